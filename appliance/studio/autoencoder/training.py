@@ -21,7 +21,7 @@ from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
 from appliance.studio.autoencoder.networks import Mlp
 from appliance.studio.autoencoder.repertoire import Nearness
-from appliance.studio.data.dataset import WINDOW, Dataset, windows
+from appliance.studio.data.dataset import WINDOW, Dataset, window_starts, windows
 from appliance.studio.processes import Processes
 from appliance.studio.training_loop import ALONE, TrainingLoop
 
@@ -131,7 +131,7 @@ class Training(TrainingLoop[Report]):
         self.lessons: Lessons = (
             Answers(
                 self.train_windows,
-                self._training_windows(False) if mirror else self.train_windows,
+                self._own_windows() if mirror else self.train_windows,
                 self.holding_chances(),
                 settings.answers,
             )
@@ -268,12 +268,15 @@ class Training(TrainingLoop[Report]):
         """(N, T, M, 4): heading-free windows to learn from, of each take its mirror image too if wanted."""
         settings, dataset = self.settings, self.dataset
         poses = windows(dataset.training, dataset.moving, mirror, settings.window, settings.hop)
-        return torch.cat(
-            [
-                self.autoencoder.without_heading(part, self.autoencoder.facing(part))
-                for part in torch.split(torch.tensor(poses).to(self.device), 4096)
-            ]
-        )
+        parts, network = torch.split(torch.tensor(poses).to(self.device), 4096), self.autoencoder
+        return torch.cat([network.without_heading(part, network.facing(part)) for part in parts])
+
+    def _own_windows(self) -> Tensor:
+        """Those of the training windows that are no mirror images: the first half of each take's."""
+        settings = self.settings
+        counts = [len(window_starts(take, settings.hop, settings.window)) for take in self.dataset.training]
+        halves = torch.split(self.train_windows, [count for count in counts for _ in range(2)])
+        return torch.cat(halves[::2])
 
     def _pace_learning(self) -> None:
         warm = min(1.0, (self.step + 1) / 200)
