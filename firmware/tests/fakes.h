@@ -133,6 +133,7 @@ class FakeSerial : public SerialPort {
  public:
   bool is_connected() override { return is_open; }
   uint16_t read(uint8_t* data, uint16_t room) override {
+    if (to_wearable.empty()) return 0;
     const size_t count = std::min<size_t>(room, to_wearable.size());
     std::copy_n(to_wearable.begin(), count, data);
     to_wearable.erase(to_wearable.begin(), to_wearable.begin() + static_cast<long>(count));

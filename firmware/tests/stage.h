@@ -11,12 +11,12 @@
 #include "box_side.h"
 #include "fakes.h"
 #include "framing.h"
+#include "second.h"
 #include "settings.h"
 #include "wearable.h"
 
 namespace bunraku {
 
-constexpr uint32_t kSecond = 1'000'000;
 constexpr uint32_t kTurnUs = 250;
 constexpr uint16_t kPort = 9750;
 inline const Address kBoxAddress = {0xC0A80401, kPort};

@@ -3,14 +3,13 @@
 
 #include <string>
 
+#include "second.h"
 #include "trouble.h"
 #include "world.h"
 
 using namespace bunraku;
 
 namespace {
-
-constexpr uint64_t kSecond = 1'000'000;
 
 // Types a line into the console and gives the answer.
 std::string ask(World& world, const std::string& line) {

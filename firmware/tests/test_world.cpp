@@ -7,6 +7,7 @@
 #include "board_model.h"
 #include "flash_model.h"
 #include "path.h"
+#include "second.h"
 #include "serial_model.h"
 #include "wifi_model.h"
 
@@ -14,7 +15,6 @@ using namespace bunraku;
 
 namespace {
 
-constexpr uint64_t kSecond = 1'000'000;
 const uint8_t kBytes[] = {1, 2, 3};
 
 struct Air {

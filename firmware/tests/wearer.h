@@ -8,10 +8,10 @@
 #include "box_side.h"
 #include "fakes.h"
 #include "pairing.h"
+#include "second.h"
 
 namespace bunraku {
 
-constexpr uint32_t kSecond = 1'000'000;
 constexpr uint32_t kBoot = 0xB0071234;
 inline const Way kBoxOnWifi = {Lane::kWifi, false, {0xC0A80401, 9750}};
 

@@ -25,8 +25,6 @@ constexpr uint16_t kMostUnchanged = 500;        // and always much sooner
 constexpr int16_t kLargestAcceleration = 6000;  // 1/100 m/s^2: at 4 g nothing larger is measured
 constexpr uint8_t kReadingBytes = 14;           // quaternion and linear acceleration
 
-int16_t value(const uint8_t* at) { return static_cast<int16_t>(at[0] | at[1] << 8); }
-
 }  // namespace
 
 bool is_axis_remap(uint8_t axis_map, uint8_t axis_sign) {

@@ -6,12 +6,12 @@
 namespace bunraku {
 namespace {
 
+using bno055::value;
+
 constexpr uint8_t kAllOffsets = 18;
 constexpr int16_t kLargestAccelerometer = 4000, kLargestMagnetometer = 6400, kLargestGyroscope = 32000;
 constexpr int16_t kLargestAccelerometerRadius = 1000;
 constexpr int16_t kLeastMagnetometerRadius = 144, kLargestMagnetometerRadius = 1280;
-
-int16_t value(const uint8_t* at) { return static_cast<int16_t>(at[0] | at[1] << 8); }
 
 bool is_within(const uint8_t* three, int16_t largest) {
   for (uint8_t i = 0; i < 6; i += 2) {
