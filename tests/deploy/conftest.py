@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -29,12 +30,16 @@ def maker(needs_roots: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def make_release(maker: Path, tmp_path_factory: pytest.TempPathFactory) -> MakeRelease:
-    """Call it with a version; what write_release takes can be named."""
+    """Call it with a version; what write_release takes can be named. Each call gives a stick of its own."""
+    made: dict[tuple[object, ...], Path] = {}
 
     def make(version: str, **more: object) -> Path:
-        folder = tmp_path_factory.mktemp("stick") / "release"
         asked = {"key": maker, "python": str(box_root.python()), **more}
-        return write_release(folder, version, **asked)  # type: ignore[arg-type]
+        wanted = (version, *sorted(asked.items()))
+        if wanted not in made:
+            made[wanted] = tmp_path_factory.mktemp("made") / "release"
+            write_release(made[wanted], version, **asked)  # type: ignore[arg-type]
+        return Path(shutil.copytree(made[wanted], tmp_path_factory.mktemp("stick") / "release"))
 
     return make
 
