@@ -11,8 +11,9 @@ from tests.boot.box import STAGE, Box, standing
 from tests.boot.disk import DataDisk
 from tests.boot.figures import Figures
 from tests.boot.hall import Hall
-from tests.boot.root import release
+from tests.boot.root import MAKER, release
 from tests.boot.trial import changed_release
+from tests.deploy.small_release import sign
 
 KEPT = "/data/bunraku-releases"
 _STAGE = "appliance/stage/run.py"
@@ -27,11 +28,12 @@ pytestmark = pytest.mark.boot
 @pytest.fixture(scope="module")
 def on_the_stick(image: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Release 9.9.4: one of its units is another one, and its stage can be told to fail."""
-    folder = tmp_path_factory.mktemp("stick")
-    made = changed_release(release(image), folder / "made", "9.9.4", _STAGE, _FAILS_WHEN_TOLD)
+    folder = tmp_path_factory.mktemp("stick") / "release"
+    made = changed_release(release(image), folder, "9.9.4", _STAGE, _FAILS_WHEN_TOLD)
     unit = made / "system/usr/lib/systemd/system/bunraku-console.service"
     unit.write_text(unit.read_text().replace("TasksMax=48", "TasksMax=49"))
-    return changed_release(made, folder / "release", "9.9.4", _STAGE, "")
+    sign(made, MAKER)
+    return made
 
 
 @pytest.fixture(scope="module")

@@ -28,9 +28,10 @@ def changed_release(sound: Path, folder: Path, version: str, module: str, last_l
 
 def _rewrite(wheel: Path, module: str, last_lines: str) -> None:
     part = wheel.with_suffix(".part")
-    with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as new:
+    with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(part, "w") as new:
         assert module in old.namelist()
         for info in old.infolist():
             data = old.read(info)
-            new.writestr(info, data + last_lines.encode() if info.filename == module else data)
+            changed = data + last_lines.encode() if info.filename == module else data
+            new.writestr(info, changed, zipfile.ZIP_STORED)
     part.replace(wheel)
