@@ -15,7 +15,7 @@ from tests.boot.figures import Figures
 from tests.boot.hall import Hall, hall
 from tests.boot.root import root_image
 
-# Who has the dancing box before whom: a look at what was just switched on, then harm, then another box file.
+# The order on the dancing box: looks at what was just switched on, then harm, then another box file.
 TURNS = ("test_power_on", "test_ports", "test_page", "test_companions", "test_restarts", "test_page_changes")
 
 

@@ -1,7 +1,4 @@
-"""The root that boots: built as the image's is, from the working tree, and kept until an input changes.
-
-`python -m tests.boot.root` builds it before the tests want it, where a box can boot at all.
-"""
+"""The root that boots: built as the image's is, from the working tree, and kept until an input changes."""
 
 from __future__ import annotations
 
@@ -12,7 +9,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.boot import rights
 from tests.conftest import ROOT
 from tests.deploy.small_release import make_key
 
@@ -78,8 +74,3 @@ def _run(*words: str) -> None:
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
     done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, f"{' '.join(words)}: {done.returncode}\n{done.stdout}{done.stderr}"
-
-
-if __name__ == "__main__":
-    reason = rights.why_not()
-    print(f"The box's root: {reason or root_image()}", flush=True)
