@@ -38,9 +38,9 @@ def pytest_configure(config: pytest.Config) -> None:
     report = figures_report.FiguresReport(ROOT / "build" / "boot")
     config.pluginmanager.register(report, figures_report.NAME)
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process compiles all modules
-    gc.disable()  # until all tests are collected: what is loaded by then stays
     worker = os.environ.get("PYTEST_XDIST_WORKER")
     if worker:
+        gc.disable()  # until all tests are collected: what is loaded by then stays
         # Files already run in parallel: what they start would only wait for its own threads.
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
             os.environ.setdefault(name, "1")
