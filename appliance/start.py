@@ -19,6 +19,7 @@ from appliance.box.realtime import prepare_environment, spare_the_collector
 _PATHS = ("--show", "--box", "--journal", "--chosen")
 _SECONDS, _ALONE = "--seconds", "--alone"
 _FEWEST_SECONDS = 0.1
+INTERRUPTED = 130  # as shells say it
 _PARAMETERS = {"show": "directory", "box": "box_file"}
 
 Wishes = dict[str, Path | float | bool]
@@ -44,6 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     prepare_environment()
     try:
         sys.exit(_play(wishes))
+    except KeyboardInterrupt:  # before there was anything to stop
+        sys.exit(INTERRUPTED)
     except Exception as error:
         from appliance.cli.app import refuse
 

@@ -141,15 +141,20 @@ def stop(stage: subprocess.Popen[bytes], words: Path) -> None:
 
 @contextlib.contextmanager
 def scratch_folder(prefix: str) -> Iterator[Path]:
-    """A temporary folder. The companions of a killed box write their last into it while it is removed."""
+    """A temporary folder."""
     folder = Path(tempfile.mkdtemp(prefix=prefix))
     try:
         yield folder
     finally:
-        until = time.monotonic() + ENDS_WITHIN_S
-        while folder.exists() and time.monotonic() < until:
-            shutil.rmtree(folder, ignore_errors=True)
-            time.sleep(0.02)
+        remove_folder(folder)
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder into which the companions of a killed box write their last meanwhile."""
+    until = time.monotonic() + ENDS_WITHIN_S
+    while folder.exists() and time.monotonic() < until:
+        shutil.rmtree(folder, ignore_errors=True)
+        time.sleep(0.02)
 
 
 @contextlib.contextmanager

@@ -16,6 +16,7 @@ from onnx import TensorProto, helper
 from appliance.cli.check import check_show, pack
 from appliance.show.bundle import write_checksums
 from appliance.stage.stage_error import StageError
+from appliance.start import INTERRUPTED
 from tests.bundles import write_show
 from tests.command import Command
 from tests.system.processes import children, wait_until
@@ -116,16 +117,22 @@ def test_play_refuses_an_endless_network(tmp_path: Path) -> None:
     assert "puppet.onnx: this network was given up" in done.stderr and "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_ends_play_while_its_network_hangs(tmp_path: Path, number: signal.Signals) -> None:
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGTERM, -signal.SIGTERM), (signal.SIGINT, INTERRUPTED)]
+)
+def test_a_signal_ends_play_while_its_network_hangs(
+    tmp_path: Path, number: signal.Signals, status: int
+) -> None:
     """What it had started to prove the network ends too, though no process is left to stop it."""
     show = endless(write_show(tmp_path / "show"), 3)
+    hearing = ("env", "--default-signal=INT")  # what runs in a shell's background ignores it
     command = [sys.executable, "-m", "appliance.start", "play", "--show", show, "--box", box(tmp_path)]
-    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen([*hearing, *command], stderr=subprocess.PIPE, text=True) as process:
         child = first_child(process.pid)
         wait_until(lambda: processor_s(child) > 0.2, "the network does not run")
         process.send_signal(number)
-        assert process.wait(PATIENCE_S)
+        assert process.wait(PATIENCE_S) == status
+        assert process.stderr is not None and "Traceback" not in process.stderr.read()
     wait_until(lambda: not Path(f"/proc/{child}").exists(), "it goes on for ever")
 
 

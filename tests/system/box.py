@@ -6,7 +6,6 @@ import contextlib
 import fcntl
 import json
 import os
-import shutil
 import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +20,7 @@ from appliance.box.checkpoint import Checkpoint, packed, read_checkpoint
 from appliance.box.record import SlotFile
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
-from hw_sim.peers import HOST, free_ports
+from hw_sim.peers import HOST, free_ports, remove_folder
 from tests.system.processes import BUNRAKU, Process, children_running, has_argument, run_bunraku, wait_until
 from tests.system.wearables import Wearables
 
@@ -159,7 +158,7 @@ def cut_power(box: Box, file: Path) -> Checkpoint:
     """What a power cut takes is gone: processes, the runtime folder, this boot. The place on the disk."""
     box.end(signal.SIGKILL)
     await_end_of_keeper(box.runtime)
-    shutil.rmtree(box.runtime)
+    remove_folder(box.runtime)
     place = read_checkpoint(file)
     assert place is not None
     with closing(SlotFile(file)) as slots:

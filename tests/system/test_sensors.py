@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import signal
 import time
 from collections.abc import Callable
@@ -15,6 +14,7 @@ import pytest
 from appliance.dancer.puppeteers import HOLD_S, TAKE_S
 from appliance.recorder.reading import read_journal
 from hw_sim.emulator import Sent
+from hw_sim.peers import remove_folder
 from tests.bundles import FIGURE, MOVING, write_show
 from tests.hw_sim.null_modem import NullModem
 from tests.system.box import JOURNAL, Box, await_end_of_keeper, playing
@@ -117,7 +117,7 @@ def test_after_a_power_cut_the_neutral_pose_is_used_again(show: Path, tmp_path: 
         wait_until((tmp_path / "sensors.memory").exists)
         box.end(signal.SIGKILL)
         await_end_of_keeper(tmp_path / "runtime")
-        shutil.rmtree(tmp_path / "runtime")
+        remove_folder(tmp_path / "runtime")
         box.kill_and_restart()
         box.await_words("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
         assert box.end() == 0
