@@ -43,7 +43,7 @@ MINUTES ?= 60
 SIGNING = $(if $(KEY),--key '$(KEY)') $(if $(NEXT_KEY),--next-key '$(NEXT_KEY)')
 
 .DEFAULT_GOAL := help
-.PHONY: help run release studio firmware test test-long pytest firmware-test fuzz-corpus lint lint-beside bench \
+.PHONY: help run release studio firmware test test-long pytest beside firmware-test firmware-check fuzz fuzz-corpus lint bench \
     lock clean soak boot-figures image test-vm debian-for-image debian-for-vm debian-for-firmware \
     debian-for-tests debian-for-boot debian-for-soak
 
@@ -62,19 +62,21 @@ firmware: debian-for-firmware ## build the wearable's firmware for this machine:
 	@$(call build,firmware,wearable)
 	@echo "Built build/firmware/libwearable.so"
 
-test: $(VENV)/.ready-to-test debian-for-boot firmware-test ## style, types, contracts, all tests
-	@$(MAKE) --no-print-directory --jobs=2 pytest lint-beside
+test: $(VENV)/.ready-to-test debian-for-boot firmware fuzz ## style, types, contracts, all tests
+	@$(MAKE) --no-print-directory --jobs=2 pytest beside
 
 pytest: $(VENV)/.ready-to-test
 	@$(BIN)/pytest $(BESIDE) $(LENGTH) $(TEST_ARGS)
 
-lint-beside:  # while tests wait: with what they leave of the processors
-	@chrt --idle 0 $(MAKE) --no-print-directory lint
+beside:  # while tests wait: with what they leave of the processors
+	@chrt --idle 0 $(MAKE) --no-print-directory lint firmware-check
 
 test-long: ## the same with every count at its full length: power cuts, fuzzing, random files, property tests
 	@$(MAKE) --no-print-directory test LENGTH=--long
 
-firmware-test: debian-for-tests firmware ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
+firmware-test: firmware-check fuzz ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
+
+firmware-check: debian-for-tests firmware
 	@echo "Wearable: host tests with sanitizers"
 	@$(call build,firmware,core_tests)
 	@build/firmware/core_tests --no-intro
@@ -85,6 +87,8 @@ firmware-test: debian-for-tests firmware ## the wearable: host tests, analysis, 
 	@$(call build,firmware-m0,sketch budget,-DCMAKE_TOOLCHAIN_FILE=cmake/cortex-m0plus.cmake)
 	@echo "Wearable: on an emulated Cortex-M0"
 	@$(call build,firmware-m0,dance)
+
+fuzz: debian-for-tests
 	@echo "Wearable: fuzzing for $(FUZZ_SECONDS) s"
 	@$(call build,firmware-fuzz,all,-DBUNRAKU_FUZZ=ON -DCMAKE_CXX_COMPILER=clang++-$(CLANG))
 	@firmware/fuzz/run.sh build/firmware-fuzz $(FUZZ_SECONDS)
