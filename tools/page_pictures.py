@@ -19,7 +19,7 @@ import typer
 from PIL import Image
 from playwright.sync_api import Browser, Page, TimeoutError, sync_playwright
 
-CHROMIUM = "/usr/bin/chromium"
+CHROMIUM = "/usr/bin/chromium-headless-shell"  # without the windows of a desktop
 PAGES = ("tonight", "dance", "sensors", "rehearsal", "picture", "prove", "happened", "box", "device")
 _FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 _COLOURS = 64  # a third of the bytes, and nothing that is seen

@@ -14,7 +14,6 @@ from tests.system.box import Box
 from tests.system.processes import PATIENCE_S, wait_until
 
 PATIENCE_MS = 1000 * PATIENCE_S
-CHROMIUM = "/usr/bin/chromium"
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}}
 ON_A_LAPTOP = pytest.mark.parametrize("context", [LAPTOP], ids=["laptop"], indirect=True)

@@ -10,9 +10,10 @@ from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
 from playwright.sync_api import Page as Tab
 
 from tests.bundles import write_show
-from tests.console.browser import CHROMIUM, PATIENCE_MS, PHONE
+from tests.console.browser import PATIENCE_MS, PHONE
 from tests.console.page import CUES, Page, box_with_page, page_alone
 from tests.system.box import Box
+from tools.page_pictures import CHROMIUM
 
 
 @pytest.fixture

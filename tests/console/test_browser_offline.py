@@ -10,9 +10,10 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from tests.bundles import write_show
-from tests.console.browser import CHROMIUM, PATIENCE_MS, PHONE, await_true, press
+from tests.console.browser import PATIENCE_MS, PHONE, await_true, press
 from tests.console.page import box_with_page
 from tests.system.namespace import Cable, Namespace, why_not
+from tools.page_pictures import CHROMIUM
 
 WHY_NOT = why_not()
 BOX, SUBNET = "10.77.0.1", "10.77.0.0/24"

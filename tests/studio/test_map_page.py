@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, sync_playwright
 
-from tests.console.browser import CHROMIUM
 from tests.studio.conftest import bunraku
+from tools.page_pictures import CHROMIUM
 
 # How many pixels of a canvas are near a colour.
 COUNT = """([id, colour]) => {
