@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import random
 import signal
 import socket
@@ -264,19 +265,13 @@ def test_the_page_dies_and_comes_back_and_the_dance_does_not_notice(venue: tuple
     (process,) = children_running(box.process.pid, "appliance.console")
     for number in (signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT):
         with contextlib.suppress(ProcessLookupError):
-            signal.pidfd_send_signal(pidfd(process), number)
+            signal.pidfd_send_signal(os.pidfd_open(process), number)
     wait_until(lambda: children_running(box.process.pid, "appliance.console") not in ([process], []))
     wait_until(page.is_open)
     assert page.get("/api/me").value["known"], "the device is remembered"
     box.pause()
     assert box.frames(1)[0][0] > first and box.process.poll() is None
     wait_until(lambda: deaths() > before)
-
-
-def pidfd(process: int) -> int:
-    import os
-
-    return os.pidfd_open(process)
 
 
 async def read_on(browser: ClientWebSocketResponse) -> None:

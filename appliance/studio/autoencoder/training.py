@@ -128,13 +128,9 @@ class Training(TrainingLoop[Report]):
             self.critic.parameters(), lr=settings.critic_learning_rate, betas=(0.5, 0.999), fused=True
         )
         conditional = isinstance(network, Conditional)
+        own = self._own_windows() if mirror else self.train_windows
         self.lessons: Lessons = (
-            Answers(
-                self.train_windows,
-                self._own_windows() if mirror else self.train_windows,
-                self.holding_chances(),
-                settings.answers,
-            )
+            Answers(self.train_windows, own, self.holding_chances(), settings.answers)
             if conditional
             else Copies(self.train_windows, settings.input_noise_degrees, processes)
         )
