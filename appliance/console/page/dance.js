@@ -18,7 +18,7 @@ export class Dance {
     this.pitch = 0.12;
     this.zoom = 1;
     this.centre = null;
-    this.away = NEAR_M;
+    this.away = null;
     this.show = null;
     this.frame = null;
     this.generation = -1;
@@ -132,6 +132,7 @@ export class Dance {
     this.centre = this.centre.map((value, axis) => value + share * (middle[axis] - value));
     const apart = Math.max(...roots.map((one) => Math.hypot(one[0] - middle[0], one[2] - middle[1])));
     const away = NEAR_M + BACK * apart;
+    this.away ??= away;
     this.away += share * (away - this.away);
     const eye = this.eye(wide, high);
     this.drawFloor(ink, eye, ratio);

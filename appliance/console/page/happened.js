@@ -116,7 +116,7 @@ async function danceAgain() {
   byId("again").scrollIntoView({ block: "center" });
   dance ??= new Dance(byId("again"), byId("again-held"), Object.assign(new EventTarget(), { framesWanted: true }), words);
   dance.show = facts;
-  dance.centre = null;
+  dance.centre = dance.away = null;
   const begun = performance.now();
   const next = () => {
     const shown = Math.floor((performance.now() - begun) / (1000 * facts.every_s)) % frames.length;
