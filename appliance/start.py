@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
-import gc
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -39,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if wishes is None:
         from appliance.cli.app import main as any_command
 
-        any_command(given, gc.enable)
+        any_command(given)
         return
     end_with_parent()
     prepare_environment()

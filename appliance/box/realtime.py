@@ -33,6 +33,18 @@ def spare_the_collector() -> None:
     atexit.register(gc.freeze)
 
 
+@contextlib.contextmanager
+def uncollected() -> Iterator[None]:
+    """While much is read that has no cycles: looking for them took longer than to read."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+
+
 def give_way(niceness: int) -> None:
     """The dance goes first, also without real-time rights; an installed box says so in the process's unit."""
     with contextlib.suppress(OSError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
@@ -140,11 +141,8 @@ def version() -> None:
     print(f"bunraku {distribution_version('bunraku')}")
 
 
-def main(arguments: Sequence[str] | None = None, loaded: Callable[[], None] = lambda: None) -> None:
-    """Run one command; an error that the user can correct ends it with one clear line and exit status 2.
-
-    loaded: called once, when the command has been loaded and before it runs.
-    """
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command; an error that the user can correct ends it with one clear line and exit status 2."""
     end_with_parent()
     given = list(sys.argv[1:] if arguments is None else arguments)
     if "--version" in given:
@@ -156,7 +154,7 @@ def main(arguments: Sequence[str] | None = None, loaded: Callable[[], None] = la
         command = parser(None, plugged)
     give_help(command, order=ORDER)
     _require_known(given, list(command.commands))
-    loaded()
+    gc.enable()  # spare_the_collector has put it off until the command is loaded
     try:
         command(given, prog_name="bunraku")
     except Exception as error:

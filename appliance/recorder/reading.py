@@ -13,6 +13,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from appliance.box.realtime import uncollected
 from appliance.pose.foreign_file import content, opened
 from appliance.pose.skeleton import Skeleton
 from appliance.recorder import chunks, log
@@ -20,7 +21,6 @@ from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
 from appliance.recorder.record import DAMAGED, EVENT, PIECE, TICK, layout_of, require_sound, skeleton_of
 from appliance.recorder.segments import SUFFIX, segment_paths
-from appliance.recorder.uncollected import uncollected
 
 EXPORTED = ".bunraku"
 _OLD_MAGIC = b"bunraku journal 1\n"

@@ -19,8 +19,10 @@ def require_sound(box: Path | None) -> None:
 
 def require_wires(box: Path | None) -> None:
     """Raises NotAskedForError where a box file is given and has no wires; ConfigError: it is no YAML."""
-    outputs = {} if box is None else read_yaml(box).values.get("outputs", {})
-    if box is not None and isinstance(outputs, dict) and outputs.get("dmx", []) == []:
+    if box is None:
+        return
+    outputs = read_yaml(box).values.get("outputs", {})
+    if isinstance(outputs, dict) and outputs.get("dmx", []) == []:
         raise no_wires(box)
 
 

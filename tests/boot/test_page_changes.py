@@ -71,7 +71,7 @@ def test_https_makes_its_certificate_in_the_page_s_sandbox(dancing: Box, device:
 
 
 def _certificate(box: Box) -> str:
-    """What the page shows to whoever asks for HTTPS; nothing where it does not answer so."""
+    """The certificate of the page's port, as PEM; empty while the page does not answer to HTTPS."""
     try:
         with box.hall.box_network.entered():
             return ssl.get_server_certificate(("127.0.0.1", 8080), timeout=10.0)

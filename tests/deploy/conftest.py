@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -33,12 +34,12 @@ def make_release(maker: Path, tmp_path_factory: pytest.TempPathFactory) -> MakeR
     """Call it with a version; what write_release takes can be named. Each call gives a stick of its own."""
     made: dict[tuple[object, ...], Path] = {}
 
-    def make(version: str, **more: object) -> Path:
-        asked = {"key": maker, "python": str(box_root.python()), **more}
+    def make(version: str, **more: Any) -> Path:
+        asked: dict[str, Any] = {"key": maker, "python": str(box_root.python()), **more}
         wanted = (version, *sorted(asked.items()))
         if wanted not in made:
             made[wanted] = tmp_path_factory.mktemp("made") / "release"
-            write_release(made[wanted], version, **asked)  # type: ignore[arg-type]
+            write_release(made[wanted], version, **asked)
         return Path(shutil.copytree(made[wanted], tmp_path_factory.mktemp("stick") / "release"))
 
     return make
