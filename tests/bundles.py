@@ -83,7 +83,8 @@ def puppet_inputs(joints: int, targets: list[int] | None = None) -> list[onnx.Va
 def set_facts(model: onnx.ModelProto, joints: Sequence[str], /, **more: str) -> None:
     """Write into a network which joints it moves, at rest unrotated, and more facts."""
     rest = np.tile(quaternion.IDENTITY, (len(joints), 1)).tolist()
-    facts = {"joints": ",".join(joints), "window": str(WINDOW), "rest": json.dumps(rest), **more}
+    sizes = {"window": str(WINDOW), "latent": "1"}
+    facts = {"joints": ",".join(joints), **sizes, "rest": json.dumps(rest), **more}
     helper.set_model_props(model, {f"bunraku.{name}": fact for name, fact in facts.items()})
 
 
@@ -128,5 +129,5 @@ def _network(kind: str) -> onnx.ModelProto:
     graph = helper.make_graph(nodes, kind, puppet_inputs(moving), outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
     model.ir_version = 9
-    set_facts(model, MOVING, architecture=kind, latent="1", precision="fp32")
+    set_facts(model, MOVING, architecture=kind, precision="fp32")
     return model

@@ -39,14 +39,15 @@ class PuppetError(ValueError):
 class Puppet:
     """One onnxruntime session on one network file; joints that the network does not move bypass it.
 
-    joints: names of the M moving joints; moving (M,): their places in the skeleton; window: poses a window.
+    joints: names of the M moving joints; moving (M,): their places in the skeleton; window: poses a window;
+    latent: Z numbers that a window is coded in.
     is_broken: whether the last dance() gave invalid poses (it then returned the last valid ones).
     """
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:
         """Raises PuppetError if bunraku did not export the file or it does not fit the skeleton."""
         self._session, facts = _session(path)
-        self.joints, self.window, self.rest = _read_facts(path, facts)
+        self.joints, self.window, self.latent, self.rest = _read_facts(path, facts)
         self.architecture = facts.get("bunraku.architecture", "unknown")
         self.precision = facts.get("bunraku.precision", "unknown")
         try:
@@ -162,10 +163,11 @@ def _session(path: Path) -> tuple[onnxruntime.InferenceSession, dict[str, str]]:
     return session, facts
 
 
-def _read_facts(path: Path, facts: dict[str, str]) -> tuple[tuple[str, ...], int, FloatArray]:
+def _read_facts(path: Path, facts: dict[str, str]) -> tuple[tuple[str, ...], int, int, FloatArray]:
     try:
         joints = tuple(facts["bunraku.joints"].split(","))
         window = int(facts["bunraku.window"])
+        latent = int(facts["bunraku.latent"])
         rest = rest_pose(facts, len(joints))
         if window != WINDOW:
             raise ValueError(f"its windows are {window} poses long; the box dances windows of {WINDOW}")
@@ -173,7 +175,7 @@ def _read_facts(path: Path, facts: dict[str, str]) -> tuple[tuple[str, ...], int
         raise PuppetError(
             f"{path}: the network does not say what it moves ({_short(error)}). {_CURE}"
         ) from None
-    return joints, window, rest
+    return joints, window, latent, rest
 
 
 def _short(error: Exception) -> str:

@@ -57,7 +57,9 @@ class StagePuppet:
     dance, blend, stand.
 
     hand_places: where the hands' joints stand among the moving ones; place None: where its phrase has it;
-    network_failed: the last good pose stays, because the network gave none.
+    network_failed: the last good pose stays, because the network gave none. What the network takes besides:
+    liveliness, how much of the phrase's own stays while a hand holds (1: all of it), and noise (Z,), added to
+    the latent.
     """
 
     puppet: Puppet
@@ -73,6 +75,8 @@ class StagePuppet:
     springs: Springs | None = None  # those among the hands
     place: Place | None = None
     network_failed: bool = False
+    liveliness: float = 1.0
+    noise: FloatArray = field(init=False)
     _whole: FloatArray = field(init=False)  # (T, J, 4)
     _roots: FloatArray = field(init=False)  # (T, 3)
     _window: FloatArray = field(init=False)  # (T, M, 4)
@@ -82,6 +86,7 @@ class StagePuppet:
         self._whole, self._roots = self.motion.window(), self.motion.roots()
         self._window = self.puppet.select(self._whole)
         self._danced = self._whole[0].copy()
+        self.noise = np.zeros(self.puppet.latent, np.float32)
 
     @property
     def lift(self) -> float:
