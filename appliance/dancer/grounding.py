@@ -89,6 +89,7 @@ class Grounding:
         self._swinging = (SWINGING_M_S * tick_s) ** 2
         self._offset_x = self._offset_z = 0.0  # of the root from its path
         self._step_x = self._step_z = 0.0  # of that offset in the last tick
+        self._hips = 0.0, 0.0, 0.0  # where a hand draws the root to, x and z in metres, and its weight
         self._height: float | None = None
         self._before: list[list[float]] | None = None
         self._shift = np.zeros(3, dtype=np.float32)
@@ -101,6 +102,19 @@ class Grounding:
     @strayed.setter
     def strayed(self, metres: tuple[float, float]) -> None:
         self._offset_x, self._offset_z = metres
+
+    @property
+    def shift(self) -> FloatArray:
+        """(3,): from the phrase's root to where grounding stood it in the last tick, metres."""
+        return np.array((self._offset_x, self._height or 0.0, self._offset_z), dtype=np.float32)
+
+    def draw_hips(self, x: float, z: float, weight: float) -> None:
+        """From the next pose on let the root stand at x, z (metres), as far as the weight (0..1) says.
+
+        The path and its offset go on below it, so that the root returns there as the weight fades. The feet
+        stay where they carry the figure, as far as the legs reach (FootLock), and come along when they lift.
+        """
+        self._hips = x, z, weight
 
     def ground_pose(
         self,
@@ -124,6 +138,8 @@ class Grounding:
             self._rest = rest_heights.tolist()
         if self._rest is not None:
             self._stand(self._rest, lift_m, held)
+        elif self._hips[2]:
+            self._move(0.0)
         return self.figure
 
     def _stand(self, rest: list[float], lift_m: float, held: FloatArray | None) -> None:
@@ -136,11 +152,18 @@ class Grounding:
         self._before = points
         wanted = lift_m - lowest
         self._height = wanted if self._height is None else self._height + FOLLOW * (wanted - self._height)
-        self._shift[:] = self._offset_x, self._height, self._offset_z
-        self.figure.move(self._shift)
-        np.add(self.root, self._shift, out=self.root)
+        self._move(self._height)
         above_floor = [clearance + self._height for clearance in clearances]
         self._foot_lock.lock(self.pose, self.figure, above_floor, lift_m, held)
+
+    def _move(self, height: float) -> None:
+        """Move figure and root from the phrase's root to their offset, this high, and to the hand."""
+        x, z, weight = self._hips
+        drawn_x = weight * (x - float(self.root[0]) - self._offset_x)
+        drawn_z = weight * (z - float(self.root[2]) - self._offset_z)
+        self._shift[:] = self._offset_x + drawn_x, height, self._offset_z + drawn_z
+        self.figure.move(self._shift)
+        np.add(self.root, self._shift, out=self.root)
 
     def state(self) -> dict[str, Any]:
         """What later positions depend on, for `restore`: plain values and copies of arrays."""

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.dancer.extrapolation import Extrapolation
+from appliance.dancer.held_places import HeldPlace, in_figure
+from appliance.dancer.loop import Placement
 from appliance.dancer.puppeteers import Kept, Puppeteer
 from appliance.dancer.slerp import FloatArray
 from appliance.dancer.springs import Springs
@@ -25,22 +27,52 @@ class Hands:
 
     targets: one orientation for each pose of the window, the present one first. The motion of a hand is
     extrapolated over the window; a kept joint has the orientations of the phrase's own window.
+    places (M, 3), place_weights (M,): joints that are held by place, metres in the figure's frame
+    (held_places.in_figure). The root held by place is its origin: that hand moves the figure's path
+    (hips_drawn). holds (M,): how firmly each joint is held, in either way.
     """
 
-    def __init__(self, puppeteers: Sequence[Puppeteer], joints: Sequence[str], window: int = 8) -> None:
-        """joints: the M moving joints of the network; window: its T poses. Raises HandError."""
+    def __init__(
+        self,
+        puppeteers: Sequence[Puppeteer],
+        joints: Sequence[str],
+        window: int = 8,
+        placement: Placement | None = None,
+        ahead_s: float = 0.0,
+    ) -> None:
+        """joints: the M moving joints of the network; window: its T poses; placement: from the puppet's own
+        floor to the room; ahead_s: how far ahead of its tick blending uses a window on average. Raises
+        HandError.
+        """
         self.puppeteers = tuple(puppeteers)
+        taken: list[int] = []
         places: list[int] = []
-        self._rows: list[slice] = []  # of each puppeteer, in what follows
+        self._turned: list[tuple[slice, Puppeteer]] = []  # with the rows of each, in what follows
+        self._placed: list[HeldPlace] = []
         for puppeteer in puppeteers:
             held = puppeteer.joints if isinstance(puppeteer, Springs) else (puppeteer.joint,)
-            self._rows.append(slice(len(places), len(places) + len(held)))
             for joint in held:
                 place = _place(joint, joints)
-                if place in places:
+                if place in taken:
                     raise HandError(f"Two hands hold '{joint}'. Give each joint to one hand only.")
-                places.append(place)
+                taken.append(place)
+            if isinstance(puppeteer, HeldPlace):
+                self._placed.append(puppeteer)
+            else:
+                self._turned.append((slice(len(places), len(places) + len(held)), puppeteer))
+                places += taken[-len(held) :]
         self._places: NDArray[np.intp] = np.array(places, dtype=np.intp)
+        self._placed.sort(key=lambda one: not one.is_root)  # the others stand on what it does
+        self._hips = next((one for one in self._placed if one.is_root), None)
+        self._from_room = (placement or Placement()).inverse
+        self._ahead_s = ahead_s
+        self._placed_at: NDArray[np.intp] = np.array(
+            [_place(one.joint, joints) for one in self._placed], dtype=np.intp
+        )
+        self._points = np.zeros((len(self._placed), 3), dtype=np.float32)
+        self.places = np.zeros((len(joints), 3), dtype=np.float32)
+        self.place_weights = np.zeros(len(joints), dtype=np.float32)
+        self.holds = np.zeros(len(joints), dtype=np.float32)
         self.mask: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
         self.targets = np.tile(quaternion.IDENTITY, (window, len(joints), 1))
         self.weights = np.zeros(len(joints), dtype=np.float32)
@@ -53,17 +85,54 @@ class Hands:
         self._extrapolation = Extrapolation(count, window)
         self._ahead = np.empty((window, count, 4), dtype=np.float32)
 
-    def pull(self, now: float, window: FloatArray) -> None:
+    def pull(
+        self,
+        now: float,
+        window: FloatArray,
+        path: FloatArray | None = None,
+        positions: FloatArray | None = None,
+    ) -> None:
         """Write all targets of this moment; call it once a tick.
 
         window (T, M, 4): the phrase's own poses of the moving joints, without sign jumps. The signs of the
         targets jump neither from tick to tick nor from pose to pose. Motion of a joint while
         nothing held it is not extrapolated.
+        path (3,): where the figure's root will stand unless a hand draws it; positions (J, 3): where its
+        joints are; metres on the puppet's own floor. Only joints that are held by place need them.
         """
-        if not self.puppeteers:
-            return
+        if self._turned:
+            self._pull_orientations(now, window)
+        if self._placed and path is not None and positions is not None:
+            self._pull_places(now, window, path.tolist(), positions)
+        np.maximum(self.weights, self.place_weights, out=self.holds)
+
+    @property
+    def hips_drawn(self) -> tuple[float, float, float]:
+        """Where the last pull drew the root: x and z on the puppet's own floor (metres), and the weight."""
+        if self._hips is None:
+            return 0.0, 0.0, 0.0
+        x, _, z = self._hips.place()
+        return x, z, self._hips.held_weight
+
+    def _pull_places(self, now: float, window: FloatArray, path: list[float], positions: FloatArray) -> None:
+        root = path
+        for row, puppeteer in enumerate(self._placed):
+            told = puppeteer.told
+            if told is not None:
+                x, z = self._from_room.point(told[0], told[2])
+                told = x, told[1], z
+            puppeteer.stand(positions[puppeteer.number].tolist(), root, told)
+            self.place_weights[self._placed_at[row]] = puppeteer.pull(now).weight
+            self._points[row] = puppeteer.place(self._ahead_s)
+            if puppeteer is self._hips:
+                x, z, weight = self.hips_drawn
+                root = [path[0] + weight * (x - path[0]), path[1], path[2] + weight * (z - path[2])]
+        facing = quaternion.heading(window[len(window) // 2, 0])
+        self.places[self._placed_at] = in_figure(self._points, np.array(root, np.float32), facing)
+
+    def _pull_orientations(self, now: float, window: FloatArray) -> None:
         np.copyto(self._before, self._present)
-        for rows, puppeteer in zip(self._rows, self.puppeteers, strict=True):
+        for rows, puppeteer in self._turned:
             self._is_new[rows] = not puppeteer.is_holding
             if isinstance(puppeteer, Kept):
                 puppeteer.follow_phrase(window[0, self._places[rows.start]])
@@ -77,7 +146,7 @@ class Hands:
         np.multiply(self._present, self._signs, out=self._present)
         self._extrapolation(self._present, self._is_new, out=self._ahead)
         self.targets[:, self._places] = self._ahead
-        for rows, puppeteer in zip(self._rows, self.puppeteers, strict=True):
+        for rows, puppeteer in self._turned:
             if isinstance(puppeteer, Kept):
                 place = self._places[rows.start]
                 np.multiply(window[:, place], self._signs[rows.start], out=self.targets[:, place])
@@ -91,6 +160,7 @@ class Hands:
             "present": self._present.copy(),
             "targets": self.targets[:, self._places].copy(),
             "weights": self.weights.copy(),
+            "places": [self.places.copy(), self.place_weights.copy(), self.holds.copy()],
             "extrapolation": self._extrapolation.state(),
         }
 
@@ -100,6 +170,7 @@ class Hands:
             puppeteer.restore(kept)
         self.mask[:], self._present[:], self.weights[:] = state["mask"], state["present"], state["weights"]
         self.targets[:, self._places] = state["targets"]
+        self.places[:], self.place_weights[:], self.holds[:] = state["places"]
         self._extrapolation.restore(state["extrapolation"])
 
 

@@ -49,6 +49,11 @@ class Puppeteer:
         return self._target.weight > 0.0
 
     @property
+    def held_weight(self) -> float:
+        """How much weight the last pull gave the joint, 0..1."""
+        return self._target.weight
+
+    @property
     def orientation(self) -> FloatArray:
         """Where the last pull pointed the joint, (4,) local; overwritten by the next."""
         return self._target.orientation

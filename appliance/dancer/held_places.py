@@ -1,0 +1,212 @@
+"""Held places: puppeteers that give a joint a place in the room instead of an orientation (fixed, OSC)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from appliance.dancer.puppeteers import Puppeteer
+from appliance.dancer.slerp import FloatArray
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
+
+REACH = 0.95  # share of the stretched chain of bones: at its very end every way on turns the whole body
+HIPS_REACH_M = 1.0  # of the hips from their own path
+FARTHEST_M = 100.0  # from the middle of the stage: a place beyond is a mistake
+
+Point = tuple[float, float, float]
+_ORIGIN: Point = (0.0, 0.0, 0.0)
+
+
+class Limits(NamedTuple):
+    """How a place follows what it is told: speed, acceleration, and the lag behind a steady hand."""
+
+    m_s: float
+    m_s2: float
+    follow_s: float
+
+
+LIMBS = Limits(3.0, 60.0, 0.05)  # the hands of the recorded dancers reach 3 to 4 m/s
+HIPS = Limits(1.0, 5.0, 0.2)  # the feet have to come along
+
+
+def in_figure(places: Array, root: Array, facing: Array) -> Array:
+    """Places (..., 3) of the room in the frame of the figure, metres.
+
+    root (3,): of the figure in the room; facing (4,): its heading, a turn about +Y. In the figure's frame the
+    root joint is the origin and faces +Z, as the network sees it.
+    """
+    return quaternion.rotate(quaternion.inverse(facing), places - root)
+
+
+def in_room(places: Array, root: Array, facing: Array) -> Array:
+    """The inverse of in_figure."""
+    return quaternion.rotate(facing, places) + root
+
+
+def reach_of(skeleton: Skeleton, joint: int) -> float:
+    """How far a joint gets from the root, metres: REACH of all bones from there, stretched.
+
+    The root itself: HIPS_REACH_M, from its own path.
+    """
+    chain = skeleton.ancestors(joint)[:-1]
+    if not chain:
+        return HIPS_REACH_M
+    return REACH * float(sum(np.linalg.norm(skeleton.offsets[one]) for one in chain))
+
+
+class HeldPlace(Puppeteer):
+    """Holds one joint at a place. Its weight grows and fades as that of every hand.
+
+    The place starts where the joint is when the hand takes it, and follows what it is told within Limits: a
+    place that jumps moves the figure no faster than a dancer does. It stays above the floor and within
+    `reach` of the root.
+    """
+
+    def __init__(self, joint: str, skeleton: Skeleton, weight: float = 1.0) -> None:
+        super().__init__(joint, weight)
+        self.number = skeleton.index(joint)
+        self.reach = reach_of(skeleton, self.number)
+        self._told: Point | None = None
+        self._here = self._aim = self._root = _ORIGIN
+        self._place = self._speed = _ORIGIN
+        self._limits = HIPS if self.is_root else LIMBS
+
+    @property
+    def is_root(self) -> bool:
+        """Whether it holds the hips: their place moves the whole figure."""
+        return self.number == 0
+
+    @property
+    def told(self) -> Point | None:
+        """The place that it was told last, metres in the room; None: none."""
+        return self._told
+
+    def stand(self, here: Sequence[float], root: Sequence[float], told: Point | None) -> None:
+        """Before each pull: where its joint is and where the root will be, metres, and `told` as the same
+        frame has it.
+        """
+        self._here, self._root = _three(here), _three(root)
+        self._aim = self._place if told is None else told
+
+    def place(self, ahead_s: float = 0.0) -> Point:
+        """Where the last pull held the joint, or will hold it ahead_s later; in the frame of `stand`."""
+        x, y, z = (at + ahead_s * speed for at, speed in zip(self._place, self._speed, strict=True))
+        return self._bounded((x, y, z))
+
+    def state(self) -> dict[str, Any]:
+        return super().state() | {
+            "place": [*self._place, *self._speed],
+            "told_place": None if self._told is None else list(self._told),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        x, y, z, *speed = state["place"]
+        self._place, self._speed = (x, y, z), _three(speed)
+        self._told = None if state["told_place"] is None else _three(state["told_place"])
+
+    def _holds(self, now: float) -> bool:
+        return self._told is not None
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        """Move the place towards what it was told; the orientation stays."""
+        if not self.is_holding:
+            self._place, self._speed = self._here, _ORIGIN
+        if not elapsed:
+            return
+        limits = self._limits
+        way = _minus(self._bounded(self._aim), self._place)
+        far = math.hypot(*way)
+        wanted = _times(way, min(1.0 / max(limits.follow_s, elapsed), limits.m_s / far)) if far > 0.0 else way
+        change = _minus(wanted, self._speed)
+        most = limits.m_s2 * elapsed
+        length = math.hypot(*change)
+        if length > most:
+            change = _times(change, most / length)
+        self._speed = _plus(self._speed, change)
+        self._place = _plus(self._place, _times(self._speed, elapsed))
+
+    def _bounded(self, place: Point) -> Point:
+        """Above the floor, and within reach of the root."""
+        x, y, z = place
+        way = _minus((x, max(0.0, y), z), self._root)
+        far = math.hypot(*way)
+        return _plus(self._root, _times(way, min(1.0, self.reach / far))) if far > 0.0 else self._root
+
+
+class FixedPlace(HeldPlace):
+    """Holds its joint at one place for good."""
+
+    def __init__(self, joint: str, skeleton: Skeleton, place: Sequence[float], weight: float = 1.0) -> None:
+        """place: x, y, z in the room, metres. Raises ValueError."""
+        super().__init__(joint, skeleton, weight)
+        self._told = checked_place(place)
+
+
+class RemotePlace(HeldPlace):
+    """A joint whose place remote control gives (OSC, a finger on the page, a tracker); free until then."""
+
+    def __init__(self, joint: str, skeleton: Skeleton, weight: float = 1.0) -> None:
+        super().__init__(joint, skeleton, weight)
+        self._left_s = math.inf
+
+    def hold(self, place: Sequence[float], for_s: float = math.inf) -> None:
+        """Hold the joint at x, y, z in the room, metres; released where for_s pass without a new place.
+
+        Raises ValueError.
+        """
+        self._told, self._left_s = checked_place(place), for_s
+
+    def hold_here(self, place: Sequence[float]) -> None:
+        """Hold the joint where it is, unless a place was set before."""
+        if self._told is None:
+            self.hold(place)
+
+    def release(self) -> None:
+        """Give the joint back to the puppet."""
+        self._told = None
+
+    def state(self) -> dict[str, Any]:
+        return super().state() | {"left_s": self._left_s}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self._left_s = state["left_s"]
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        self._left_s -= elapsed
+        if self._left_s < 0.0:
+            self._told, self._aim = None, self._place
+        super()._point(orientation, now, elapsed)
+
+
+def checked_place(place: Sequence[float]) -> Point:
+    """Three finite numbers, metres. Raises ValueError."""
+    numbers = [float(value) for value in place]
+    if len(numbers) != 3 or not all(abs(value) <= FARTHEST_M for value in numbers):
+        raise ValueError(
+            f"{numbers} is no place: three numbers x, y, z in metres are needed, at most {FARTHEST_M:g} each."
+        )
+    return _three(numbers)
+
+
+def _three(values: Sequence[float]) -> Point:
+    x, y, z = values
+    return float(x), float(y), float(z)
+
+
+def _plus(a: Point, b: Point) -> Point:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _minus(a: Point, b: Point) -> Point:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _times(a: Point, share: float) -> Point:
+    return a[0] * share, a[1] * share, a[2] * share
