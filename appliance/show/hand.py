@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from appliance.show.section import Axis, Joint, Orientation, Section, key, refusal
 
 LONGEST_SENSOR_NAME = 24  # as in the key file (appliance/sensor/keys.py) and the wearable's flash
 KINDS = ("sensor", "turning", "fixed", "kept", "osc", "springs")
 SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # of a hand, for a worn sensor alone
+BY_POSITION = ("osc", "fixed")  # kinds that may give a position instead of an orientation
+FARTHEST_M = 100.0  # from the middle of the stage
+
+Metres = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
+Position = Annotated[tuple[Metres, Metres, Metres], Field(strict=False)]
 
 
 class TurningConfig(Section):
@@ -24,6 +29,9 @@ class FixedConfig(Section):
     """A hand that holds its joint still."""
 
     orientation: Orientation = key("Local to the parent joint.", (1.0, 0.0, 0.0, 0.0))
+    position: Position | None = key(
+        "In the room, metres: x, y upwards, z. Only for `by: position`, which needs it.", None
+    )
 
 
 class HandConfig(Section):
@@ -47,6 +55,16 @@ class HandConfig(Section):
         length=(1, 64),
     )
     joint: Joint = key("Name of the held joint, one that the network moves.", length=(1, None))
+    by: Literal["orientation", "position"] = key(
+        "What the hand gives: an orientation of the joint, or its position in the room. `position`: for osc "
+        "and fixed. The position of the root joint draws the whole figure there, its feet on the floor.",
+        "orientation",
+    )
+    tracker: str | None = key(
+        "For osc by position: name of the VMC tracker (`/VMC/Ext/Tra/Pos`) that moves it.",
+        None,
+        length=(1, 64),
+    )
     weight: float = key(
         "How firmly it is held: how far all interactions together bring the joint to the hand; 0 not at all.",
         1.0,
@@ -88,6 +106,32 @@ class HandConfig(Section):
                 message = f"'{name}' belongs to a sensor, and this hand is {given[0]}."
                 raise refusal(message, "Remove it.", at=name)
         return values
+
+    @model_validator(mode="after")
+    def _position_where_it_can_be(self) -> Self:
+        by_position = self.by == "position"
+        if by_position and self.kind not in BY_POSITION:
+            raise refusal(
+                f"A hand by position is {' or '.join(BY_POSITION)}, and this hand is {self.kind}.",
+                "Write osc: true and send /mocap/setjointpos, or remove `by`.",
+                at="by",
+            )
+        if self.fixed is not None and (self.fixed.position is not None) != by_position:
+            if by_position:
+                words, cure = (
+                    "A fixed hand by position needs one.",
+                    "Write fixed: {position: [0.3, 1.4, 0.2]}.",
+                )
+            else:
+                words, cure = "This hand has a position, but holds by orientation.", "Write by: position."
+            raise refusal(words, cure, at="fixed")
+        if self.fixed is not None and by_position and "orientation" in self.fixed.model_fields_set:
+            words = "A hand holds by orientation or by position, and this one has both."
+            raise refusal(words, "Remove one of them.", at=("fixed", "orientation"))
+        if self.tracker is not None and not (by_position and self.osc):
+            words = "A tracker gives a position: 'tracker' belongs to {osc: true, by: position}."
+            raise refusal(words, "Add what is missing, or remove it.", at="tracker")
+        return self
 
     @property
     def kind(self) -> str:

@@ -231,6 +231,7 @@ class Show:
             self.file.problem((*at, "joint"), words, cure)
             for at, hand in self.config.hands_at
             if hand.joint == skeleton.names[0] and hand.kind not in ("kept", "springs")
+            if hand.by == "orientation"  # a position draws the figure there, which is what is meant
         ]
 
     def _idle_hands(self) -> list[Problem]:

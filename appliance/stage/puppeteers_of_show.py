@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from appliance.dancer.grounding import Grounding
+from appliance.dancer.held_places import FixedPlace, RemotePlace
 from appliance.dancer.puppet import Puppet
 from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
 from appliance.dancer.springs import Springs
+from appliance.pose.skeleton import Skeleton
 from appliance.sensor.neutral import Mounting, joint_from_reading
 from appliance.show.hand import HandConfig
 from appliance.show.show import Show
@@ -19,7 +21,9 @@ def puppeteers_of(
     show: Show, hands: Sequence[HandConfig], puppet: Puppet, grounding: Grounding
 ) -> list[Puppeteer]:
     """The hands of one puppet in their order; springs know the others, whose joints they leave alone."""
-    made = {place: _puppeteer(hand) for place, hand in enumerate(hands) if hand.springs is None}
+    made = {
+        place: _puppeteer(hand, show.skeleton) for place, hand in enumerate(hands) if hand.springs is None
+    }
     others, settings = tuple(made.values()), springs_by_name(show.config.springs)
     for place, hand in enumerate(hands):
         if hand.springs is not None:
@@ -33,7 +37,11 @@ def puppeteers_of(
     return [made[place] for place in range(len(hands))]
 
 
-def _puppeteer(hand: HandConfig) -> Puppeteer:
+def _puppeteer(hand: HandConfig, skeleton: Skeleton) -> Puppeteer:
+    if hand.by == "position":
+        if hand.fixed is not None and hand.fixed.position is not None:
+            return FixedPlace(hand.joint, skeleton, hand.fixed.position, hand.weight)
+        return RemotePlace(hand.joint, skeleton, hand.weight)
     if hand.sensor is not None:
         mounting = mounting_of(hand)
         return WornSensor(hand.joint, hand.weight, joint_from_reading(mounting.assumed_pose, mounting))
