@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from appliance.show.config_error import nearest
-from appliance.show.sources import MOST_POINTS, PARAMETERS
+from appliance.show.sources import MOST_POINTS, PARAMETERS, SEEDS
 from appliance.show_control.packet import Unread, is_readable
 
 REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"  # what the box answers with
@@ -108,6 +108,8 @@ FORMS: dict[str, Form] = {
     "/springs/kick": Form(numbers=_WIND),
     "/iterations": Form(numbers=(Number("coding", 0, 64, True), Number("interaction", 0, 64, True))),
     "/hold": Form("joint", (_ON,)),
+    "/liveliness": Form(numbers=(Number("liveliness", 0, 1), _FADE), optional=1),
+    "/seed": Form(numbers=(Number("seed", 0, SEEDS - 1, True),)),
     "/ping": Form(),
     "/status": Form(),
     "/cues": Form(),

@@ -45,6 +45,8 @@ class Status(NamedTuple):
     refused: int
     strangers: int
     fallbacks: int
+    liveliness: float
+    seed: int
 
 
 def status(
@@ -78,6 +80,8 @@ def status(
         refused=refused,
         strangers=strangers,
         fallbacks=sum(one.active for _, one in observer.fallbacks(now)),
+        liveliness=_known(health.get("liveliness")),
+        seed=int(health.get("seed", -1)),
     )
 
 

@@ -43,6 +43,10 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
             if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
                 words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
         elif order.name == "allow":
+        elif order.name == "liveliness":
+            parts.liveliness.ask(*order.values)
+        elif order.name == "seed":
+            parts.liveliness.change_seed(int(order.values[0]))
             for puppet in parts.puppets:
                 puppet.iterations.allow(int(order.values[0]))
         elif order.name in SPRINGS_ORDERS:

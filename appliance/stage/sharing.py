@@ -123,6 +123,8 @@ class Sharing:
                     "base": one.motion.base,
                     "made": one.motion.made.recipe if one.motion.made else "",
                     "position_s": one.motion.position_s,
+            "liveliness": parts.liveliness.level,
+            "seed": parts.liveliness.seed,
                 }
                 for one in parts.puppets[1:]
             ],
