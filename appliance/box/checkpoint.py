@@ -49,7 +49,8 @@ class Checkpoint:
     power_cuts: how often the show went on after one; ended: the show was ended as it should; tries: starts
     from here that produced no frame; others: the puppets beside the first; motion: parts of the show state
     for the generator, by name, with their values; made: number of what was made ahead and is danced, whose
-    seconds position_s then counts, else 0.
+    seconds position_s then counts, else 0; liveliness: the level that was asked for last, the seed of the
+    noise, and the absolute tick of this stage's tick 0; None: of another release.
     """
 
     show: str
@@ -76,6 +77,7 @@ class Checkpoint:
     others: tuple[Standing, ...] = ()
     motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
     made: int = 0
+    liveliness: tuple[float, int, int] | None = None
 
 
 def packed(place: Checkpoint) -> bytes:
@@ -99,7 +101,7 @@ def packed(place: Checkpoint) -> bytes:
     others = tuple([(other.phrase, other.let_go, other.made) for other in place.others])
     payload = numbers + _names(
         *(place.show, place.phrase, place.cue, place.let_go, place.boot, place.applied, place.source),
-        *((others, place.motion, place.made) if others or place.motion or place.made else ()),
+        *(others, place.motion, place.made, place.liveliness),
     )
     payload += b"\0" if others else b""
     for one in place.others:
@@ -146,10 +148,11 @@ def unpacked(payload: bytes) -> Checkpoint | None:
             tuple(map(_standing, *later[1:2], numbers_of_others)) if later[1:] else (),
             tuple((str(name), tuple(map(float, values))) for name, values in later[2]) if later[2:] else (),
             int(later[3]) if later[3:] else 0,
+            _liveliness(*later[4]) if later[4:] and later[4] else None,
         )
     except (struct.error, ValueError, TypeError):
         return None
-    sound = [position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z]
+    sound = [*(place.liveliness or ()), position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z]
     for one in place.others:
         sound += [one.position_s, *one.excerpt, one.rate, *one.standing, *one.strayed]
     for _, values in place.motion:
@@ -161,6 +164,10 @@ def _split(payload: bytes) -> tuple[bytes, list[tuple[float, ...]]]:
     """The names in a packed checkpoint, JSON without a zero byte, and the numbers of the other puppets."""
     names, _, behind = payload[_NUMBERS.size :].partition(b"\0")
     return names, list(_OTHER.iter_unpack(behind))
+
+
+def _liveliness(level: Any, seed: Any, begins_at: Any) -> tuple[float, int, int]:
+    return float(level), int(seed), int(begins_at)
 
 
 def _standing(names: list[Any], numbers: tuple[float, ...]) -> Standing:

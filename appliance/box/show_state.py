@@ -28,9 +28,10 @@ class ShowState:
     Fades run by themselves: readers pass the time at which they draw.
 
     dance: what the stage applies, each part once, in this order: `cue` (name), `phrase` (name; fade in
-    seconds), `iterations` (coding, interaction, fade in seconds), `rate` (of playback; none: the show's),
-    `hand JOINT` (joint; 1 holds). For the generator: `motion SOURCE NAME` (value; fade in seconds), `motion
-    path points` (x, y of each), `motion again` (how often). A stage with another show than `show` ignores it.
+    seconds), `iterations` (coding, interaction, fade in seconds), `liveliness` (0 to 1; fade in seconds),
+    `seed` (of the answer's noise), `rate` (of playback; none: the show's), `hand JOINT` (joint; 1 holds).
+    For the generator: `motion SOURCE NAME` (value; fade in seconds), `motion path points` (x, y of each),
+    `motion again` (how often). A stage with another show than `show` ignores it.
     generation: the newest that declared something for the dance, in nanoseconds since the machine started.
     """
 

@@ -72,6 +72,8 @@ def present_cue(name: str, value: dict[str, Any], facts: dict[str, Any]) -> dict
         whole = {key: int(number) if key == "seed" else number for key, number in parameters.items()}
         cue["motion"] = {phrase: whole}
     cue["iterations"] = [status["coding"], status["interaction"]]
+    if status["seed"] >= 0:
+        cue |= {"liveliness": round(status["liveliness"], 3), "seed": status["seed"]}
     cue["hands"] = [one["joint"] for one in value["hands"] if one["holds"]]
     cue |= {key: status[key] for key in ("look", "lights") if status[key]}
     return cue

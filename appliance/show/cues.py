@@ -11,7 +11,7 @@ from appliance.show.config_error import Problem, did_you_mean
 from appliance.show.look import CameraChange
 from appliance.show.motion_sources import MotionChanges
 from appliance.show.section import Section, key, refusal
-from appliance.show.sources import NO_CARD
+from appliance.show.sources import NO_CARD, SEEDS
 from appliance.show.yaml_file import Location, YamlFile
 
 FADE_S = 2.0
@@ -37,6 +37,12 @@ class CueConfig(Section):
     iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = key(
         "Coding and interaction iterations, reached in whole steps; more than fit are lowered.", None
     )
+    liveliness: float | None = key("How alive the answer to a hand is, 0 to 1.", None, within=(0, 1))
+    seed: int | None = key(
+        "Seed of the noise in the answer: another number, another dance. The change takes 2 s.",
+        None,
+        within=(0, SEEDS - 1),
+    )
     hands: list[Name] | None = key(
         "Joints whose hands hold in this cue; the other hands let go. []: all let go.", None, length=(0, 8)
     )
@@ -52,8 +58,8 @@ class CueConfig(Section):
     strings: float | None = key("How loud the strings are, 0 to 1.", None, within=(0, 1))
     master: float | None = key("Brightness of lights and picture, 0 to 1.", None, within=(0, 1))
     fade_s: float = key(
-        "How long phrase, iterations, springs, strings, look, camera, card, lights and master take "
-        "to change, in seconds. "
+        "How long phrase, iterations, liveliness, springs, strings, look, camera, card, lights and master "
+        "take to change, in seconds. "
         "Hands take 0.5 s to hold and 1 s to let go, whatever stands here.",
         FADE_S,
         within=(0, 60),

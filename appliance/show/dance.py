@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from appliance.show.config_error import did_you_mean
 from appliance.show.motion_sources import GranularConfig, ImproviseConfig, PathConfig, VaryConfig
 from appliance.show.section import BundleFile, Section, key, refusal
-from appliance.show.sources import GRANULAR, IMPROVISE, LIVE, MADE, MAIN, PATH, VARY
+from appliance.show.sources import GRANULAR, IMPROVISE, LIVE, MADE, MAIN, PATH, SEEDS, VARY
 
 Blending = Literal["prompt", "hann"]
 
@@ -30,6 +30,19 @@ class DancerConfig(Section):
         "Left out: one less than coding_iterations (but at least 1), so the last pass is free.",
         9,
         within=(0, 64),
+    )
+    liveliness: float = key(
+        "How much of the phrase's own movement stays while a hand holds. 1: as alive as the dancer; 0: the "
+        "calm answer, without noise.",
+        1.0,
+        within=(0, 1),
+    )
+    seed: int | None = key(
+        "Seed of the noise in the answer to a hand. The same seed and the same hand give the same dance, so "
+        "every evening is as it was rehearsed. null: a new seed at each start of the show, which status and "
+        "journal tell. A show that goes on after a crash or a power cut keeps its seed.",
+        0,
+        within=(0, SEEDS - 1),
     )
     hop: int = key("Ticks from one window to the next; they are blended.", 1, within=(1, 8))
     blending: Blending = key(

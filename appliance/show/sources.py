@@ -9,6 +9,7 @@ LIVE = "live"  # a live dancer's motion capture, in place of a phrase
 VARY, GRANULAR, PATH, IMPROVISE = "vary", "granular", "path", "improvise"  # made ahead by the generator
 MADE = (VARY, GRANULAR, PATH, IMPROVISE)
 NO_CARD = "none"  # takes a card off
+SEEDS = 2**31  # seeds of the noise in the answer are 0 to SEEDS - 1: an OSC integer holds them
 KEPT = "kept"  # of a recipe: a motion that was kept, under a name of its own
 
 

@@ -119,6 +119,10 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
             parts[f"{MOTION}{source} {key}"] = "", values
     if cue.get("iterations") is not None:
         parts["iterations"] = "", (*map(float, cue["iterations"]), fade_s)
+    if cue.get("liveliness") is not None:
+        parts["liveliness"] = "", (float(cue["liveliness"]), fade_s)
+    if cue.get("seed") is not None:
+        parts["seed"] = "", (float(cue["seed"]),)
     return in_cue(show_state, cue, PARTS, now).with_dance(now, parts), f"Cue {name}."
 
 
@@ -157,6 +161,18 @@ def _again(show_state: ShowState, command: Command, facts: Facts | None, now: fl
 def _iterations(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     danced(facts)
     return show_state.with_dance(now, {"iterations": ("", command.values)}), ""
+
+
+def _liveliness(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    danced(facts)
+    words = f"The liveliness goes to {100 * command.values[0]:.0f} %."
+    return show_state.with_dance(now, {"liveliness": ("", command.values)}), words
+
+
+def _seed(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    danced(facts)
+    words = f"The answer goes over to the seed {command.values[0]:.0f}."
+    return show_state.with_dance(now, {"seed": ("", command.values)}), words
 
 
 def _springs(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
@@ -207,6 +223,8 @@ DECLARATIONS: dict[str, Declaration] = {
     "/cue": _cue,
     "/phrase": _phrase,
     "/iterations": _iterations,
+    "/liveliness": _liveliness,
+    "/seed": _seed,
     "/hold": _hold,
     "/springs": _springs,
     "/strings": _strings,

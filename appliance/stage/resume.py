@@ -115,10 +115,14 @@ class Resumption:
         if self._after_power_cut and place.source:
             reconciler.source = place.source
         reconciler.motion = place.motion
+        if place.liveliness is not None:
+            level, seed, begins_at = place.liveliness
+            parts.liveliness.go_on(level, seed, begins_at + place.tick + 1)
         return reconciler.iterations.ask(place.coding, place.interaction)
 
     def _place(self, reconciler: Reconciler, tick: int) -> Checkpoint:
         motion, hands = reconciler.parts.motion, reconciler.parts.hands
+        liveliness = reconciler.parts.liveliness
         phrase, position_s, made = motion.going_on
         coding, interaction = reconciler.iterations.asked
         return Checkpoint(
@@ -142,6 +146,7 @@ class Resumption:
             motion=reconciler.motion,
             others=tuple([puppet.noted for puppet in reconciler.parts.puppets[1:]]),
             made=made,
+            liveliness=(liveliness.asked, liveliness.seed, liveliness.begins_at),
         )
 
     def _write(self, place: Checkpoint) -> None:

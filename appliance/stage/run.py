@@ -137,6 +137,8 @@ class Stage:
         self.resuming.write_start(self.reconciler)
         if self.recorder is not None:
             self.recorder.keyframe(self.tick.state())
+        if self.show.config.dancer.seed is None:
+            self._say_and_note(f"The answer's noise has the seed {self.parts.liveliness.seed}.")
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)

@@ -37,6 +37,7 @@ from appliance.show.show import Show
 from appliance.show.sources import LIVE, MAIN
 from appliance.stage.admission import MOST_ITERATIONS, Admission, admit, lowered
 from appliance.stage.iterations import Iterations
+from appliance.stage.liveliness import Liveliness
 from appliance.stage.open_sensors import open_sensors
 from appliance.stage.puppeteers_of_show import mounting_of, puppeteers_of
 from appliance.stage.stage_error import StageError
@@ -53,6 +54,7 @@ class StageParts:
 
     skeleton: Skeleton
     puppets: tuple[StagePuppet, ...]
+    liveliness: Liveliness
     worn: dict[str, list[WornSensor]]
     mountings: dict[str, list[Mounting]]
     primary: str | None
@@ -125,11 +127,13 @@ class StageParts:
 
     def state(self) -> dict[str, Any]:
         """What the first puppet's dance to come depends on, for `restore`: plain values, copies of arrays."""
-        return {**self.first.parts_state(), "newest_primary": self.newest_primary}
+        first = self.first.parts_state() | {"liveliness": self.liveliness.state()}
+        return {**first, "newest_primary": self.newest_primary}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a state that parts of the same show gave."""
         self.first.restore_parts(state)
+        self.liveliness.restore(state.get("liveliness"))
         self.newest_primary = restored_reading(state["newest_primary"])
 
     def close(self) -> None:
@@ -175,6 +179,7 @@ def assemble(
     return StageParts(
         skeleton=show.skeleton,
         puppets=tuple(puppets),
+        liveliness=Liveliness(config.dancer.liveliness, config.dancer.seed, puppets),
         worn=worn,
         mountings=mountings,
         primary=config.primary_sensor,

@@ -75,6 +75,7 @@ class Tick:
             for puppet in parts.puppets:
                 puppet.start(slot.started)
             ends[MOTION] = now()
+            parts.liveliness.dance(slot.tick)
             for puppet in parts.puppets:
                 puppet.pull(slot.started)
             ends[HANDS] = now()
@@ -110,6 +111,7 @@ class Tick:
         if not self.frame.late:
             for puppet in self.parts.puppets:
                 puppet.advance()
+            self.parts.liveliness.advance()
         self.parts.link.send_due(self._monotonic())
         self.wearing.look(slot.started)
         begin = slot.started

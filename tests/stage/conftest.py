@@ -27,6 +27,7 @@ CUES = [
     {"name": "storm", "phrase": "slow", "iterations": [12, 11], "hands": ["Chest"], "fade_s": 0.2},
     {"name": "alone", "hands": []},
     {"name": "lights only", "master": 0.5},
+    {"name": "calm", "liveliness": 0.25, "seed": 2**31 - 1, "fade_s": 1.0},
 ]
 
 

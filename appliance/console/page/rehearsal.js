@@ -1,4 +1,4 @@
-// For choreographers: the figure with its hands, what is danced, how often a window is coded.
+// For choreographers: the figure with its hands, what is danced, how often a window is coded, how alive it answers.
 import { showChoices } from "./choices.js";
 import { request } from "./box.js";
 import { ask, command, withPin } from "./device.js";
@@ -6,10 +6,10 @@ import { Figure } from "./figure.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
 import { twice } from "./venue.js";
-import { hasWords, words } from "./words.js";
+import { hasWords, number, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
-const PHRASE_FADE_S = 1, KEEPING_MS = 120_000;
+const PHRASE_FADE_S = 1, LIVELINESS_FADE_S = 1, KEEPING_MS = 120_000;
 let figure = null;
 
 export function initRehearsal(me, box) {
@@ -22,6 +22,12 @@ export function initRehearsal(me, box) {
       byId(id).blur();
     });
   }
+  byId("liveliness").addEventListener("input", () => tell());
+  byId("liveliness").addEventListener("change", () => {
+    command("/liveliness", Number(byId("liveliness").value), LIVELINESS_FADE_S);
+    byId("liveliness").blur();
+  });
+  byId("seed-new").addEventListener("click", () => command("/seed", crypto.getRandomValues(new Uint32Array(1))[0] >>> 1));
   figure = new Figure(byId("figure"), byId("figure-said"), box, words);
   initMotion();
   initSprings();
@@ -48,6 +54,8 @@ export function showRehearsal(value, show) {
     if (show) byId(id).max = show.most_iterations;
     if (value.status && document.activeElement !== byId(id)) byId(id).value = value.status[id];
   }
+  if (value.status && document.activeElement !== byId("liveliness")) byId("liveliness").value = value.status.liveliness;
+  byId("seed-said").textContent = value.status?.seed >= 0 ? words("seed_now", { seed: value.status.seed }) : "";
   tell();
   showMotion(value, show);
   showSprings(value, show);
@@ -76,4 +84,5 @@ export function leaveRehearsal() { figure.letGo(); }
 
 function tell() {
   for (const id of ["coding", "interaction"]) byId(`${id}-said`).textContent = byId(id).value;
+  byId("liveliness-said").textContent = number(Number(byId("liveliness").value), 2);
 }
