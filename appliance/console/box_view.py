@@ -63,7 +63,7 @@ class BoxView:
         for address, values in answers:
             if address in _LISTS and len(values) == 2:
                 lists[_LISTS[address]].append({"name": values[0], "now": bool(values[1])})
-        hands = [values for address, values in answers if address == "/hands/hand" and len(values) == 3]
+        hands = [values for address, values in answers if address == "/hands/hand" and len(values) == 4]
         self._note_late(status)
         judged: Verdict = verdict(frames, status, sensors, fallbacks, self._since, trouble)
         return {
@@ -78,7 +78,8 @@ class BoxView:
             "fallbacks": fallbacks,
             "processes": [{"process": one.process, "late": one.late} for one in self._processes.members(now)],
             "hands": [
-                {"joint": joint, "source": source, "holds": bool(holds)} for joint, source, holds in hands
+                {"joint": joint, "source": source, "holds": bool(holds), "by": by}
+                for joint, source, holds, by in hands
             ],
             "generation": self._stage.generation,
             **self._declared(),

@@ -28,8 +28,9 @@ class Hands:
     targets: one orientation for each pose of the window, the present one first. The motion of a hand is
     extrapolated over the window; a kept joint has the orientations of the phrase's own window.
     places (M, 3), place_weights (M,): joints that are held by place, metres in the figure's frame
-    (held_places.in_figure). The root held by place is its origin: that hand moves the figure's path
-    (hips_drawn). holds (M,): how firmly each joint is held, in either way.
+    (held_places.in_figure). The root is the origin there: a hand on it moves the figure's path (hips_drawn)
+    and has no weight. by_place (M,): joints with such hands. holds (M,): how firmly each joint is held, in
+    either way.
     """
 
     def __init__(
@@ -69,6 +70,8 @@ class Hands:
         self._placed_at: NDArray[np.intp] = np.array(
             [_place(one.joint, joints) for one in self._placed], dtype=np.intp
         )
+        self.by_place: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
+        self.by_place[self._placed_at] = True
         self._points = np.zeros((len(self._placed), 3), dtype=np.float32)
         self.places = np.zeros((len(joints), 3), dtype=np.float32)
         self.place_weights = np.zeros(len(joints), dtype=np.float32)
@@ -105,6 +108,8 @@ class Hands:
         if self._placed and path is not None and positions is not None:
             self._pull_places(now, window, path.tolist(), positions)
         np.maximum(self.weights, self.place_weights, out=self.holds)
+        if self._hips is not None:
+            self.holds[self._placed_at[0]] = self._hips.held_weight
 
     @property
     def hips_drawn(self) -> tuple[float, float, float]:
@@ -122,9 +127,11 @@ class Hands:
                 x, z = self._from_room.point(told[0], told[2])
                 told = x, told[1], z
             puppeteer.stand(positions[puppeteer.number].tolist(), root, told)
-            self.place_weights[self._placed_at[row]] = puppeteer.pull(now).weight
+            weight = puppeteer.pull(now).weight
             self._points[row] = puppeteer.place(self._ahead_s)
-            if puppeteer is self._hips:
+            if puppeteer is not self._hips:
+                self.place_weights[self._placed_at[row]] = weight
+            else:
                 x, z, weight = self.hips_drawn
                 root = [path[0] + weight * (x - path[0]), path[1], path[2] + weight * (z - path[2])]
         facing = quaternion.heading(window[len(window) // 2, 0])

@@ -13,10 +13,10 @@ from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
+from appliance.show.hand import FARTHEST_M
 
 REACH = 0.95  # share of the stretched chain of bones: at its very end every way on turns the whole body
 HIPS_REACH_M = 1.0  # of the hips from their own path
-FARTHEST_M = 100.0  # from the middle of the stage: a place beyond is a mistake
 
 Point = tuple[float, float, float]
 _ORIGIN: Point = (0.0, 0.0, 0.0)

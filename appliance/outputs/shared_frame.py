@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -59,6 +59,8 @@ class Facts:
     cards: tuple[str, ...] = ()
     puppets: tuple[str, ...] = ()  # their names; (): one, without a name
     motion: Mapping[str, Any] = field(default_factory=dict)  # sources that are made ahead, as in show.yaml
+    by_position: tuple[int, ...] = ()  # of the held joints those whose hands give positions
+    trackers: Mapping[str, Sequence[str]] = field(default_factory=dict)  # joints that each VMC tracker moves
 
     @property
     def layout(self) -> FrameLayout:
@@ -86,10 +88,10 @@ class Facts:
         """From JSON. Raises ValueError, KeyError or TypeError for foreign data."""
         facts = plain_json(packed)
         skeleton, box_file = facts["skeleton"], facts["box_file"]
-        names = ("held", "hands", "phrases", "cues", "looks", "lights", "springs", "cards", "puppets")
+        names = ("held", "hands", "by_position", "phrases", "cues", "looks", "lights", "springs", "cards")
         return cls(
             **facts
-            | {name: tuple(facts[name]) for name in names}
+            | {name: tuple(facts[name]) for name in (*names, "puppets")}
             | {
                 "show_directory": Path(facts["show_directory"]),
                 "box_file": None if box_file is None else Path(box_file),

@@ -85,7 +85,10 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
     import onnxruntime  # loaded in the stage already; no other process needs it for a journal
 
     skeleton, bundled = show.skeleton, show.directory.resolve() == default_show_path().resolve()
-    hands = [{"joint": hand.joint, "kind": hand.kind, "sensor": hand.sensor} for hand in show.config.hands]
+    hands = [
+        {"joint": hand.joint, "kind": hand.kind, "sensor": hand.sensor, "by": hand.by}
+        for hand in show.config.hands
+    ]
     puppets = puppets_of(show)
     live, others = int(show.config.motion.live), max(len(puppets) - 1, 0)
     layout = record(len(skeleton), len(hands), len(sensors), live, others)

@@ -12,7 +12,7 @@ LONGEST_SENSOR_NAME = 24  # as in the key file (appliance/sensor/keys.py) and th
 KINDS = ("sensor", "turning", "fixed", "kept", "osc", "springs")
 SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # of a hand, for a worn sensor alone
 BY_POSITION = ("osc", "fixed")  # kinds that may give a position instead of an orientation
-FARTHEST_M = 100.0  # from the middle of the stage
+FARTHEST_M = 100.0  # of a position from the middle of the stage: beyond is a mistake
 
 Metres = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Position = Annotated[tuple[Metres, Metres, Metres], Field(strict=False)]

@@ -67,6 +67,7 @@ _WIND = tuple(Number(f"{axis}, m/s", -30, 30) for axis in "xyz")
 _CORNER = Number("corner", 1, 4, is_whole=True)
 _PLACE = (Number("x", -0.5, 1.5), Number("y", -0.5, 1.5))  # as far as keys move a corner
 _POINT = (Number("x", 0, 1), Number("y", 0, 1))
+_METRES = tuple(Number(f"{axis} in metres", *_ANY) for axis in "xyz")
 _STAND = (
     Number("angle in degrees", -180, 180),
     Number("elevation in degrees", -3, 70),
@@ -107,9 +108,9 @@ FORMS: dict[str, Form] = {
     "/springs/gravity": Form(numbers=(Number("downwards, m/s^2", -20, 20),)),
     "/springs/kick": Form(numbers=_WIND),
     "/iterations": Form(numbers=(Number("coding", 0, 64, True), Number("interaction", 0, 64, True))),
-    "/hold": Form("joint", (_ON,)),
     "/liveliness": Form(numbers=(Number("liveliness", 0, 1), _FADE), optional=1),
     "/seed": Form(numbers=(Number("seed", 0, SEEDS - 1, True),)),
+    "/hold": Form("joint", (_ON,)),
     "/ping": Form(),
     "/status": Form(),
     "/cues": Form(),
@@ -132,6 +133,7 @@ FORMS: dict[str, Form] = {
     "/player/rate": Form(numbers=(Number("rate", -4, 4),)),
     "/player/excerpt": Form(numbers=(Number("start", 0, _FAR), Number("end", 0, _FAR)), optional=1),
     "/mocap/setjointrot": Form("joint", tuple(Number(axis, *_ANY) for axis in ("x", "y", "z", "angle"))),
+    "/mocap/setjointpos": Form("joint", (*_METRES, Number("seconds", 0.1, 3600)), optional=1),
     "/mocap/releasejoint": Form("joint"),
     "/sensors/neutral": Form("sensor", may_be_nameless=True),
     "/sensors/heading": Form("sensor", may_be_nameless=True),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,7 @@ from appliance.show_control.show_state_commands import (
 )
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import END, QUESTIONS, STATUS, Status, status, told
+from appliance.show_control.trackers import TRACKERS, Trackers
 
 if TYPE_CHECKING:
     from appliance.outputs.shared_frame import Facts
@@ -46,6 +47,7 @@ ORDERS: Mapping[str, tuple[Place, str]] = {
     "/player/excerpt": ("stage", "excerpt"),
     "/springs/kick": ("stage", "kick"),
     "/mocap/setjointrot": ("stage", "hold"),
+    "/mocap/setjointpos": ("stage", "place"),
     "/mocap/releasejoint": ("stage", "release"),
     "/sensors/neutral": ("stage", "neutral"),
     "/sensors/heading": ("stage", "heading"),
@@ -87,6 +89,7 @@ class CommandHandler:
         self.acknowledgements = Acknowledgements(observer)
         self._observer, self._dispatch, self._keys = observer, dispatch, keys
         self._send, self._publish, self._live = send, publish, live
+        self._trackers = Trackers()
         self._generation = -1
         self._is_new_stage = False
 
@@ -103,6 +106,9 @@ class CommandHandler:
                 self._refuse(f"{address} is an answer, no command.")
                 continue
             try:
+                if address in TRACKERS:
+                    self._follow_tracker(address, arguments, asker, now)
+                    continue
                 if is_live(address):
                     self._live.hear(address, arguments, self._observer.facts, now)
                     continue
@@ -191,6 +197,10 @@ class CommandHandler:
         keys = self._keys.keys() if command.address == "/sensors/reload" else _no_keys()
         order = Order(name, command.values, text, keys, quiet=command.address.startswith(STREAMS))
         self._dispatch.dispatch_order(place, order, now, partial(self._reply, asker, command.address))
+
+    def _follow_tracker(self, address: str, arguments: Sequence[object], asker: Address, now: float) -> None:
+        for order in self._trackers.orders(address, arguments, self._observer.facts, now):
+            self._dispatch.dispatch_order("stage", order, now, partial(self._reply, asker, address))
 
     def _send_roster(self, asker: Address, now: float) -> None:
         if not self._observer.lives(now):

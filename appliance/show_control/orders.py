@@ -31,8 +31,9 @@ _NONSENSE = (ValueError, KeyError, TypeError, AttributeError, OverflowError, Rec
 class Order:
     """One thing to do, within its bounds; the receiver checks names that only the show knows.
 
-    For the stage:  jump (s), excerpt (start s[, end s]), hold (x, y, z, angle; text: joint), release (text:
-    joint), neutral, heading, strobe (text: the sensor or ""), reload (keys).
+    For the stage:  jump (s), excerpt (start s[, end s]), hold (x, y, z, angle; text: joint), place (x, y, z
+    in metres[, s until it is let go]; text: joint), release (text: joint), neutral, heading, strobe (text:
+    the sensor or ""), reload (keys).
     For the projector:  corner (number 1..4, x, y), corners (x1, y1 .. x4, y4), corners/reset, brightness (b),
     mirror (0|1), grid (0|1), info (0|1).
     For the lights:  walk (text: the fixture or "" for all), walk/stop.

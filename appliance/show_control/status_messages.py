@@ -125,7 +125,8 @@ def _hands(status: Status, observer: StageObserver, now: float) -> Iterator[Mess
     let_go = observer.health().get("let_go", ())
     for joint, source in zip(facts.held, facts.hands, strict=True):
         name = facts.skeleton.names[joint]
-        yield "/hands/hand", name, source, int(name not in let_go)
+        by = "position" if joint in facts.by_position else "orientation"
+        yield "/hands/hand", name, source, int(name not in let_go), by
 
 
 def _fallbacks(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:

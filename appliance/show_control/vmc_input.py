@@ -46,7 +46,7 @@ class VmcInput:
         skeleton's order once a frame is whole, else None. Raises ValueError with one clear sentence."""
         if address not in (BONE, ROOT):
             return None
-        name, place, turned = _parsed(address, arguments)
+        name, place, turned = parsed(address, arguments)
         if address == ROOT:
             self._root = place, turned
             return None
@@ -77,7 +77,7 @@ class VmcInput:
         return place if self._knows_hips else (math.nan,) * 3, list(self._rotations)
 
 
-def _parsed(address: str, arguments: Sequence[object]) -> tuple[str, Vector, Quaternion]:
+def parsed(address: str, arguments: Sequence[object]) -> tuple[str, Vector, Quaternion]:
     """Name, position and rotation in the box's axes. A root may have scale and offset behind them."""
     name, *numbers = arguments or ("",)
     values = [float(one) for one in numbers[:7] if isinstance(one, int | float)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from appliance.dancer.held_places import RemotePlace
 from appliance.dancer.puppeteers import Remote
 from appliance.dancer.springs_parameters import KNOBS
 from appliance.pose import quaternion
@@ -33,8 +34,8 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
     """Carry out an order that is not about sensors."""
     motion, words = parts.motion, ""
     try:
-        if order.name in ("hold", "release"):
-            _turn(order, parts)
+        if order.name in ("hold", "place", "release"):
+            _lead(order, parts)
         elif order.name == "hand":
             _enable(order, parts)
         elif order.name == "iterations":
@@ -42,11 +43,11 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
             words = iterations.ask(int(coding), int(interaction), *fade_s)
             if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
                 words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
-        elif order.name == "allow":
         elif order.name == "liveliness":
             parts.liveliness.ask(*order.values)
         elif order.name == "seed":
             parts.liveliness.change_seed(int(order.values[0]))
+        elif order.name == "allow":
             for puppet in parts.puppets:
                 puppet.iterations.allow(int(order.values[0]))
         elif order.name in SPRINGS_ORDERS:
@@ -116,12 +117,14 @@ def _require_heard(names: list[str], link: SensorLink, now: float) -> None:
 
 
 def _enable(order: Order, parts: StageParts) -> None:
-    """Let a hand hold or let go; one by OSC without an orientation yet holds its joint where it is."""
+    """Let a hand hold or let go; one by OSC that was told nothing yet holds its joint where it is."""
     for puppeteer in parts.hands.puppeteers:
         if puppeteer.joint == order.text:
             puppeteer.enabled = bool(order.values[0])
             if puppeteer.enabled and isinstance(puppeteer, Remote):
                 puppeteer.hold_here(_orientation(puppeteer.joint, parts).tolist())
+            if puppeteer.enabled and isinstance(puppeteer, RemotePlace):
+                puppeteer.hold_here(parts.first.frame.positions[puppeteer.number].tolist())
 
 
 def _dance_made(order: Order, parts: StageParts) -> None:
@@ -163,18 +166,31 @@ def _spring(order: Order, parts: StageParts) -> None:
         raise ValueError(f"There is no setting of springs '{order.text}' in this show.")
 
 
-def _turn(order: Order, parts: StageParts) -> None:
-    """Give a joint that is held by OSC its orientation, or back: of each puppet with such a hand there."""
+def _lead(order: Order, parts: StageParts) -> None:
+    """Give a joint that is held by OSC its orientation or place, or back: of each puppet with such a hand."""
     puppeteers = [one for puppet in parts.puppets for one in puppet.hands.puppeteers]
-    led = [one for one in puppeteers if isinstance(one, Remote) and one.joint == order.text]
+    led = [one for one in puppeteers if isinstance(one, Remote | RemotePlace) and one.joint == order.text]
     if not led:
         raise ValueError(
             f"No hand of this show holds '{order.text}' by OSC. "
             f"Add {{osc: true, joint: {order.text}}} to its hands."
         )
-    for puppeteer in led:
-        if order.name == "release":
+    if order.name == "release":
+        for puppeteer in led:
             puppeteer.release()
+        return
+    wanted = RemotePlace if order.name == "place" else Remote
+    led = [one for one in led if isinstance(one, wanted)]
+    if not led:
+        given, address, cure = (
+            ("an orientation", "rot", ", or write by: position in show.yaml")
+            if order.name == "place"
+            else ("a position", "pos", "")
+        )
+        raise ValueError(f"The hand on '{order.text}' takes {given}: send /mocap/setjoint{address}{cure}.")
+    for puppeteer in led:
+        if isinstance(puppeteer, RemotePlace):
+            puppeteer.hold(order.values[:3], *order.values[3:])
         else:
             x, y, z, angle = order.values
             puppeteer.hold_axis_angle((x, y, z), angle)

@@ -80,7 +80,10 @@ class Recorder:
         hands = parts.hands
         for hand, place in enumerate(parts.first.hand_places):
             field["targets"][0, hand] = hands.targets[0, place]
-            field["weights"][0, hand] = hands.weights[place]
+            if hands.by_place[place]:
+                field["targets"][0, hand, 0] = 0.0
+                field["targets"][0, hand, 1:] = hands.places[place]
+            field["weights"][0, hand] = hands.holds[place]
         field["root"][0] = frame.root
         field["pose"][0] = frame.pose
         for other, puppet in enumerate(parts.puppets[1:]):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from appliance.box.runtime_folder import Claim, RuntimeFolderError, runtime_folder
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show.box import BoxConfig
+from appliance.show.hand import HandConfig
 from appliance.show.show import Show
 from appliance.show.springs import springs_by_name
 from appliance.stage.health import Health
@@ -25,14 +26,16 @@ def facts_of(
     show: Show, box_file: Path | None, iterations: Iterations, now: float, rehearsal: bool = False
 ) -> Facts:
     """What readers need to know about this stage; `now`: it is about to dance."""
-    config, names = show.config, show.config.names
+    config, names, joints = show.config, show.config.names, show.skeleton.names
     return Facts(
         show_directory=show.directory.resolve(),
         box_file=None if box_file is None else box_file.resolve(),
         show_name=config.name,
         skeleton=show.skeleton,
-        held=tuple(show.skeleton.names.index(hand.joint) for hand in config.hands),
+        held=tuple(joints.index(hand.joint) for hand in config.hands),
         hands=tuple(hand.sensor or hand.kind for hand in config.hands),
+        by_position=tuple(joints.index(hand.joint) for hand in config.hands if hand.by == "position"),
+        trackers=_trackers(hand for _, hand in config.hands_at),
         phrases=names["phrase"],
         cues=tuple(cue.model_dump(mode="json") for cue in config.cues),
         looks=names["look"],
@@ -53,6 +56,15 @@ def facts_of(
             for name, section in config.motion.made_sources.items()
         },
     )
+
+
+def _trackers(hands: Iterable[HandConfig]) -> dict[str, list[str]]:
+    """Which joints each VMC tracker moves, of any puppet."""
+    found: dict[str, list[str]] = {}
+    for hand in hands:
+        if hand.tracker is not None and hand.joint not in found.setdefault(hand.tracker, []):
+            found[hand.tracker].append(hand.joint)
+    return found
 
 
 class Sharing:
@@ -111,6 +123,8 @@ class Sharing:
             "locked": locked,
             "coding": iterations.coding,
             "interaction": iterations.interaction,
+            "liveliness": parts.liveliness.level,
+            "seed": parts.liveliness.seed,
             "phrase": parts.first.source,
             "base": parts.motion.base,
             "wanted": reconciler.wanted,
@@ -123,8 +137,6 @@ class Sharing:
                     "base": one.motion.base,
                     "made": one.motion.made.recipe if one.motion.made else "",
                     "position_s": one.motion.position_s,
-            "liveliness": parts.liveliness.level,
-            "seed": parts.liveliness.seed,
                 }
                 for one in parts.puppets[1:]
             ],

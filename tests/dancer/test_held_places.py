@@ -249,6 +249,7 @@ def danced(swaying: Recording, released_at: int) -> tuple[np.ndarray, np.ndarray
         if tick == released_at:
             hand.release()
         hands.pull(tick * TICK_S, WINDOW[:, :2], root + grounding.shift, grounding.figure.positions)
+        assert not hands.place_weights.any()  # the network has nothing to do with it
         grounding.draw_hips(*hands.hips_drawn)
         grounding.ground_pose(pose, root, float(floor.lifts[at]), held=holds)
         roots.append(grounding.root.copy())

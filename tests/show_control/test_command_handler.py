@@ -84,6 +84,8 @@ def test_names_without_a_stage_are_refused_in_words(asker: Asker) -> None:
         (("/phrase", "quiet"), "phrase", ("quiet", 2.0)),
         (("/phrase", "quiet", 0), "phrase", ("quiet", 0.0)),
         (("/iterations", 12, 11), "iterations", ("", 12.0, 11.0)),
+        (("/liveliness", 0.5, 3), "liveliness", ("", 0.5, 3.0)),
+        (("/seed", 2**31 - 1), "seed", ("", 2.0**31 - 1)),
     ],
 )
 def test_what_persists_of_the_dance_is_declared_and_answered_when_the_stage_follows(
@@ -169,7 +171,10 @@ def test_questions_are_answered_with_what_is_in_force(stage: StageDouble, asker:
     assert asker.ask_all("/phrases")[:2] == [["/phrases/phrase", "main", 0], ["/phrases/phrase", "quiet", 1]]
     looks = asker.ask_all("/looks")
     assert [look[1:] for look in looks[:-1]] == [["plaster", 0], ["lines", 0], ["ink", 1], ["cloud", 0]]
-    assert asker.ask_all("/hands") == [["/hands/hand", "lShldr", "left-wrist", 0], ["/end", "/hands", 1]]
+    assert asker.ask_all("/hands") == [
+        ["/hands/hand", "lShldr", "left-wrist", 0, "orientation"],
+        ["/end", "/hands", 1],
+    ]
 
 
 def test_questions_without_a_stage_have_empty_answers(asker: Asker) -> None:

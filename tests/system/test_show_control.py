@@ -142,7 +142,7 @@ def test_cues_stop_and_go_reach_the_dance_and_are_answered(show: Path, tmp_path:
         with contextlib.closing(Asker(box.control)) as other:
             other.tell("/cue")
         await_status(asker, state="dancing", coding=4, interaction=3, cue="storm", look="ink", level=0.5)
-        assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0]
+        assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0, "orientation"]
         assert "Did you mean 'storm'?" in asker.ask("/cue", "strom")[3]
         assert "Did you mean 'lShldr'?" in asker.ask("/hold", "lSholder", 1)[3]
         assert asker.order("/hold", "lShldr", 1)[2] == 1
@@ -218,7 +218,7 @@ def test_a_cue_called_while_the_dance_is_away_is_in_force_when_it_comes_back(
         assert status(asker)["look"] == "ink"
         box.kill_and_restart()
         await_status(asker, state="dancing", cue="storm", coding=4, interaction=3)
-        assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0]
+        assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0, "orientation"]
         box.await_words("the show goes on in the cue 'calm'")
         assert box.end() == 0
 
