@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.conditional import Conditional
+from appliance.studio.autoencoder.coupled import Coupled, share_of_pass
 from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.autoencoder.networks import Network, Shape
 
@@ -77,12 +78,15 @@ class Autoencoder(nn.Module):
         coding_iterations: int,
         interaction_iterations: int = 0,
         hold: HeldJoints[Tensor] | None = None,
+        liveliness: float = 1.0,
+        noise: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Iterative autoencoding: (B, T, M, 4) -> the same, and the last latents (B, Z).
 
-        The first interaction_iterations passes overwrite the held joints before coding. If all passes are
+        The first interaction_iterations passes bring the held joints towards their targets: a coupled network
+        moves the latent, for any other SLERP overwrites the window before it is coded. If all passes are
         interactive, the result is overwritten too, so that the held orientation shows; otherwise the last
-        pass is the dancer's own.
+        pass is the dancer's own. liveliness, 0 to 1, and noise (B, Z) or (Z,): of a coupled network.
         """
         facing = self.facing(windows)
         x = start = self.without_heading(windows, facing)
@@ -92,19 +96,27 @@ class Autoencoder(nn.Module):
             held = (hold.mask.float() * hold.weights).expand(len(x), -1)
             goal = self.without_heading(hold.targets.expand_as(x), facing)
         led = min(interaction_iterations, coding_iterations)
-        if isinstance(self.network, Conditional) and led:  # its conditions are the same in every pass
+        coupled = self.network if isinstance(self.network, Coupled) else None
+        if coupled is not None and led:
+            whole = 1 - (1 - held) ** max(1, interaction_iterations)  # what the weights of all passes come to
+            meant = slerp_towards(start, goal, whole[:, None, :, None])
+            lively = x.new_full((len(x),), liveliness)
+            drawn = latents if noise is None else noise.expand_as(latents)
+            pull = coupled.pull(self.encode(start), start, meant, (held > 0).float(), lively, drawn)
+        if isinstance(self.network, Conditional) and led:
             told = self.network.encoder.condition(start, goal, held)
-            meant = self.network.decoder.condition(start, held)
+            phrase = self.network.decoder.condition(start, held)
         for k in range(coding_iterations):
             if k < led and isinstance(self.network, Conditional):
                 latents = self.network.encode_held(x, held, told)
-                x = rotation.normalize(self.network.decode_held(latents, meant).view_as(x))
-            elif k < led:
-                latents = self.encode_held(x, start, goal, held)
-                x = self.decode(latents)
-            else:
-                latents = self.encode(x)
-                x = self.decode(latents)
+                x = rotation.normalize(self.network.decode_held(latents, phrase).view_as(x))
+                continue
+            if k < led and coupled is None:
+                x = slerp_towards(x, goal, held[:, None, :, None])
+            latents = self.encode(x)
+            if k < led and coupled is not None:
+                latents = latents + share_of_pass(k) * pull
+            x = self.decode(latents)
         if interaction_iterations >= coding_iterations:
             x = slerp_towards(x, goal, held[:, None, :, None])
         return self.with_heading(x, facing), latents
