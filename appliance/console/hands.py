@@ -1,4 +1,4 @@
-"""Hands of browsers: orientations of joints on their way to show control, and every joint given back."""
+"""Hands of browsers: what they hold joints at, on its way to show control, and every joint given back."""
 
 from __future__ import annotations
 
@@ -25,7 +25,16 @@ _TRIES = 3
 _LONGEST_MESSAGE = 512  # bytes
 _LOOK_S = 0.1
 _LARGEST = 4096
-_TAKE, _RELEASE = "/mocap/setjointrot", "/mocap/releasejoint"
+_TURN, _PLACE, _RELEASE = "/mocap/setjointrot", "/mocap/setjointpos", "/mocap/releasejoint"
+_FAR_M = 100.0
+
+
+class _Said(NamedTuple):
+    """What a browser said of a joint: a command's address and numbers; without an address it lets go."""
+
+    joint: str
+    address: str = ""
+    numbers: tuple[float, ...] = ()
 
 
 class _Hold(NamedTuple):
@@ -65,8 +74,8 @@ class Hands:
                     self._give_back(joint)
 
     async def serve(self, request: web.Request) -> web.StreamResponse:
-        """One browser. It says {"joint": name, "turned": [w, x, y, z]}, local to the parent; without `turned`
-        it lets go.
+        """One browser. It says {"joint": name, "turned": [w, x, y, z]}, local to the parent; in place of that
+        "at": [x, y, z], metres in the room; or neither, and lets go.
         """
         self._guard.require_device(request)
         if len(self._browsers) >= MOST:
@@ -79,11 +88,11 @@ class Hands:
                 answering = asyncio.create_task(_tell_refusals(stream, browser))
                 try:
                     async for message in browser:
-                        turned = _turned(message.data) if message.type == WSMsgType.TEXT else None
-                        if turned is None or self._guard.device(request) is None:
+                        said = _said(message.data) if message.type == WSMsgType.TEXT else None
+                        if said is None or self._guard.device(request) is None:
                             await browser.close(code=1008, message=b"not understood")
                             break
-                        if refusal := self._follow(browser, stream, *turned):
+                        if refusal := self._follow(browser, stream, said):
                             await browser.send_str(json.dumps({"refused": refusal}))
                 finally:
                     answering.cancel()
@@ -106,13 +115,12 @@ class Hands:
                 async with asyncio.timeout(0.5):
                     await browser.close(code=1001)
 
-    def _follow(
-        self, browser: web.WebSocketResponse, stream: Stream, joint: str, turned: tuple[float, ...] | None
-    ) -> str:
+    def _follow(self, browser: web.WebSocketResponse, stream: Stream, said: _Said) -> str:
         """Hold a joint, or let it go; why not, in a sentence."""
+        joint = said.joint
         hold = self._held.get(joint)
         is_own = hold is not None and hold.browser is browser
-        if turned is None:
+        if not said.address:
             if is_own:
                 self._give_back(joint)
             return ""
@@ -123,7 +131,7 @@ class Hands:
         self._held[joint] = _Hold(browser, time.monotonic())
         if hold is None:
             self._write_note()
-        stream.send(_TAKE, [joint, *_axis_angle(turned)])
+        stream.send(said.address, [joint, *said.numbers])
         return ""
 
     def _give_back(self, joint: str) -> None:
@@ -160,21 +168,31 @@ async def _tell_refusals(stream: Stream, browser: web.WebSocketResponse) -> None
             await browser.send_str(json.dumps({"refused": await stream.refusal()}))
 
 
-def _turned(text: str) -> tuple[str, tuple[float, ...] | None] | None:
-    """Joint and orientation that a browser said; None for anything else."""
+def _said(text: str) -> _Said | None:
+    """What a browser said; None for anything else."""
     try:
         said: Any = json.loads(text)
-        joint, turned = said["joint"], said.get("turned")
+        joint, turned, at = said["joint"], said.get("turned"), said.get("at")
     except (ValueError, RecursionError, TypeError, KeyError, AttributeError):
         return None
     if not isinstance(joint, str) or not 0 < len(joint) <= LONGEST_NAME or not joint.isprintable():
         return None
+    if turned is None and at is None:
+        return _Said(joint)
     if turned is None:
-        return joint, None
-    if not isinstance(turned, list) or len(turned) != 4 or not all(type(v) in (int, float) for v in turned):
+        place = _numbers(at, 3)
+        return _Said(joint, _PLACE, place) if place and all(abs(v) <= _FAR_M for v in place) else None
+    numbers = _numbers(turned, 4)
+    if at is not None or not numbers or not 0.5 < math.hypot(*numbers) < 2.0:
         return None
-    numbers = tuple(map(float, turned))
-    return (joint, numbers) if 0.5 < math.hypot(*numbers) < 2.0 else None
+    return _Said(joint, _TURN, _axis_angle(numbers))
+
+
+def _numbers(given: Any, count: int) -> tuple[float, ...]:
+    """So many numbers; () for anything else."""
+    if not isinstance(given, list) or len(given) != count or not all(type(v) in (int, float) for v in given):
+        return ()
+    return tuple(map(float, given))
 
 
 def _axis_angle(turned: tuple[float, ...]) -> tuple[float, float, float, float]:

@@ -164,11 +164,16 @@ def test_who_may_hold_what(browser: Browser, studio: Studio) -> None:
     held_there = json.dumps({"joint": HELD, "turned": [1, 0, 0, 0]})
     assert stranger.evaluate(SPOKEN, held_there) == 1006, "without the PIN there is no hand"
     tab = opened(browser.new_context(**LAPTOP), studio)
-    for spoilt in ("{", "[]", '{"joint": ""}', '{"joint": "a", "turned": [0, 0, 0, 0]}', "[" * 400):
+    turned, at = [1, 0, 0, 0], [0, 1, 0]
+    places = [{"joint": HELD, "at": at[:2]}, {"joint": HELD, "at": [0, 1e3, 0]}, {"at": at}]
+    both = {"joint": HELD, "at": at, "turned": turned}
+    spoilt_ones = ["{", "[]", '{"joint": ""}', '{"joint": "a", "turned": [0, 0, 0, 0]}', "[" * 400]
+    for spoilt in (*spoilt_ones, *map(json.dumps, [*places, both])):
         assert tab.evaluate(SPOKEN, spoilt) == 1008, spoilt
     assert "No hand of this show holds 'lShldr'" in tab.evaluate(
         SPOKEN, json.dumps({"joint": "lShldr", "turned": [1, 0, 0, 0]})
     )
+    assert "takes an orientation" in tab.evaluate(SPOKEN, json.dumps({"joint": HELD, "at": at}))
     Finger(tab).down(*ring(tab))
     wait_until(lambda: held(studio) == 1.0)
     assert "Another browser holds" in tab.evaluate(SPOKEN, held_there)

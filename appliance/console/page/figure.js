@@ -1,4 +1,5 @@
-// The figure of a rehearsal: a finger or the mouse takes a joint by its ring, and that is the hand.
+// The figure of a rehearsal: a finger or the mouse takes a joint by its ring, and that is the hand. A round ring
+// turns its joint; a square one takes it to a place, in the plane that faced the eye when it was taken.
 import { Dance } from "./dance.js";
 import { say, withPin } from "./device.js";
 import { aimed, inverse, multiplied } from "./rotation.js";
@@ -25,6 +26,8 @@ export class Figure extends Dance {
     if (!this.show) return [];
     return this.show.held.filter((_, place) => this.show.hands[place] === "osc").map((name) => this.show.joints.indexOf(name));
   }
+
+  isPlaced(joint) { return this.show.by_position.includes(this.show.joints[joint]); }
 
   turnBy(canvas) {
     canvas.addEventListener("pointerdown", (event) => {
@@ -56,7 +59,7 @@ export class Figure extends Dance {
     if (this.holding(joint)) return;
     this.open();
     this.taken.set(event.pointerId, {
-      joint, at: this.pixel(event), way, length: Math.hypot(...way), world: [...this.turned(joint)], away: this.view(way)[2],
+      joint, at: this.pixel(event), way, length: Math.hypot(...way), world: [...this.turned(joint)], away: this.view(way)[2], from: [...from],
     });
     this.stream();
   }
@@ -89,11 +92,15 @@ export class Figure extends Dance {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(said));
   }
 
-  // Where the fingers are, as orientations local to the parent joint, in the newest frame.
+  // Where the fingers are in the newest frame: places, or orientations local to the parent joint.
   stream() {
     if (!this.frame || !this.show || this.taken.size === 0) return;
     this.open();
-    for (const { joint, at, way, length, world, away } of this.taken.values()) {
+    for (const { joint, at, way, length, world, away, from } of this.taken.values()) {
+      if (this.isPlaced(joint)) {
+        this.tellBox({ joint: this.show.joints[joint], at: this.place(from, at).map((value) => Number(value.toFixed(4))) });
+        continue;
+      }
       const parent = this.show.parents[joint];
       const turned = multiplied(aimed(way, this.pointing(joint, at, length, away)), world);
       const local = parent < 0 ? turned : multiplied(inverse(this.turned(parent)), turned);
@@ -103,12 +110,24 @@ export class Figure extends Dance {
 
   // From the joint to the finger; the bone keeps its length, so a finger nearer to the joint turns it away.
   pointing(joint, at, length, away) {
-    const ratio = this.canvas.width / this.canvas.clientWidth;
-    const middle = this.eye(this.canvas.width, this.canvas.height)(this.point(joint));
-    let [side, up] = [(at[0] * ratio - middle.x) / middle.scale, (middle.y - at[1] * ratio) / middle.scale];
+    let [side, up] = this.apart(this.point(joint), at);
     const far = Math.hypot(side, up);
     if (far > length) [side, up] = [side * length / far, up * length / far];
-    const near = Math.sign(away || 1) * Math.sqrt(Math.max(0, length ** 2 - side ** 2 - up ** 2));
+    return this.world(side, up, Math.sign(away || 1) * Math.sqrt(Math.max(0, length ** 2 - side ** 2 - up ** 2)));
+  }
+
+  // The place in the room under a pixel, as far from the eye as a point is.
+  place(from, at) { return this.world(...this.apart(from, at), 0).map((value, axis) => value + from[axis]); }
+
+  // How far a pixel is from a point, in metres at its distance: to the right, up.
+  apart(point, at) {
+    const ratio = this.canvas.width / this.canvas.clientWidth;
+    const middle = this.eye(this.canvas.width, this.canvas.height)(point);
+    return [(at[0] * ratio - middle.x) / middle.scale, (middle.y - at[1] * ratio) / middle.scale];
+  }
+
+  // A way in metres that the eye sees (to the right, up, towards the eye), in the room.
+  world(side, up, near) {
     const [sy, cy, sp, cp] = [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(this.pitch), Math.cos(this.pitch)];
     return [side * cy - up * sp * sy + near * cp * sy, up * cp + near * sp, -side * sy - up * sp * cy + near * cp * cy];
   }
@@ -142,7 +161,7 @@ export class Figure extends Dance {
 
   ring(joint) {
     const ratio = this.canvas.width / this.canvas.clientWidth;
-    const at = this.eye(this.canvas.width, this.canvas.height)(this.tip(joint));
+    const at = this.eye(this.canvas.width, this.canvas.height)(this.isPlaced(joint) ? this.point(joint) : this.tip(joint));
     return [at.x / ratio, at.y / ratio];
   }
 
@@ -175,7 +194,8 @@ export class Figure extends Dance {
       ink.strokeStyle = isHeld ? HELD : FREE;
       ink.lineWidth = (isHeld ? 5 : 3) * ratio;
       ink.beginPath();
-      ink.arc(x * ratio, y * ratio, 22 * ratio, 0, 7);
+      if (this.isPlaced(joint)) ink.rect((x - 20) * ratio, (y - 20) * ratio, 40 * ratio, 40 * ratio);
+      else ink.arc(x * ratio, y * ratio, 22 * ratio, 0, 7);
       ink.stroke();
     }
     for (const { joint, at } of this.taken.values()) this.drawString(ink, this.ring(joint), at, ratio);

@@ -46,6 +46,7 @@ export function initRehearsal(me, box) {
 export function showRehearsal(value, show) {
   figure.show = show;
   byId("figure-how").hidden = figure.joints.length === 0;
+  byId("figure-place").hidden = !figure.joints.some((joint) => figure.isPlaced(joint));
   const phrases = value.phrases.map((one) => ({ ...one, label: hasWords(`source_${one.name}`) ? words(`source_${one.name}`) : one.name }));
   showChoices(byId("phrases"), byId("phrases-part"), phrases, (name) => command("/phrase", name, PHRASE_FADE_S));
   const hands = value.hands.map((one) => ({ name: one.joint, label: `${one.joint} · ${one.source === "osc" ? words("hand_here") : one.source}`, now: one.holds }));
