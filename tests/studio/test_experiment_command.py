@@ -42,7 +42,11 @@ def test_the_command_writes_page_strips_recordings_and_figures_of_two_networks_s
     for network in report["networks"].values():
         assert set(network["claims"]) == set("abcdefg")
     page = (tmp_path / "out/experiments.html").read_text()
-    assert "".join(f"<th>{name}</th>" for name in ("claim", *report["networks"])) in page
+    assert "".join(f"<th>{name}</th>" for name in ("bounds", *report["networks"], "null networks")) in page
+    assert list(report["null_networks"]) == ["copy", "paste", "mean", "untrained"]
+    copied = report["null_networks"]["copy"]["claims"]
+    assert copied["a"]["holds_on_the_whole"] and not copied["f"]["holds_on_the_whole"]
+    assert report["worth"]["a"] == "copy and paste pass, rightly: nothing is to change"
     assert "http" not in page, "it opens without a network"
     assert page.count("data:image/jpeg;base64,") == (13 if long_run else 0)
     assert (tmp_path / "out/experiments.png").exists() == long_run

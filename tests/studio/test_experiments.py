@@ -1,4 +1,4 @@
-"""The first paper's experiments: excerpts by measure, claims that a copy and a pausing dancer tell apart."""
+"""The first paper's experiments: excerpts by measure, the conditions, page and picture."""
 
 from __future__ import annotations
 
@@ -12,60 +12,38 @@ from PIL import Image
 
 from appliance.pictures.filmstrip import draw_strips
 from appliance.pose import quaternion
-from appliance.pose.bvh import read_bvh
-from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.show.bundle import default_show_path
 from appliance.show.config_error import ConfigError
-from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.data.dataset import FPS, WINDOW, Take
 from appliance.studio.data.regions import regions_of
-from appliance.studio.evaluation.coders import Poses
-from appliance.studio.experiments.claims import claims, pauses
+from appliance.studio.experiments.claims import claims
 from appliance.studio.experiments.claims_picture import COLOURS, draw_claims
 from appliance.studio.experiments.excerpts import FRAMES, Excerpt, choose, measured, named
-from appliance.studio.experiments.families import CONDITIONS, Condition, Trial, usual_trace
+from appliance.studio.experiments.families import CONDITIONS, Condition, Trial
+from appliance.studio.experiments.null_networks import Paste
 from appliance.studio.experiments.page import write_page
 from appliance.studio.experiments.strips import strip_of_excerpts
 from appliance.studio.studio_error import StudioError
-
-SECONDS = 12.0
-ARMS = ("rShldr", "lShldr", "rForeArm", "lForeArm")
-LEGS = ("rThigh", "lThigh", "rShin", "lShin")
-TORSO = ("abdomen", "chest")
-JOINTS = ("hip", *TORSO, "head", *ARMS, *LEGS)
-JOINT = "lShldr"
+from tests.studio.excerpt_takes import (
+    ARMS,
+    JOINTS,
+    LEGS,
+    Pausing,
+    five_takes,
+    take,
+    trials,
+    whole_skeleton,
+)
 
 
 @pytest.fixture(scope="module")
 def skeleton() -> Skeleton:
-    return read_bvh(default_show_path() / "skeleton.bvh").skeleton
-
-
-def take(skeleton: Skeleton, name: str, **swings: tuple[tuple[str, ...], float, float]) -> Take:
-    """A body at rest whose joints swing: what it is called = (joints, degrees, cycles a second)."""
-    count = round(SECONDS * FPS)
-    time = np.arange(count) / FPS
-    poses = np.tile(quaternion.IDENTITY.astype(float), (count, len(skeleton), 1))
-    for joints, degrees, hertz in swings.values():
-        angles = np.radians(degrees) * np.sin(2 * np.pi * hertz * time)
-        for joint in joints:
-            poses[:, skeleton.index(joint)] = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), angles)
-    roots = np.tile([0.0, 1.0, 0.0], (count, 1))
-    recording = Recording(skeleton, poses, roots, FPS)
-    return Take(name, name, recording, np.ones(count, dtype=bool), FPS, FPS)
+    return whole_skeleton()
 
 
 @pytest.fixture(scope="module")
 def takes(skeleton: Skeleton) -> list[Take]:
-    """Each of them is one of the five kinds from end to end."""
-    return [
-        take(skeleton, "nothing", all=(JOINTS, 0.5, 0.2)),
-        take(skeleton, "bending", torso=(TORSO, 30, 0.3), arms=(ARMS, 1, 0.3), legs=(LEGS, 1, 0.3)),
-        take(skeleton, "apart", arms=(ARMS, 30, 0.35), legs=(LEGS, 30, 0.87)),
-        take(skeleton, "in_step", arms=(ARMS, 30, 0.5), legs=(LEGS, 30, 0.5)),
-        take(skeleton, "everything", all=(JOINTS, 40, 0.6), arms=(ARMS, 40, 0.75)),
-    ]
+    return five_takes(skeleton)
 
 
 def test_each_kind_of_excerpt_is_found_where_it_is(takes: list[Take]) -> None:
@@ -140,74 +118,13 @@ def test_named_excerpts_are_taken(takes: list[Take], tmp_path: Path) -> None:
     assert (found.name, found.take, found.first) == ("mine", "apart", 125)
 
 
-def test_pauses_and_jumps_are_counted() -> None:
-    turns = np.repeat([0.0, 10.0, 20.0, 30.0], 10)  # four pauses of ten ticks, each left by one step
-    poses = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.radians(turns))[:, None]
-    share, jump = pauses(poses, mean_speed=30.0 / 39)
-    assert share == pytest.approx(36 / 39)
-    assert jump == 1
-    smooth = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.radians(np.linspace(0, 30, 40)))[
-        :, None
-    ]
-    share, jump = pauses(smooth, mean_speed=30.0 / 39)
-    assert share == 0 and np.isnan(jump)
-
-
-class Pretender:
-    """A coder that only overwrites what is held, and with `pausing` rounds every angle to steps."""
-
-    batch = 512
-
-    def __init__(self, pausing: bool = False) -> None:
-        self.joints, self.facts, self.pausing = (
-            JOINTS,
-            {"architecture": "pretender", "precision": "none"},
-            pausing,
-        )
-        self.rest = np.tile(quaternion.IDENTITY, (len(JOINTS), 1))
-
-    def iterate(
-        self,
-        windows: Poses,
-        coding_iterations: int,
-        interaction_iterations: int = 0,
-        held: HeldJoints[np.ndarray] | None = None,
-    ) -> tuple[Poses, Poses]:
-        made = windows.copy()
-        if self.pausing and coding_iterations > 1:
-            made[..., 1] = np.round(made[..., 1] * 8) / 8
-            made = quaternion.normalize(made).astype(np.float32)
-        if held is not None and interaction_iterations == coding_iterations:
-            made[:, :, held.mask] = held.targets[:, :, held.mask]
-        return made, np.zeros((len(windows), 2), dtype=np.float32)
-
-
-def trials(takes: list[Take], coder: Pretender, joints: tuple[str, ...] = (JOINT,)) -> list[Trial]:
-    excerpts = choose(takes, JOINTS)
-    trace = usual_trace(excerpts, takes[0].recording.skeleton.index(JOINT))
-    found = [
-        Trial(coder, one, joints, trace) for one in excerpts if one.name in ("still", "coordinated", "torso")
-    ]
-    for trial in found:
-        trial.run()
-    return found
-
-
 @pytest.fixture(scope="module")
 def copied(takes: list[Take]) -> list[Trial]:
     """What a dancer that only copies has danced."""
-    return trials(takes, Pretender())
-
-
-def test_a_copy_is_faithful_and_shows_the_hand_and_does_nothing_else(copied: list[Trial]) -> None:
-    verdicts = {one.letter: one.holds_on_the_whole for one in claims(copied)}
-    assert verdicts == {"a": True, "b": True, "c": False, "d": True, "e": False, "f": False, "g": False}
-
-
-def test_a_dancer_that_pauses_on_poses_is_intermittent(takes: list[Take]) -> None:
-    by_letter = {one.letter: one for one in claims(trials(takes, Pretender(pausing=True)))}
-    assert by_letter["c"].holds_on_the_whole
-    assert by_letter["c"].figures["coordinated"]["pauses_10"] > 0.3
+    found = trials(takes, Paste(JOINTS, np.tile(quaternion.IDENTITY, (len(JOINTS), 1))))
+    for trial in found:
+        trial.run()
+    return found
 
 
 def test_every_family_is_danced_as_long_as_its_hand_needs(copied: list[Trial]) -> None:
@@ -228,17 +145,25 @@ def test_the_page_has_its_pictures_inside(copied: list[Trial], tmp_path: Path) -
     Image.new("RGB", (64, 32), "red").save(strip)
     page = tmp_path / "page.html"
     write_page(
-        page, "A <title>", ["Words."], [trial.excerpt], {"a network": claims([trial])}, {"Strips": [strip]}
+        page,
+        "A <title>",
+        ["Words."],
+        [trial.excerpt],
+        {"a network": claims([trial])},
+        {"paste": claims([trial])},
+        {"Strips": [strip]},
     )
     text = page.read_text()
     assert "A &lt;title&gt;" in text and "does not hold" in text
+    assert "degrees at most 3" in text and "paste passes, rightly" in text and "over 99 times" in text
     _, data = text.split("data:image/jpeg;base64,")
     shown = Image.open(io.BytesIO(base64.b64decode(data.split('"')[0])))
     assert shown.size == (64, 32)
 
 
 def test_several_joints_are_kept_and_one_is_in_the_hand(takes: list[Take]) -> None:
-    trial = trials(takes, Pretender(pausing=True), ("lForeArm", "rThigh"))[0]
+    trial = trials(takes, Pausing(), ("lForeArm", "rThigh"))[0]
+    trial.run()
     kept = trial.dances[Condition("kept", (10, 10))].poses
     off = quaternion.angle_between(kept, trial.once.phrase[: len(kept)]).max(axis=0)
     places = [JOINTS.index(name) for name in ("lForeArm", "rThigh")]
@@ -262,7 +187,13 @@ def test_the_report_is_one_picture_with_a_field_for_each_verdict(
     one, two = (
         np.asarray(
             Image.open(
-                draw_claims(tmp_path / f"{len(names)}.png", "T", dict.fromkeys(names, found), excerpts)
+                draw_claims(
+                    tmp_path / f"{len(names)}.png",
+                    "T",
+                    dict.fromkeys(names, found),
+                    excerpts,
+                    {"paste": found},
+                )
             )
         )
         for names in (["a"], ["a", "b"])

@@ -1,53 +1,84 @@
-"""What the paper found, (a) to (g), each with a measure, its figure for every excerpt and whether it holds.
+"""What the paper found, (a) to (g): each with a measure, figures by excerpt, bounds, and whether it holds.
 
-Degrees are mean joint angles, heading removed. 'Others': the joints that the hand does not hold. The bounds
-say when a figure is taken to agree with the paper's words, which give no numbers.
+The paper's words give no numbers: the bounds say when a figure is taken to agree with them, and a margin by
+how much it does. Where a null network passes too, a verdict says nothing of what a network has learned.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from appliance.studio.experiments import claim_figures as measures
+from appliance.studio.experiments.claim_figures import OWN_POSE, PAUSE_SHARE
+from appliance.studio.experiments.families import NUDGE_DEGREES, Trial
+from appliance.studio.experiments.null_networks import Copy, Paste
 
-from appliance.pose import quaternion
-from appliance.pose.quaternion import Array
-from appliance.studio.evaluation import dance_figures as motion
-from appliance.studio.evaluation.coders import Poses
-from appliance.studio.evaluation.nearest import Reference, without_heading
-from appliance.studio.experiments.families import NUDGE_DEGREES, TURNS_S, Trial
-
-FAITHFUL = 3.0  # degrees after one pass
-STAYS = 5.0  # degrees after ten
-PAUSE_SHARE = 0.3  # of the excerpt's mean speed: below it a body nearly stands still
-MORE_PAUSES = 0.1  # of the time
-OWN_POSE = 8.0  # degrees from a pose of the excerpt: nearly that pose
-SHOWS, HIDDEN = 3.0, 6.0  # degrees between the joint and the hand
-FAINT = 2.0  # degrees that the others are moved by at 1/1
 STILL = "still"
+MOST = 99.0  # margins are cut there: a figure of nothing has no end of it
+RIGHTLY = (Copy.name, Paste.name)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What a figure has to be: at most or at least `limit`; words: 'degrees from the excerpt'."""
+
+    figure: str
+    words: str
+    limit: float
+    at_least: bool = False
+
+    def margin(self, row: Mapping[str, float]) -> float:
+        """How many times over the figure keeps the bound: 1 just so, less where it does not; 0 for NaN."""
+        value = row[self.figure]
+        if not math.isfinite(value):
+            return 0.0
+        if self.at_least:
+            return min(max(value, 0.0) / self.limit, MOST)
+        return min(self.limit / max(value, 1e-9), MOST)
+
+    def __str__(self) -> str:
+        """For people: 'degrees from the excerpt at most 3'."""
+        return f"{self.words} {'at least' if self.at_least else 'at most'} {self.limit:g}"
 
 
 @dataclass(frozen=True)
 class Claim:
     """letter and words of the paper; measure: what the figures are; figures: by excerpt and name.
 
-    holds: by excerpt, and `holds_on_the_whole`.
+    about: the excerpts that the claim speaks of. rightly: null networks that pass it as they should, because
+    the claim is that nothing changes.
     """
 
     letter: str
     words: str
     measure: str
+    bounds: tuple[Bound, ...]
     figures: Mapping[str, Mapping[str, float]]
-    holds: Mapping[str, bool]
-    most: float = 0.5
+    about: tuple[str, ...]
+    rightly: tuple[str, ...] = ()
+
+    @property
+    def margins(self) -> dict[str, float]:
+        """By excerpt: how many times over its weakest figure keeps its bound."""
+        return {name: min(bound.margin(self.figures[name]) for bound in self.bounds) for name in self.about}
+
+    @property
+    def holds(self) -> dict[str, bool]:
+        """By excerpt."""
+        return {name: margin >= 1 for name, margin in self.margins.items()}
+
+    @property
+    def margin(self) -> float:
+        """On the whole: what more than half of the excerpts reach."""
+        ordered = sorted(self.margins.values(), reverse=True)
+        return ordered[len(ordered) // 2] if ordered else 0.0
 
     @property
     def holds_on_the_whole(self) -> bool:
-        """In more than `most` of the excerpts that it is about."""
-        return sum(self.holds.values()) > self.most * len(self.holds)
+        """In more than half of the excerpts that it is about."""
+        return self.margin >= 1
 
     def as_json(self) -> dict[str, object]:
         """For the report."""
@@ -58,209 +89,154 @@ class Claim:
         return {
             "claim": self.words,
             "measure": self.measure,
+            "bounds": [str(bound) for bound in self.bounds],
             "figures": figures,
-            "holds": dict(self.holds),
+            "holds": self.holds,
+            "margins": {name: round(margin, 2) for name, margin in self.margins.items()},
             "holds_on_the_whole": self.holds_on_the_whole,
+            "margin": round(self.margin, 2),
         }
 
 
 def claims(trials: Sequence[Trial]) -> list[Claim]:
-    """All seven, from trials that were run; (b) is about the excerpt that is named `still`."""
+    """All seven, from trials; (b) is about the excerpt that is named `still`, (c) about the others."""
     still = [one for one in trials if one.excerpt.name == STILL]
     moving = [one for one in trials if one.excerpt.name != STILL] or list(trials)
     return [
         _claim(
             "a",
             "One pass reproduces the recording faithfully.",
-            "degrees from the excerpt after one pass",
+            "degrees from the excerpt after one pass; the same as a share of the way from the excerpt to the "
+            "dancer's mean pose",
+            (Bound("degrees", "degrees", 3.0), Bound("way_to_mean", "share of the way to the mean", 0.2)),
+            {one.excerpt.name: measures.faithfulness(one, 1) for one in trials},
             trials,
-            lambda one: {"degrees": _apart(one, 1)},
-            lambda row: row["degrees"] <= FAITHFUL,
+            rightly=RIGHTLY,
         ),
         _claim(
             "b",
             "A static excerpt stays as it is, at ten passes as well.",
-            "degrees from the excerpt after ten passes; the other excerpts for comparison",
-            trials,
-            lambda one: {"degrees": _apart(one, 10)},
-            lambda row: row["degrees"] <= STAYS,
-            about=still,
+            "the same after ten passes; the other excerpts for comparison",
+            (Bound("degrees", "degrees", 5.0), Bound("way_to_mean", "share of the way to the mean", 0.33)),
+            {one.excerpt.name: measures.faithfulness(one, 10) for one in trials},
+            still,
+            rightly=RIGHTLY,
         ),
         _claim(
             "c",
             "Above one pass smooth motion becomes intermittent: it pauses on poses, mostly of the excerpt, "
             "and jumps.",
-            f"share of the time below {PAUSE_SHARE:.0%} of the excerpt's mean speed, in the recording, after "
-            "one and after ten passes; median length of the jumps between two pauses after ten, in ticks; "
-            f"share of poses within {OWN_POSE:g} degrees of one of the excerpt",
+            f"pauses: share of the time below {PAUSE_SHARE:.0%} of the dance's own mean speed, in the "
+            "recording, after one and after ten passes, and by how much ten have more than both; half in: "
+            "share of the time, the quickest, in which half of the motion happens; sharper: in how much less "
+            "than in recording and one pass; jumps: the speed in that time by the excerpt's in its own; "
+            "median length of the jumps in ticks; own poses: share of the pauses within "
+            f"{OWN_POSE:g} degrees of a pose of the excerpt",
+            (
+                Bound("more_pauses", "more pauses", 0.1, at_least=True),
+                Bound("sharper", "sharper", 2.0, at_least=True),
+                Bound("jumps", "jumps", 0.5, at_least=True),
+                Bound("own_poses", "own poses", 0.5, at_least=True),
+            ),
+            {one.excerpt.name: measures.intermittency(one) for one in moving},
             moving,
-            _intermittency,
-            lambda row: row["pauses_10"] - row["pauses_1"] >= MORE_PAUSES,
         ),
         _claim(
             "d",
             "The held orientation shows only when all passes are interaction iterations.",
             "degrees between the joint and a hand at five seconds a turn, at 1/1, 10/5 and 10/10 (blending "
             "follows such a hand by 2 degrees)",
+            (
+                Bound("1/1", "degrees at 1/1", 3.0),
+                Bound("10/10", "at 10/10", 3.0),
+                Bound("10/5", "at 10/5", 6.0, at_least=True),
+            ),
+            {one.excerpt.name: measures.holding(one) for one in trials},
             trials,
-            _held,
-            lambda row: max(row["1/1"], row["10/10"]) <= SHOWS and row["10/5"] >= HIDDEN,
         ),
         _claim(
             "e",
             "The influence on the other joints is very small at 1/1 and grows with the passes and with the "
             "distance of the hand from the recording.",
-            "degrees that the others are moved by a hand at five seconds a turn, at 1/1 and 10/10; "
-            "correlation of that with the hand's distance from the recorded orientation over the ticks at "
-            "10/10",
+            "degrees that the others are moved by a hand at five seconds a turn, at 1/1 and 10/10; the "
+            "second by the first; correlation of the second with the hand's distance from the recorded "
+            "orientation over the ticks",
+            (
+                Bound("1/1", "degrees at 1/1", 2.0),
+                Bound("10/10", "at 10/10", 4.0, at_least=True),
+                Bound("growth", "growth", 3.0, at_least=True),
+                Bound("correlation", "correlation", 0.3, at_least=True),
+            ),
+            {one.excerpt.name: measures.influence(one) for one in trials},
             trials,
-            _influence,
-            lambda row: row["1/1"] <= FAINT and row["10/10"] > 2 * row["1/1"] and row["correlation"] > 0.0,
         ),
         _claim(
             "f",
             "The speed of the turning joint sets the pace of the whole skeleton, also of a static excerpt; "
             "slow turns make larger motion.",
             "speed of the others at 10/10 in degrees a second without a hand, at five seconds and at one "
-            "second a turn; how far they range at both (degrees from their mean pose)",
+            "second a turn; how far they range at both (degrees from their mean pose); faster: the quick "
+            "turn's speed by the slow one's; larger: the slow turn's range by the quick one's",
+            (
+                Bound("faster", "faster", 1.5, at_least=True),
+                Bound("larger", "larger", 1.1, at_least=True),
+            ),
+            {one.excerpt.name: measures.pace(one) for one in trials},
             trials,
-            _pace,
-            lambda row: row["speed_1s"] > row["speed_5s"] and row["range_5s"] > row["range_1s"],
         ),
-        _sensitivity(trials),
+        _claim(
+            "g",
+            "Fast recordings make the answer unpredictable.",
+            "degrees that the others differ by for each degree that the hand is ahead (by "
+            f"{NUDGE_DEGREES:g}), at one second a turn and 10/10; growth: the faster half of the excerpts by "
+            "the slower half; chance: how often excerpts in random order agree as well with their speeds "
+            "(permutation test on ranks)",
+            (Bound("chance", "chance", 0.05), Bound("growth", "growth", 1.5, at_least=True)),
+            measures.sensitivity(trials),
+            trials,
+        ),
     ]
-
-
-def pauses(poses: Array, mean_speed: float) -> tuple[float, float]:
-    """Of poses (T, M, 4): share of ticks nearly still, and median length in ticks from one pause to the next.
-
-    The length is not a number where there are no two pauses.
-    """
-    speeds = np.degrees(quaternion.angle_between(poses[1:], poses[:-1])).mean(axis=1)
-    is_pause: NDArray[np.bool_] = speeds < PAUSE_SHARE * mean_speed
-    edges = np.flatnonzero(np.diff(is_pause.astype(np.int8)))
-    begins = edges[~is_pause[edges + 1]] + 1  # of jumps that follow a pause
-    ends = edges[is_pause[edges + 1]] + 1
-    lengths = [int(ends[ends > begin][0] - begin) for begin in begins if (ends > begin).any()]
-    return float(is_pause.mean()), float(np.median(lengths)) if lengths else float("nan")
 
 
 def _claim(
     letter: str,
     words: str,
     measure: str,
-    trials: Sequence[Trial],
-    figures: Callable[[Trial], Mapping[str, float]],
-    holds: Callable[[Mapping[str, float]], bool],
-    about: Sequence[Trial] | None = None,
+    bounds: tuple[Bound, ...],
+    figures: Mapping[str, Mapping[str, float]],
+    about: Sequence[Trial],
+    rightly: tuple[str, ...] = (),
 ) -> Claim:
-    """about: the excerpts that the claim speaks of, where it is not about all that are measured."""
-    found = {one.excerpt.name: figures(one) for one in trials}
-    spoken_of = trials if about is None else about
-    held = {one.excerpt.name: bool(holds(found[one.excerpt.name])) for one in spoken_of}
-    return Claim(letter, words, measure, found, held)
+    names = tuple(one.excerpt.name for one in about)
+    return Claim(letter, words, measure, bounds, figures, names, rightly)
 
 
-def _apart(trial: Trial, passes: int) -> float:
-    danced = trial.dance("coding", (passes, 0)).poses
-    return float(motion.degrees_apart(without_heading(danced), without_heading(trial.once.phrase)).mean())
+def verdict(claim: Claim) -> str:
+    """For people: 'holds (1.3 times, 4 of 5)'."""
+    held = f"{sum(claim.holds.values())} of {len(claim.about)}"
+    return f"{'holds' if claim.holds_on_the_whole else 'does not hold'} ({times(claim.margin)}, {held})"
 
 
-def _intermittency(trial: Trial) -> Mapping[str, float]:
-    phrase = without_heading(trial.once.phrase)
-    speed = motion.energy(phrase)
-    excerpt = Reference(phrase)
-    found = {"pauses_recorded": pauses(phrase, speed)[0]}
-    for passes in (1, 10):
-        danced = without_heading(trial.dance("coding", (passes, 0)).poses)
-        found[f"pauses_{passes}"], jumps = pauses(danced, speed)
-        if passes > 1:
-            found["jump_ticks"] = jumps
-            found["own_poses"] = float((excerpt.nearest(danced) <= OWN_POSE).mean())
-    return found
+def times(margin: float) -> str:
+    """A margin in words: '1.3 times'."""
+    return f"over {MOST:g} times" if margin >= MOST else f"{margin:.2g} times"
 
 
-def _held(trial: Trial) -> Mapping[str, float]:
-    found = {}
-    for iterations in ((1, 1), (10, 5), (10, 10)):
-        dance = trial.dance("turning", iterations, f"{TURNS_S[1]:g}s")
-        assert dance.hand is not None, "a turning hand has orientations"
-        apart = quaternion.angle_between(dance.poses[:, trial.place], dance.hand)
-        found[_words(iterations)] = float(np.degrees(apart).mean())
-    return found
+def passed_by(claim: Claim, nulls: Mapping[str, Sequence[Claim]]) -> list[str]:
+    """Names of the null networks that pass a claim."""
+    return [
+        name
+        for name, found in nulls.items()
+        if any(one.letter == claim.letter and one.holds_on_the_whole for one in found)
+    ]
 
 
-def _influence(trial: Trial) -> Mapping[str, float]:
-    found = {}
-    for iterations in ((1, 1), (10, 10)):
-        dance = trial.dance("turning", iterations, f"{TURNS_S[1]:g}s")
-        moved = _moved(trial, dance.poses, trial.looped.free(iterations[0]))
-        found[_words(iterations)] = float(moved.mean())
-    assert dance.hand is not None, "a turning hand has orientations"
-    distance = quaternion.angle_between(trial.looped.phrase[: len(dance.hand), trial.place], dance.hand)
-    return found | {"correlation": _correlation(moved, distance)}
-
-
-def _pace(trial: Trial) -> Mapping[str, float]:
-    found = {"speed_free": _speed(trial, trial.looped.free(10))}
-    for seconds in TURNS_S:
-        poses = trial.dance("turning", (10, 10), f"{seconds:g}s").poses
-        found[f"speed_{seconds:g}s"] = _speed(trial, poses)
-        found[f"range_{seconds:g}s"] = _range(without_heading(poses)[:, trial.others])
-    return found
-
-
-def _sensitivity(trials: Sequence[Trial]) -> Claim:
-    """(g), of which all excerpts together are the measure: more of it where the recording is faster."""
-    found, by_speed = {}, []
-    for trial in trials:
-        usual = trial.dance("turning", (10, 10), f"{TURNS_S[0]:g}s").poses
-        other = trial.nudged(TURNS_S[0], (10, 10))
-        degrees = float(_moved(trial, usual, other).mean()) / NUDGE_DEGREES
-        speed = _speed(trial, trial.looped.phrase)
-        found[trial.excerpt.name] = {"degrees_per_degree": degrees, "recorded_speed": speed}
-        by_speed.append((speed, degrees))
-    speeds, answers = (np.array(column) for column in zip(*by_speed, strict=True))
-    rank = 0.0 if np.ptp(answers) < 1e-6 else _correlation(*(_ranks(each) for each in (speeds, answers)))
-    found = {name: row | {"rank_correlation": rank} for name, row in found.items()}
-    return Claim(
-        "g",
-        "Fast recordings make the answer unpredictable.",
-        f"degrees that the others differ by for each degree that the hand is ahead (by {NUDGE_DEGREES:g}), "
-        "at one second a turn and 10/10; holds where it grows with the excerpt's speed, by rank, over all "
-        "excerpts",
-        found,
-        dict.fromkeys(found, rank > 0.5),
-    )
-
-
-def _moved(trial: Trial, poses: Poses, others: Poses) -> Array:
-    """(T,) degrees between the joints that nobody holds in two dances."""
-    count = min(len(poses), len(others))
-    one, other = (without_heading(each[:count])[:, trial.others] for each in (poses, others))
-    return motion.degrees_apart(one, other)
-
-
-def _speed(trial: Trial, poses: Poses) -> float:
-    """Degrees a second, of the others."""
-    return 50.0 * motion.energy(without_heading(poses)[:, trial.others])
-
-
-def _range(poses: Array) -> float:
-    mean = quaternion.normalize(quaternion.aligned(poses, poses[0]).mean(axis=0))
-    return float(np.degrees(quaternion.angle_between(poses, mean)).mean())
-
-
-def _correlation(a: Array, b: Array) -> float:
-    count = min(len(a), len(b))
-    one, other = a[:count] - a[:count].mean(), b[:count] - b[:count].mean()
-    size = float(np.sqrt((one**2).sum() * (other**2).sum()))
-    return float((one * other).sum()) / size if size > 1e-9 else 0.0
-
-
-def _ranks(values: Array) -> Array:
-    return np.argsort(np.argsort(values)).astype(float)
-
-
-def _words(iterations: tuple[int, int]) -> str:
-    return f"{iterations[0]}/{iterations[1]}"
+def worth(claim: Claim, nulls: Mapping[str, Sequence[Claim]]) -> str:
+    """What a verdict on a claim says, in words, by the null networks that pass it."""
+    passed = passed_by(claim, nulls)
+    idle = [name for name in passed if name not in claim.rightly]
+    if idle:
+        return f"says nothing of what was learned: {' and '.join(idle)} pass{'es' * (len(idle) == 1)} too"
+    if passed:
+        return f"{' and '.join(passed)} pass{'es' * (len(passed) == 1)}, rightly: nothing is to change"
+    return "no null network passes"

@@ -9,15 +9,25 @@ from textwrap import fill
 from typing import Any
 
 from appliance.studio.evaluation.pictures import FAINT, INK, PANEL, new_figure, save
-from appliance.studio.experiments.claims import Claim
+from appliance.studio.experiments.claims import Claim, worth
 
 WIDTH, CLAIM_SHARE = 15.0, 0.34  # inches; of the width for the claim's words
-ROW, HEAD = 0.74, 0.5  # inches
+ROW, HEAD = 0.84, 0.5  # inches
+FIGURES = 4  # at most in a field
 COLOURS = {True: "#2f5a3a", False: "#6e2a1f", None: PANEL}  # holds, does not, is not spoken of
 
 
-def draw_claims(path: Path, title: str, networks: Mapping[str, Sequence[Claim]], excerpts: Path) -> Path:
-    """excerpts: their strip, a PNG. For each network a table: claims by excerpts, green where they hold."""
+def draw_claims(
+    path: Path,
+    title: str,
+    networks: Mapping[str, Sequence[Claim]],
+    excerpts: Path,
+    nulls: Mapping[str, Sequence[Claim]],
+) -> Path:
+    """excerpts: their strip, a PNG. For each network a table: claims by excerpts, green where they hold.
+
+    nulls: the claims of networks that know nothing; each row tells which of them pass.
+    """
     import matplotlib.image
 
     strip = matplotlib.image.imread(excerpts)
@@ -30,11 +40,11 @@ def draw_claims(path: Path, title: str, networks: Mapping[str, Sequence[Claim]],
     axes.imshow(strip, interpolation="antialiased")
     axes.set_axis_off()
     for number, (name, claims) in enumerate(networks.items(), 1):
-        _table(figure.add_subplot(rows[number]), name, claims)
+        _table(figure.add_subplot(rows[number]), name, claims, nulls)
     return save(figure, path)
 
 
-def _table(axes: Any, name: str, claims: Sequence[Claim]) -> None:
+def _table(axes: Any, name: str, claims: Sequence[Claim], nulls: Mapping[str, Sequence[Claim]]) -> None:
     from matplotlib.patches import Rectangle
 
     names = list(dict.fromkeys(excerpt for claim in claims for excerpt in claim.figures))
@@ -46,11 +56,11 @@ def _table(axes: Any, name: str, claims: Sequence[Claim]) -> None:
     for column, excerpt in enumerate(names):
         axes.text(CLAIM_SHARE + (column + 0.5) * width, -0.3, excerpt, color=FAINT, fontsize=10, ha="center")
     for row, claim in enumerate(claims):
-        measured = next(iter(claim.figures.values()))
+        drawn = _drawn(claim)
         words = fill(f"({claim.letter}) {claim.words}", 70)
         axes.text(0, row + 0.06, words, color=INK, fontsize=9.5, va="top")
-        told = " / ".join(name.replace("_", " ") for name in measured)
-        axes.text(0, row + 0.92, told, color=FAINT, fontsize=8.5, va="bottom")
+        told = " / ".join(name.replace("_", " ") for name in drawn)
+        axes.text(0, row + 0.92, f"{told}\n{worth(claim, nulls)}", color=FAINT, fontsize=8.5, va="bottom")
         for column, excerpt in enumerate(names):
             figures = claim.figures.get(excerpt)
             if figures is None:
@@ -58,8 +68,14 @@ def _table(axes: Any, name: str, claims: Sequence[Claim]) -> None:
             left = CLAIM_SHARE + column * width
             colour = COLOURS[claim.holds.get(excerpt)]
             axes.add_patch(Rectangle((left + 0.003, row + 0.06), width - 0.006, 0.86, color=colour))
-            said = " / ".join(map(_short, figures.values()))
+            said = " / ".join(_short(figures[name]) for name in drawn)
             axes.text(left + width / 2, row + 0.5, said, color=INK, fontsize=9, ha="center", va="center")
+
+
+def _drawn(claim: Claim) -> list[str]:
+    """Names of the figures that a field has room for: all of four, else those with a bound."""
+    names = list(next(iter(claim.figures.values())))
+    return names if len(names) <= FIGURES else [bound.figure for bound in claim.bounds]
 
 
 def _short(value: float) -> str:

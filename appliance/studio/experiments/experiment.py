@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -27,10 +27,11 @@ from appliance.studio.data.dataset import FPS, Take, load_folder
 from appliance.studio.data.remembered import remembered_reading
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import load_takes
-from appliance.studio.experiments.claims import Claim, claims
+from appliance.studio.experiments.claims import Claim, claims, verdict, worth
 from appliance.studio.experiments.claims_picture import draw_claims
 from appliance.studio.experiments.excerpts import Excerpt, choose, named
 from appliance.studio.experiments.families import CONDITIONS, Trial, usual_trace
+from appliance.studio.experiments.null_networks import KINDS, null_networks
 from appliance.studio.experiments.page import write_page
 from appliance.studio.experiments.strips import FIGURES, strip_of_excerpts, strips_of_trial
 from appliance.studio.studio_error import StudioError
@@ -82,7 +83,8 @@ def run(options: ExperimentOptions) -> None:
         Progress(console=console, transient=True, disable=not console.is_terminal) as bar,
     ):
         task = bar.add_task(
-            "dancing", total=work * len(CONDITIONS) + (1 + work * len(FIGURES)) * options.pictures
+            "dancing",
+            total=work * len(CONDITIONS) + len(KINDS) + (1 + work * len(FIGURES)) * options.pictures,
         )
 
         def advance(words: str) -> None:
@@ -101,13 +103,14 @@ def run(options: ExperimentOptions) -> None:
                 drawing += [pool.submit(draw_strips, *one) for one in wanted]
                 pictures[f"{name}: {trial.excerpt.name}, {trial.excerpt.why}"] = [one[0] for one in wanted]
             found[name] = claims(trials)
+        nulls = _null_claims(first, excerpts, joints, trace, advance)
         for done in as_completed(drawing):
             done.result()
             advance("drawing")
     if options.pictures:
-        draw_claims(options.out / "experiments.png", TITLE, found, figure_2)
+        draw_claims(options.out / "experiments.png", TITLE, found, figure_2, nulls)
     (options.out / "experiments.json").write_text(
-        json.dumps(_report(coders, excerpts, joints, found), indent=1) + "\n"
+        json.dumps(_report(coders, excerpts, joints, found, nulls), indent=1) + "\n"
     )
     write_page(
         options.out / "experiments.html",
@@ -115,9 +118,10 @@ def run(options: ExperimentOptions) -> None:
         _words(joints, options),
         excerpts,
         found,
+        nulls,
         pictures,
     )
-    _print_verdicts(Console(), found)
+    _print_verdicts(Console(), found, nulls)
     console.print(
         f"{options.out / 'experiments.html'} shows all of it; BVH and strips lie beside it.", highlight=False
     )
@@ -193,6 +197,21 @@ def _takes(options: ExperimentOptions, coder: Coder) -> list[Take]:
     return list(dataset.held_out or dataset.training)
 
 
+def _null_claims(
+    coder: Coder,
+    excerpts: Sequence[Excerpt],
+    joints: Sequence[str],
+    trace: Array,
+    advance: Callable[[str], None],
+) -> dict[str, list[Claim]]:
+    """What networks that know nothing make of the claims, by name; coder: whose joints and mean pose."""
+    found = {}
+    for name, null in null_networks(coder.joints, coder.rest).items():
+        advance(f"a network that knows nothing: {name}")
+        found[name] = claims([Trial(null, one, joints, trace) for one in excerpts])
+    return found
+
+
 def _write_dances(trial: Trial, folder: Path) -> None:
     """BVH of the excerpt and of every dance on it."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -206,14 +225,19 @@ def _report(
     excerpts: Sequence[Excerpt],
     joints: Sequence[str],
     found: Mapping[str, Sequence[Claim]],
+    nulls: Mapping[str, Sequence[Claim]],
 ) -> dict[str, object]:
+    def by_letter(claims: Sequence[Claim]) -> dict[str, object]:
+        return {one.letter: one.as_json() for one in claims}
+
     return {
         "joints": list(joints),
         "excerpts": {one.name: one.as_json() for one in excerpts},
         "networks": {
-            name: {"facts": coders[name].facts, "claims": {one.letter: one.as_json() for one in found[name]}}
-            for name in coders
+            name: {"facts": coders[name].facts, "claims": by_letter(found[name])} for name in coders
         },
+        "null_networks": {name: {"claims": by_letter(claims)} for name, claims in nulls.items()},
+        "worth": {one.letter: worth(one, nulls) for one in next(iter(found.values()))},
     }
 
 
@@ -226,21 +250,27 @@ def _words(joints: Sequence[str], options: ExperimentOptions) -> list[str]:
         "seconds a turn, led by a sensor's trace, and held still. K/J are coding and interaction iterations.",
         "Windows of 8 poses, one a tick, blended by Hann weights as in the paper. The sensor's trace: "
         f"{trace}.",
+        "Beside each network four that know nothing dance the same: copy gives back each window and hears no "
+        "hand, paste gives it back with the held joint in it, mean pulls every joint to the dancer's mean "
+        "pose, untrained has random weights. A claim that one of them passes says nothing of what a network "
+        "has learned, except where the claim is that nothing changes: (a), (b). A margin is how many times "
+        "over the weakest figure keeps its bound, in more than half of the excerpts: from 1 on it holds.",
     ]
 
 
-def _print_verdicts(console: Console, found: Mapping[str, Sequence[Claim]]) -> None:
-    table = Table(title="The paper's claims")
-    table.add_column("claim")
-    for name in found:
-        table.add_column(name)
+def _print_verdicts(
+    console: Console, found: Mapping[str, Sequence[Claim]], nulls: Mapping[str, Sequence[Claim]]
+) -> None:
+    table = Table(title="The paper's claims; in brackets how many times over the bounds are kept")
+    for heading in ("claim", *found, "null networks"):
+        table.add_column(heading)
     for rows in zip(*found.values(), strict=True):
-        held = [f"{sum(one.holds.values())} of {len(one.holds)}" for one in rows]
-        words = [
-            f"{'holds' if one.holds_on_the_whole else 'does not hold'} ({of})"
-            for one, of in zip(rows, held, strict=True)
-        ]
-        table.add_row(f"({rows[0].letter}) {rows[0].words}", *words)
+        bounds = "; ".join(map(str, rows[0].bounds))
+        table.add_row(
+            f"({rows[0].letter}) {rows[0].words} ({bounds})",
+            *map(verdict, rows),
+            worth(rows[0], nulls),
+        )
     console.print(table)
 
 

@@ -98,8 +98,11 @@ class Trial:
             self.dances[condition] = self._dance(condition)
 
     def dance(self, family: str, iterations: Iterations, variant: str = "") -> Dance:
-        """One of those that were danced."""
-        return self.dances[Condition(family, iterations, variant)]
+        """One of the conditions, danced now if it was not yet."""
+        condition = Condition(family, iterations, variant)
+        if condition not in self.dances:
+            self.dances[condition] = self._dance(condition)
+        return self.dances[condition]
 
     def held_joints(self, condition: Condition) -> tuple[str, ...]:
         """By name, the one in the hand first."""

@@ -8,7 +8,7 @@ import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from appliance.studio.experiments.claims import Claim
+from appliance.studio.experiments.claims import Claim, times, verdict, worth
 from appliance.studio.experiments.excerpts import Excerpt
 
 _STYLE = """
@@ -29,11 +29,13 @@ def write_page(
     words: Sequence[str],
     excerpts: Sequence[Excerpt],
     networks: Mapping[str, Sequence[Claim]],
+    nulls: Mapping[str, Sequence[Claim]],
     pictures: Mapping[str, Sequence[Path]],
 ) -> None:
-    """words: paragraphs below the title; networks: name and claims; pictures: heading and PNG files."""
+    """words: paragraphs below the title; networks, nulls: claims by name; pictures: PNG files by heading."""
     parts = [f"<h1>{html.escape(title)}</h1>", *(f"<p>{html.escape(one)}</p>" for one in words)]
-    parts += ["<h2>The excerpts</h2>", _excerpts(excerpts), "<h2>The paper's claims</h2>", _summary(networks)]
+    parts += ["<h2>The excerpts</h2>", _excerpts(excerpts), "<h2>The paper's claims</h2>"]
+    parts += [_summary(networks, nulls), "<h3>Networks that know nothing</h3>", _nulls(nulls)]
     for name, claims in networks.items():
         parts += [f"<h3>{html.escape(name)}</h3>", *(_claim(one) for one in claims)]
     for heading, files in pictures.items():
@@ -56,38 +58,51 @@ def _excerpts(excerpts: Sequence[Excerpt]) -> str:
     return _table(rows)
 
 
-def _summary(networks: Mapping[str, Sequence[Claim]]) -> str:
-    first = next(iter(networks.values()))
-    rows = [["claim", *networks]]
-    for number, claim in enumerate(first):
-        verdicts = (claims[number].holds_on_the_whole for claims in networks.values())
-        rows.append(
-            [
-                f"({claim.letter}) {claim.words}",
-                *("holds" if holds else "does not hold" for holds in verdicts),
-            ]
-        )
+def _summary(networks: Mapping[str, Sequence[Claim]], nulls: Mapping[str, Sequence[Claim]]) -> str:
+    rows = [["claim", "bounds", *networks, "null networks"]]
+    for claims in zip(*networks.values(), strict=True):
+        first, verdicts = claims[0], map(verdict, claims)
+        rows.append([_words(first), _bounds(first), *verdicts, worth(first, nulls)])
     return _table(rows)
+
+
+def _nulls(nulls: Mapping[str, Sequence[Claim]]) -> str:
+    rows = zip(*nulls.values(), strict=True)
+    return _table([["claim", *nulls], *([_words(row[0]), *map(verdict, row)] for row in rows)])
 
 
 def _claim(claim: Claim) -> str:
     columns = list(next(iter(claim.figures.values()), {}))
-    rows = [["excerpt", *(column.replace("_", " ") for column in columns), ""]]
+    rows = [["excerpt", *(column.replace("_", " ") for column in columns), "margin", ""]]
     for name, figures in claim.figures.items():
-        verdict = {True: "holds", False: "does not hold", None: ""}[claim.holds.get(name)]
-        rows.append([name, *(f"{figures[column]:.2f}" for column in columns), verdict])
-    words, measure = html.escape(claim.words), html.escape(claim.measure)
-    return f"<p>({claim.letter}) {words}<br><span class=words>{measure}</span></p>{_table(rows)}"
+        said = {True: "holds", False: "does not hold", None: ""}[claim.holds.get(name)]
+        margin = times(claim.margins[name]) if name in claim.about else ""
+        rows.append([name, *(f"{figures[column]:.2f}" for column in columns), margin, said])
+    measure = html.escape(f"{claim.measure}. Holds with {_bounds(claim)}.")
+    words = html.escape(_words(claim))
+    return f"<p>{words}<br><span class=words>{measure}</span></p>{_table(rows)}"
+
+
+def _words(claim: Claim) -> str:
+    return f"({claim.letter}) {claim.words}"
+
+
+def _bounds(claim: Claim) -> str:
+    return "; ".join(map(str, claim.bounds))
 
 
 def _table(rows: Sequence[Sequence[str]]) -> str:
     head, *body = rows
     lines = ["<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
-    colours = {"holds": " class=yes", "does not hold": " class=no"}
     for row in body:
-        cells = "".join(f"<td{colours.get(cell, '')}>{html.escape(cell)}</td>" for cell in row)
+        cells = "".join(f"<td{_colour(cell)}>{html.escape(cell)}</td>" for cell in row)
         lines.append(f"<tr>{cells}</tr>")
     return f"<table>{''.join(lines)}</table>"
+
+
+def _colour(cell: str) -> str:
+    """Of a verdict."""
+    return " class=yes" if cell.startswith("holds") else " class=no" if cell.startswith("does not") else ""
 
 
 def _picture(file: Path) -> str:
