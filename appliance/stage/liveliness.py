@@ -10,10 +10,10 @@ import numpy as np
 
 from appliance.dancer.latent_noise import LatentNoise
 from appliance.dancer.phrase import FPS
-from appliance.show.sources import SEEDS
 from appliance.stage.stage_puppet import StagePuppet
 
 AMOUNT = 0.25  # of the noise at full liveliness, in standard deviations of the latent
+DRAWN_SEEDS = 1_000_000  # six digits: easily noted down, and exact as a float of OSC
 LEAST_FADE_S = 0.5  # a faster change would be seen as a jerk of the whole body
 
 
@@ -27,7 +27,7 @@ class Liveliness:
         """seed None: drawn anew."""
         self.level = self.asked = level
         self._puppets, latents = tuple(puppets), puppets[0].puppet.latent
-        drawn = secrets.randbelow(SEEDS) if seed is None else seed
+        drawn = secrets.randbelow(DRAWN_SEEDS) if seed is None else seed
         self._noise = LatentNoise(drawn, len(puppets), latents)
         self._scaled = np.zeros((len(puppets), latents), np.float32)
         for one, noise in zip(puppets, self._scaled, strict=True):

@@ -71,6 +71,7 @@ _names = st.text(max_size=60)
         restarts=st.integers(0, 65535),
         ended=st.booleans(),
         tries=st.integers(0, 255),
+        liveliness=st.none() | st.tuples(_finite, st.integers(0, 2**31 - 1), st.integers(0, 2**62)),
         motion=st.lists(st.tuples(_names, st.lists(_finite, max_size=4).map(tuple)), max_size=3).map(tuple),
     )
 )
@@ -81,6 +82,7 @@ def test_comes_back_as_it_was(place: Checkpoint) -> None:
 def test_numbers_that_are_none_are_no_place() -> None:
     assert unpacked(packed(replace(PLACE, position_s=math.nan))) is None
     assert unpacked(packed(replace(PLACE, strayed=(0.0, math.inf)))) is None
+    assert unpacked(packed(replace(PLACE, liveliness=(math.nan, 0, 0)))) is None
     assert unpacked(packed(replace(PLACE, motion=(("motion vary sigma", (math.inf,)),)))) is None
 
 

@@ -115,6 +115,8 @@ def test_the_settings_of_now_become_a_cue(browser: Browser, studio: tuple[Box, P
         assert page.command(address, *given).value["done"]
     wait_until(lambda: _danced(page) == "vary", "no variation is danced")
     wait_until(lambda: page.status()["status"]["coding"] == 6)
+    assert page.command("/liveliness", 0.4, 0.5).value["done"] and page.command("/seed", 12).value["done"]
+    wait_until(lambda: round(page.status()["status"]["liveliness"], 3) == 0.4)
     tab = unlocked_tab(browser.new_context(**LAPTOP, locale="en-GB"), page, "rehearsal")
     for name, said in [("anna", "The cue anna is in the copy"), ("anna", "another name"), ("ben", "cue ben")]:
         tab.fill("#cue-name", name)
@@ -131,6 +133,7 @@ def test_the_settings_of_now_become_a_cue(browser: Browser, studio: tuple[Box, P
     assert [line for line in lines if line in before] == before, "comments and all"
     cue = load_show(kept).config.cues[-1]
     assert (cue.name, cue.phrase, cue.iterations) == ("ben", "vary", (6, 4))
+    assert (cue.liveliness, cue.seed) == (0.4, 12)
     assert cue.motion is not None and cue.motion.vary is not None and cue.motion.vary.sigma == 1.25
     assert cue.hands == ["lShldr", "rForeArm"], "the page's hand waits for a finger"
 

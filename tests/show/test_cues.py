@@ -46,6 +46,8 @@ def test_a_cue_says_what_it_changes_and_leaves_the_rest(with_cues: Callable[[str
             "  - name: storm\n"
             "    phrase: quiet\n"
             "    iterations: [10, 9]\n"
+            "    liveliness: 0.5\n"
+            "    seed: 7\n"
             "    hands: [lShldr]\n"
             "    look: wires\n"
             "    master: 0.4\n"
@@ -55,6 +57,7 @@ def test_a_cue_says_what_it_changes_and_leaves_the_rest(with_cues: Callable[[str
     start, storm = config.cues
     assert (start.phrase, start.iterations, start.hands, start.look, start.master) == (None,) * 5
     assert start.fade_s == 2.0
+    assert (storm.liveliness, storm.seed, start.liveliness, start.seed) == (0.5, 7, None, None)
     assert (storm.phrase, storm.iterations, storm.hands) == ("quiet", (10, 9), ["lShldr"])
     assert (storm.look, storm.master, storm.fade_s) == ("wires", 0.4, 5)
     assert config.names["phrase"] == ("main", "quiet")
@@ -111,6 +114,8 @@ def test_without_looks_the_built_in_ones_may_be_named(bundle: Path, show_yaml: C
         ("{name: a, iterations: [0, 0]}", 0, ["0 coding iterations"]),
         ("{name: a, iterations: [4]}", 0, ["is a list of 1"]),
         ("{name: a, iterations: [65, 1]}", 0, ["is 65, out of range"]),
+        ("{name: a, liveliness: 1.5}", 0, ["is 1.5, out of range"]),
+        ("{name: a, seed: -1}", 0, ["is -1, out of range"]),
         ("{name: a, iterations: 5}", 0, ["is 5, which is not 2 numbers in brackets"]),
         ("{name: a, master: 1.5}", 0, ["is 1.5, out of range", "Write 0 to 1."]),
         ("{name: a, fade_s: 61}", 0, ["Write 0 to 60."]),

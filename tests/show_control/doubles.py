@@ -42,6 +42,8 @@ CUES: tuple[dict[str, Any], ...] = (
         "fade_s": 4.0,
         "phrase": "quiet",
         "iterations": [12, 11],
+        "liveliness": 0.25,
+        "seed": 7,
         "hands": [],
     },
 )

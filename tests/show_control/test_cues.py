@@ -20,6 +20,8 @@ def test_a_cue_declares_picture_lights_and_dance_and_is_answered_when_the_dance_
     assert declared(folder, "phrase") == ("quiet", 4.0)
     assert declared(folder, "hand lShldr") == ("lShldr", 0.0)
     assert declared(folder, "iterations") == ("", 12.0, 11.0, 4.0)
+    assert declared(folder, "liveliness") == ("", 0.25, 4.0)
+    assert declared(folder, "seed") == ("", 7.0)
     dance = {**now.dance}
     assert asker.ask("/cue", 1)[2] == 1
     now = show_state(folder)

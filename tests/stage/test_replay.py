@@ -87,6 +87,8 @@ def eventful(night: Night) -> Night:
     night.dance(20, reading(TURNED, boot_nonce=2, taps=1))
     night.order("excerpt", 0.5, 2.5)
     night.order("heading")
+    night.command("/liveliness", 0.4, 3.0)
+    night.command("/seed", 77)
     night.command("/iterations", 4.0, 3.0)
     night.dance(400, reading(OTHER, boot_nonce=3, wearable=2))  # a spare under the same name
     night.command("/cue", text="calm")

@@ -10,6 +10,7 @@ import { hasWords, number, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
 const PHRASE_FADE_S = 1, LIVELINESS_FADE_S = 1, KEEPING_MS = 120_000;
+const SEEDS = 1_000_000; // six digits are easily noted down
 let figure = null;
 
 export function initRehearsal(me, box) {
@@ -27,7 +28,7 @@ export function initRehearsal(me, box) {
     command("/liveliness", Number(byId("liveliness").value), LIVELINESS_FADE_S);
     byId("liveliness").blur();
   });
-  byId("seed-new").addEventListener("click", () => command("/seed", crypto.getRandomValues(new Uint32Array(1))[0] >>> 1));
+  byId("seed-new").addEventListener("click", () => command("/seed", Math.floor(Math.random() * SEEDS)));
   figure = new Figure(byId("figure"), byId("figure-said"), box, words);
   initMotion();
   initSprings();
