@@ -84,8 +84,6 @@ def test_names_without_a_stage_are_refused_in_words(asker: Asker) -> None:
         (("/phrase", "quiet"), "phrase", ("quiet", 2.0)),
         (("/phrase", "quiet", 0), "phrase", ("quiet", 0.0)),
         (("/iterations", 12, 11), "iterations", ("", 12.0, 11.0)),
-        (("/liveliness", 0.5, 3), "liveliness", ("", 0.5, 3.0)),
-        (("/seed", 2**31 - 1), "seed", ("", 2.0**31 - 1)),
     ],
 )
 def test_what_persists_of_the_dance_is_declared_and_answered_when_the_stage_follows(
@@ -95,6 +93,17 @@ def test_what_persists_of_the_dance_is_declared_and_answered_when_the_stage_foll
     assert asker.ask(*message) == ["/reply", message[0], 1, "So it is."]
     assert declared(folder, part) == wanted
     assert stage.orders == []
+
+
+def test_how_alive_and_which_dance_is_declared(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    words = "The liveliness goes to 50 %."
+    assert asker.ask("/liveliness", 0.5, 3) == ["/reply", "/liveliness", 1, words]
+    assert declared(folder, "liveliness") == ("", 0.5, 3.0)
+    words = "The answer goes over to the seed 2147483647."
+    assert asker.ask("/seed", 2**31 - 1) == ["/reply", "/seed", 1, words]
+    assert declared(folder, "seed") == ("", 2.0**31 - 1)
+    stage.tell(liveliness=0.75, seed=5)
+    assert asker.ask("/status")[-2:] == [0.75, 5]
 
 
 def test_hands_are_declared_by_name_or_number(folder: Path, stage: StageDouble, asker: Asker) -> None:
