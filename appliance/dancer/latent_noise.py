@@ -26,13 +26,14 @@ class LatentNoise:
     noise is a closed form of the tick, so overlapping windows, a restarted stage, a replay and a second box
     have the same. Puppet p has the noise of the seed plus p.
 
-    seed: the newest that was asked for. begins_at: the absolute tick of this stage's tick 0.
+    noise: of the newest tick. seed: the newest that was asked for. begins_at: the absolute tick of this
+    stage's tick 0.
     """
 
     def __init__(self, seed: int, puppets: int, latents: int) -> None:
         self.seed, self.begins_at = seed, 0
         self._shape = puppets, latents
-        self._noise: FloatArray = np.zeros(self._shape, np.float32)
+        self.noise: FloatArray = np.zeros(self._shape, np.float32)
         self._other: FloatArray = np.zeros(self._shape, np.float32)
         self._phases: _Phases = np.zeros((SINUSOIDS, *self._shape), np.uint32)
         self._signed = self._phases.view(np.int32)  # the same angles, from half a turn back to half a turn on
@@ -60,7 +61,7 @@ class LatentNoise:
         if self._next is not self._waves and now - self._since >= CROSSFADE_TICKS:
             self._before, self._waves, self._since = self._waves, self._next, max(self._newest, 0)
         self._newest = now
-        noise = self._sum(self._waves, now, self._noise)
+        noise = self._sum(self._waves, now, self.noise)
         if (part := (now - self._since) / CROSSFADE_TICKS) < 1.0:
             other = self._sum(self._before, now, self._other)
             np.multiply(noise, np.float32(math.sin(0.5 * math.pi * part)), out=noise)

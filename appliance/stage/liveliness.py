@@ -6,13 +6,10 @@ import secrets
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from appliance.dancer.latent_noise import LatentNoise
 from appliance.dancer.phrase import FPS
 from appliance.stage.stage_puppet import StagePuppet
 
-AMOUNT = 0.25  # of the noise at full liveliness, in standard deviations of the latent
 DRAWN_SEEDS = 1_000_000  # six digits: easily noted down, and exact as a float of OSC
 LEAST_FADE_S = 0.5  # a faster change would be seen as a jerk of the whole body
 
@@ -29,8 +26,7 @@ class Liveliness:
         self._puppets, latents = tuple(puppets), puppets[0].puppet.latent
         drawn = secrets.randbelow(DRAWN_SEEDS) if seed is None else seed
         self._noise = LatentNoise(drawn, len(puppets), latents)
-        self._scaled = np.zeros((len(puppets), latents), np.float32)
-        for one, noise in zip(puppets, self._scaled, strict=True):
+        for one, noise in zip(puppets, self._noise.noise, strict=True):
             one.liveliness, one.noise = level, noise
         self._before = level
         self._tick = self._ticks = 0
@@ -64,11 +60,11 @@ class Liveliness:
         self.change_seed(seed)
 
     def dance(self, tick: int) -> None:
-        """Give the puppets their liveliness and noise of this stage's tick."""
+        """Give the puppets their liveliness and noise of this stage's tick; the network scales the noise."""
         self._has_danced = True
         for one in self._puppets:
             one.liveliness = self.level
-        np.multiply(self._noise.at(tick), np.float32(AMOUNT * self.level), out=self._scaled)
+        self._noise.at(tick)
 
     def advance(self) -> None:
         """The frame has left: one tick further on the way."""
