@@ -1,8 +1,9 @@
 """Motion matching with the held joint put in at the end: the reference that a network has to beat.
 
-Clavet 2016, Holden et al. 2020 (without the learned parts), on the training poses themselves: it looks for
-the recorded moment whose held joint is as the hand's, and whose others are as the phrase's and as what is danced
-now. It needs the recordings, makes nothing new and cuts from moment to moment, but its body is the dancer's.
+Clavet 2016, Holden et al. 2020 (without the learned parts), on the training poses themselves. It looks for
+the recorded moment whose held joint is as the hand's, and whose others are as the phrase's and as what is
+danced now. It needs the recordings, makes nothing new, and cuts from moment to moment; the body is the
+dancer's.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from appliance.studio.evaluation.nearest import Floats, without_heading
 SEARCH_TICKS = 5
 BEFORE, CHANGE = 8, 4  # ticks: the held joint 0.16 s ago; the others' change over 0.08 s
 HAND_NOW, HAND_BEFORE, PHRASE, PRESENT = 6.0, 3.0, 1.0, 1.0  # weights of squared distances
-MARGIN = 0.1  # another moment is taken if it is cheaper by this share
+MARGIN = 0.15  # another moment is taken if it is cheaper by this share
 FADE_TICKS = 15  # in which the difference at a cut disappears
 
 
