@@ -126,10 +126,11 @@ def _finish(
         )
     else:
         request = Request(checkpoint, source, options.out, options.name or "", options.phrase, options.hand)
-        release(request, training.dataset, console)
+        found = release(request, training.dataset, console)
         show = shlex.quote(str(options.out))
-        for line in few_data(training.dataset):
-            console.print(line, highlight=False)
+        if "not_measured" in found["puppetry"]:  # else the advice says what more recordings would do
+            for line in few_data(training.dataset):
+                console.print(line, highlight=False)
         console.print(f"{options.out} is a show. Dance it: bunraku play --show {show} --emulate")
 
 

@@ -14,11 +14,12 @@ from appliance.studio.data.dataset import FPS, WINDOW, Dataset
 from appliance.studio.evaluation import puppetry
 from appliance.studio.evaluation.answer_picture import draw_answer
 from appliance.studio.evaluation.coders import Coder
+from appliance.studio.evaluation.dancer_verdict import Learned
 from appliance.studio.evaluation.measurement import Iterations, Measurement, Pair
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.onset import CODED_WINDOWS
 from appliance.studio.evaluation.pairs import own_takes
-from appliance.studio.evaluation.puppetry_report import verdict
+from appliance.studio.evaluation.puppetry_report import judged
 from appliance.studio.studio_error import StudioError
 
 PARTS = ("left upper arm", "left forearm", "head")
@@ -29,10 +30,17 @@ MOST_TICKS, FEWEST_TICKS = 600, 150
 SIZES = ((2, 3), (1, 3), (1, 1))  # pairs and joints: fewer for a slow network
 
 
-def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
-    """The figures of puppetry.measure, and verdict, measured_on; draws a picture.
+def own_answer(
+    coder: Coder,
+    dataset: Dataset,
+    picture: Path,
+    one_pass_error: float | None = None,
+    steps: int | None = None,
+) -> dict[str, Any]:
+    """The figures of puppetry.measure, and cause, verdict, advice, measured_on; draws a picture.
 
-    Never fails: if nothing can be measured, not_measured gives the reason, and there is no picture.
+    one_pass_error: degrees off the recordings after one pass without a hand; steps: of training. Never
+    fails: if nothing can be measured, not_measured gives the reason, and there is no picture.
     """
     picture.unlink(missing_ok=True)
     try:
@@ -52,8 +60,13 @@ def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
     measurements = [Measurement(coder, pair, reference) for pair in pairs]
     found = puppetry.measure(measurements, joints[: size.joints], ITERATIONS, FREE, turning=False)
     draw_answer(picture, measurements[0], joints[0], puppetry.IN_PLAY)
+    return {**found, "measured_on": takes.words, **judged(found, learned(dataset, steps), one_pass_error)}
+
+
+def learned(dataset: Dataset, steps: int | None) -> Learned:
+    """What the verdict has to know of a training."""
     minutes = sum(take.recording.seconds for take in dataset.training) / 60
-    return {**found, "measured_on": takes.words, "verdict": verdict(found, minutes)}
+    return Learned(minutes, len({take.take for take in dataset.training}), steps)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+from dataclasses import asdict
 from typing import Any, Literal
 
 from rich.box import SIMPLE_HEAD
@@ -10,40 +11,53 @@ from rich.console import Console
 from rich.table import Table
 
 from appliance.pose.roles import UPPER_ARMS, held_joints
+from appliance.studio.evaluation.dancer_verdict import (
+    ANSWERS,
+    ANSWERS_A_LITTLE,
+    LIMBS,
+    PLAUSIBLE,
+    Learned,
+    Seen,
+    judge,
+)
 
-ANSWERS, ANSWERS_A_LITTLE = 8.0, 4.0  # degrees
 LIVELY = (0.7, 1.3)  # energy
-PLAUSIBLE = 1.1  # the phrase has 1; release 0.1.0, the arm more or less pasted on, 1.1 to 1.25
 COLUMNS = ["held", "K/J", "answer", "fit", "own/foreign"]
 COLUMNS += ["plausibility", "energy", "roughness", "off hand"]
-ENOUGH_MINUTES = 8.0  # the default show's dancer answers with what it learned in 11
 
 
-def verdict(found: dict[str, Any], minutes: float) -> str:
-    """Whether the dancer answers, by its upper arms where they were held, and what to do.
+def judged(found: dict[str, Any], learned: Learned, error: float | None = None) -> dict[str, str]:
+    """cause, verdict and advice of a measured dancer, by its upper arms where they were held.
 
-    minutes: of dance that it learned from.
+    error: degrees off the recordings after one pass without a hand.
     """
+    return asdict(judge(seen(found, error), learned))
+
+
+def seen(found: dict[str, Any], error: float | None = None) -> Seen:
+    """What puppetry.measure found, as the verdict reads it: means over the joints held."""
     named = [name for part, name in held_joints(joints_of(found)).items() if part in UPPER_ARMS]
     rows = [strongest(found[joint])[1] for joint in named or joints_of(found)]
-    what = f"a hand moves its other joints by {statistics.fmean(row['answer'] for row in rows):.1f} degrees"
-    if None not in (energies := [row["energy"] for row in rows]):
-        what += f", at an energy of {statistics.fmean(energies):.2f}"
-    wrong = list(dict.fromkeys(words for row in rows for words in reservations(row)))
-    strength = min(degree(row) for row in rows)
-    if strength == 2 and not wrong:
-        return f"The dancer answers: {what}."
-    opening = f"The dancer {'answers a little' if strength else 'does not answer'}: {what}"
-    if strength and wrong:
-        opening += f", but {' and '.join(wrong)}"
-    if minutes < ENOUGH_MINUTES:
-        cure = (
-            f"More recordings help most: it learned from {minutes:.1f} minutes of dance, the default show's "
-            "dancer from 11."
-        )
-    else:
-        cure = "Train longer (--minutes), or with recordings in which the arms do more."
-    return f"{opening}. {cure}"
+    free: dict[str, dict[str, float | None]] = found.get("free", {})
+    in_play = free.get("10") or next(iter(free.values()), None) or {}
+    return Seen(
+        answer=statistics.fmean(row["answer"] for row in rows),
+        error=error,
+        energy={"whole": _mean(rows, "energy"), **{limb: _mean(rows, f"energy_{limb}") for limb in LIMBS}},
+        spread={"whole": _mean(rows, "spread"), **{limb: _mean(rows, f"spread_{limb}") for limb in LIMBS}},
+        free_energy=in_play.get("energy"),
+        roughness=_mean(rows, "roughness"),
+        plausibility=_mean(rows, "plausibility"),
+        critic=_mean(rows, "critic"),
+        fits=not any(row["fit"] is not None and row["fit"] > row["fit_bare"] for row in rows),
+        off_hand=_mean(rows, "held"),
+    )
+
+
+def _mean(rows: list[dict[str, Any]], name: str) -> float | None:
+    """Mean over the rows that have the figure."""
+    values = [row[name] for row in rows if row.get(name) is not None]
+    return statistics.fmean(values) if values else None
 
 
 def print_answer(console: Console, found: dict[str, Any]) -> None:
@@ -55,7 +69,7 @@ def print_answer(console: Console, found: dict[str, Any]) -> None:
     console.print(table(found))
     lines = [*sentences(found), *asides(found)]
     if "verdict" in found:
-        lines += [f"Measured {found['measured_on']}.", found["verdict"]]
+        lines += [f"Measured {found['measured_on']}.", f"{found['verdict']} {found['advice']}".strip()]
     for line in lines:
         console.print(line, highlight=False, soft_wrap=True)
 

@@ -91,7 +91,8 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
     report[KEY] = reading_facts(request.source.catalogue)
     say("Measuring whether the body answers a hand.")
-    report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png")
+    error = report["degrees"]["1"]["mean"]
+    report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png", error, state["step"])
     packing.write_skeleton(request.out, dataset.skeleton, _shown_pose(dataset))
     about = "what the show starts from; another: bunraku export --phrase FILE"
     if request.phrase is not None:
