@@ -16,6 +16,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.show.network import WINDOW, network_inputs
 
 FIGURE = Skeleton(
     ("Hips", "Chest", "lShldr", "lForeArm", "lThigh", "lFoot", "rThigh", "rFoot"),
@@ -31,7 +32,6 @@ FIGURE = Skeleton(
 )
 MOVING = ("Hips", "Chest", "lShldr", "lForeArm", "lThigh", "rThigh")
 WORN = {"sensor": "left-wrist", "joint": "lShldr"}
-WINDOW = 8
 
 
 def write_show(
@@ -69,14 +69,12 @@ def swaying_phrase(seconds: float = 3.0) -> Recording:
 
 def puppet_inputs(joints: int, targets: list[int] | None = None) -> list[onnx.ValueInfoProto]:
     """The inputs of a puppet's network with this many moving joints; `targets`: another shape of these."""
-    shapes = {
-        "window": (TensorProto.FLOAT, [WINDOW, joints, 4]),
-        "mask": (TensorProto.BOOL, [joints]),
-        "targets": (TensorProto.FLOAT, targets or [WINDOW, joints, 4]),
-        "weights": (TensorProto.FLOAT, [joints]),
-        "coding_iterations": (TensorProto.INT64, []),
-        "interaction_iterations": (TensorProto.INT64, []),
+    shapes: dict[str, tuple[int, Sequence[int | str]]] = {
+        name: (helper.np_dtype_to_tensor_dtype(np.dtype(dtype)), ["P", *shape])
+        for name, (dtype, shape) in network_inputs(joints, 1).items()
     }
+    if targets is not None:
+        shapes["targets"] = TensorProto.FLOAT, targets
     return [helper.make_tensor_value_info(name, *shape) for name, shape in shapes.items()]
 
 
@@ -92,39 +90,41 @@ def _network(kind: str) -> onnx.ModelProto:
     """Held joints show their targets, the others the window; `broken` divides by nothing."""
     moving = len(MOVING)
     outputs = [
-        helper.make_tensor_value_info("poses", TensorProto.FLOAT, [WINDOW, moving, 4]),
-        helper.make_tensor_value_info("latent", TensorProto.FLOAT, [1]),
+        helper.make_tensor_value_info("poses", TensorProto.FLOAT, ["P", WINDOW, moving, 4]),
+        helper.make_tensor_value_info("latent", TensorProto.FLOAT, ["P", 1]),
     ]
-    one, last = np.array([1], np.int64), np.array([-1], np.int64)
     constants = [
-        helper.make_tensor("last", TensorProto.INT64, [1], last),
-        helper.make_tensor("one", TensorProto.INT64, [1], one),
+        helper.make_tensor("window_and_last", TensorProto.INT64, [2], [1, 3]),
+        helper.make_tensor("all_but_puppet", TensorProto.INT64, [3], [1, 2, 3]),
+        helper.make_tensor("last", TensorProto.INT64, [1], [1]),
         helper.make_tensor("half", TensorProto.FLOAT, [], [0.5]),
         helper.make_tensor("seven", TensorProto.FLOAT, [], [7.0]),
         helper.make_tensor("all", TensorProto.FLOAT, [], [0.0 if kind == "broken" else 1.0]),
     ]
     nodes = [
-        helper.make_node("Unsqueeze", ["mask", "last"], ["mask_column"]),
-        helper.make_node("Unsqueeze", ["weights", "last"], ["weight_column"]),
+        helper.make_node("Unsqueeze", ["mask", "window_and_last"], ["mask_column"]),
+        helper.make_node("Unsqueeze", ["weights", "window_and_last"], ["weight_column"]),
         helper.make_node("Greater", ["weight_column", "half"], ["firm"]),
         helper.make_node("And", ["mask_column", "firm"], ["held"]),
         helper.make_node("Where", ["held", "targets", "window"], ["shown"]),
         helper.make_node("Cast", ["coding_iterations"], ["coding"], to=TensorProto.FLOAT),
-        helper.make_node("Sub", ["coding", "seven"], ["from_seven"]),
+        helper.make_node("Sub", ["coding", "seven"], ["from_seven_flat"]),
+        helper.make_node("Unsqueeze", ["from_seven_flat", "all_but_puppet"], ["from_seven"]),
         helper.make_node("Identity", ["from_seven" if kind == "fragile" else "all"], ["scale"]),
         helper.make_node("Mul", ["shown", "scale"], ["scaled"]),
         helper.make_node("Div", ["scaled", "scale"], ["poses"]),
         helper.make_node("Cast", ["interaction_iterations"], ["interaction"], to=TensorProto.FLOAT),
         helper.make_node("Add", ["coding", "interaction"], ["sum"]),
-        helper.make_node("Reshape", ["sum", "one"], ["latent" if kind != "heavy" else "light"]),
+        helper.make_node("Unsqueeze", ["sum", "last"], ["latent" if kind != "heavy" else "light"]),
     ]
     if kind == "heavy":  # three products of 400 x 400 matrices: some milliseconds everywhere
         constants.append(helper.make_tensor("square", TensorProto.INT64, [2], np.array([400, 400])))
         nodes += [
-            helper.make_node("Expand", ["light", "square"], ["matrix0"]),
+            helper.make_node("ReduceMax", ["light"], ["number"], keepdims=0),
+            helper.make_node("Expand", ["number", "square"], ["matrix0"]),
             *(helper.make_node("MatMul", [f"matrix{k}", f"matrix{k}"], [f"matrix{k + 1}"]) for k in range(3)),
             helper.make_node("ReduceMax", ["matrix3"], ["largest"], keepdims=0),
-            helper.make_node("Reshape", ["largest", "one"], ["latent"]),
+            helper.make_node("Add", ["light", "largest"], ["latent"]),
         ]
     graph = helper.make_graph(nodes, kind, puppet_inputs(moving), outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])

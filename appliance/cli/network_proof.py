@@ -12,7 +12,7 @@ import numpy as np
 
 from appliance.box.runtime_folder import RuntimeFolderError
 from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, limit_memory, run_with_timeout
-from appliance.dancer.puppet import Puppet, PuppetError
+from appliance.dancer.puppet import PuppetError, PuppetNetwork
 from appliance.pose.bvh import BvhError
 from appliance.show.check import Finding, not_as_packed, verify_bundle
 from appliance.show.config_error import ConfigError
@@ -66,12 +66,14 @@ def prove_network(show: Show) -> str:
     def run() -> None:
         require_danceable(verify_bundle(show.directory))
         print(not_as_packed(show.directory))
-        puppet, dancer = Puppet(show.network, show.skeleton), show.config.dancer
-        window = np.tile(puppet.rest, (puppet.window, 1, 1))
-        held = np.isin(puppet.joints, [hand.joint for hand in show.config.hands])
-        iterations = dancer.coding_iterations, dancer.interaction_iterations
+        config = show.config
+        network = PuppetNetwork(show.network, show.skeleton, len(config.hands_of_puppets))
+        for number, puppet in enumerate(network.puppets):
+            held = np.isin(network.joints, [hand.joint for hand in config.hands_of_puppets[number]])
+            targets, weights = np.tile(network.rest, (network.window, 1, 1)), held.astype(np.float32)
+            puppet.hold(held, targets, weights, *config.iterations_of_puppets[number])
         try:
-            puppet.dance(window, held, window, held.astype(np.float32), *iterations)
+            network.dance()
         except Exception as error:  # onnxruntime has a class of its own for every way to fail
             raise StageError(
                 f"{show.network}: the network fails when it runs ({str(error)[:200]}). Nothing is danced. "

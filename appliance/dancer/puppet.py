@@ -1,11 +1,9 @@
-"""The puppet: iterative autoencoding of a window with held joints, one run of the network's graph."""
+"""The puppets: iterative autoencoding of windows with held joints, one run of the network's graph for all."""
 
 from __future__ import annotations
 
 import math
-from copy import copy
 from pathlib import Path
-from typing import Any, Self
 
 import numpy as np
 import onnxruntime
@@ -15,16 +13,8 @@ from appliance.dancer.slerp import FloatArray
 from appliance.pose.foreign_file import content
 from appliance.pose.skeleton import Skeleton, UnknownJointError
 from appliance.show.bundle import LARGEST_FILE
-from appliance.show.network import WINDOW, rest_pose
+from appliance.show.network import WINDOW, latent_size, network_inputs, rest_pose, resting_feed
 
-_INPUTS = {  # and how many dimensions each has
-    "window": 3,
-    "mask": 1,
-    "targets": 3,
-    "weights": 1,
-    "coding_iterations": 0,
-    "interaction_iterations": 0,
-}
 _OUTPUT = "poses"
 _CURE = "Export the show again, or copy the bundle again."
 # Sum of squares of a window of unit quaternions is their count. Rounding moves it by 1e-6 of that; a damaged
@@ -36,18 +26,21 @@ class PuppetError(ValueError):
     """A network file that cannot dance this skeleton: which file, what is wrong, what to do."""
 
 
-class Puppet:
-    """One onnxruntime session on one network file; joints that the network does not move bypass it.
+class PuppetNetwork:
+    """One onnxruntime session on one network file, and the puppets that it dances, all in one run.
 
     joints: names of the M moving joints; moving (M,): their places in the skeleton; window: poses a window;
-    latent: Z numbers that a window is coded in.
-    is_broken: whether the last dance() gave invalid poses (it then returned the last valid ones).
+    latent: Z numbers that a window is coded in; rest (M, 4).
+
+    The session is bound to the arrays of the rows once: a run allocates nothing here. In int8 the rows'
+    activations share a range, so that a row depends a little on the others (docs/results.md).
     """
 
-    def __init__(self, path: Path, skeleton: Skeleton) -> None:
+    def __init__(self, path: Path, skeleton: Skeleton, puppets: int = 1) -> None:
         """Raises PuppetError if bunraku did not export the file or it does not fit the skeleton."""
         self._session, facts = _session(path)
-        self.joints, self.window, self.latent, self.rest = _read_facts(path, facts)
+        self.joints, self.latent, self.rest = _read_facts(path, facts)
+        self.window = WINDOW
         self.architecture = facts.get("bunraku.architecture", "unknown")
         self.precision = facts.get("bunraku.precision", "unknown")
         try:
@@ -57,64 +50,99 @@ class Puppet:
                 f"{path}: the network moves joints that this skeleton does not have. {error} "
                 "Use the skeleton that the network was trained on."
             ) from None
-        self._clear_memory()
+        self.inputs = resting_feed(self.rest, self.latent, puppets)
+        self.poses: FloatArray = self.inputs["window"].copy()
+        self._ports = self._session.io_binding()
+        for name, values in self.inputs.items():
+            self._ports.bind_cpu_input(name, values)
+        self._ports.bind_ortvalue_output(_OUTPUT, onnxruntime.OrtValue.ortvalue_from_numpy(self.poses))
+        self.puppets = tuple(Puppet(self, row) for row in range(puppets))
 
-    def another(self) -> Self:
-        """A puppet of the same network: it shares the session, and nothing that changes."""
-        other = copy(self)
-        other._clear_memory()
-        return other
+    def dance(self) -> None:
+        """Let all puppets iterate their windows as their rows say; their poses are in their rows then."""
+        self._session.run_with_iobinding(self._ports)
+        for puppet in self.puppets:
+            puppet.look()
 
-    def _clear_memory(self) -> None:
+    def warm_up(self) -> None:
+        """One pass over the windows as they are; its poses go nowhere, and no row keeps its iterations."""
+        self.inputs["coding_iterations"][:], self.inputs["interaction_iterations"][:] = 1, 0
+        self._session.run_with_iobinding(self._ports)
+
+
+class Puppet:
+    """One of a network's puppets: its row of what the network takes and gives, as views.
+
+    window, targets (T, M, 4); mask, weights (M,); noise (Z,), added to the latent; places (M, 3) and
+    place_weights (M,). poses (T, M, 4): what the last dance gave, unit quaternions unless is_broken.
+    """
+
+    def __init__(self, network: PuppetNetwork, row: int) -> None:
+        self.network, inputs = network, network.inputs
+        self.window: FloatArray = inputs["window"][row]
+        self.noise: FloatArray = inputs["noise"][row]
+        self.places: FloatArray = inputs["places"][row]
+        self.place_weights: FloatArray = inputs["place_weights"][row]
+        self.poses: FloatArray = network.poses[row]
         self.is_broken = False
-        self._window = np.zeros((self.window, len(self.joints), 4), dtype=np.float32)
-        self._sound: FloatArray | None = None
-        self._iterations = np.zeros((), dtype=np.int64), np.zeros((), dtype=np.int64)
-        self._feed: dict[str, Any] = {
-            "coding_iterations": self._iterations[0],
-            "interaction_iterations": self._iterations[1],
-        }
+        self._mask: NDArray[np.bool_] = inputs["mask"][row]
+        self._targets: FloatArray = inputs["targets"][row]
+        self._weights: FloatArray = inputs["weights"][row]
+        self._coding, self._interaction, self._liveliness = (
+            inputs[name][row : row + 1]
+            for name in ("coding_iterations", "interaction_iterations", "liveliness")
+        )
+        self._flat = self.poses.reshape(-1)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the M moving joints."""
+        return self.network.joints
+
+    @property
+    def latent(self) -> int:
+        """Z: numbers that a window is coded in."""
+        return self.network.latent
+
+    @property
+    def liveliness(self) -> float:
+        """How much of the phrase's own stays while a hand holds; 1: all of it."""
+        return float(self._liveliness[0])
+
+    @liveliness.setter
+    def liveliness(self, share: float) -> None:
+        self._liveliness[0] = share
 
     def select(self, window: FloatArray) -> FloatArray:
-        """The moving joints (window, M, 4) of one of all joints (window, J, 4); overwritten each time."""
-        return np.take(window, self.moving, axis=1, out=self._window, mode="clip")
+        """The moving joints of one of all joints (T, J, 4): the window (T, M, 4) of the next dance."""
+        return np.take(window, self.network.moving, axis=1, out=self.window, mode="clip")
 
     def restore(self, pose: FloatArray, whole: FloatArray) -> None:
         """Write a pose of the moving joints (M, 4) into one of all joints (J, 4); numbers (M,) as well."""
-        whole[self.moving] = pose
+        whole[self.network.moving] = pose
 
-    def dance(
+    def hold(
         self,
-        window: FloatArray,
         mask: NDArray[np.bool_],
         targets: FloatArray,
         weights: FloatArray,
         coding_iterations: int,
         interaction_iterations: int,
-    ) -> FloatArray:
-        """Iterate a window (window, M, 4); returns unit quaternions (window, M, 4).
+    ) -> None:
+        """Take the held joints and the iterations of the next dance.
 
-        mask (M,), targets (window, M, 4), weights (M,): the held joints, with one orientation for each pose
-        of the window, as hands.Hands gives them. The held joints are overwritten in the first
-        interaction_iterations of coding_iterations passes, which together bring them as far towards their
-        targets as the weights say.
+        mask (M,), targets (T, M, 4), weights (M,): as hands.Hands gives them, one orientation for each pose
+        of the window. The held joints are overwritten in the first interaction_iterations of
+        coding_iterations passes, which together bring them as far towards their targets as the weights say.
         """
-        self._iterations[0][...] = coding_iterations
-        self._iterations[1][...] = interaction_iterations
-        feed = self._feed
-        feed["window"], feed["mask"], feed["targets"] = window, mask, targets
-        feed["weights"] = weights_of_one_pass(weights, interaction_iterations)
-        poses: FloatArray = self._session.run((_OUTPUT,), feed)[0]
-        flat = poses.ravel()
-        length = float(flat.dot(flat)) * 4 / flat.size
+        self._mask[:], self._targets[:] = mask, targets
+        self._weights[:] = weights_of_one_pass(weights, interaction_iterations)
+        self._coding[0], self._interaction[0] = coding_iterations, interaction_iterations
+
+    def look(self) -> None:
+        """Whether what the last dance gave are poses."""
+        length = float(self._flat.dot(self._flat)) * 4 / self._flat.size
         self.is_broken = not math.isfinite(length) or abs(length - 1) > _LENGTH_TOLERANCE
-        if not self.is_broken:
-            self._sound = poses
-        elif self._sound is None:
-            return window
-        else:
-            return self._sound
-        return poses
 
 
 def weights_of_one_pass(weights: FloatArray, interaction_iterations: int) -> FloatArray:
@@ -149,33 +177,35 @@ def _session(path: Path) -> tuple[onnxruntime.InferenceSession, dict[str, str]]:
         raise PuppetError(
             f"{path}: onnxruntime cannot read this network ({_short(error)}). {_CURE}"
         ) from None
-    if inputs.keys() != _INPUTS.keys() or _OUTPUT not in outputs:
+    known = network_inputs(0, 0)
+    for name, (_, shape) in known.items():
+        if name in inputs and len(inputs[name]) != 1 + len(shape):
+            raise PuppetError(
+                f"{path}: the network's input '{name}' has the shape {inputs[name]}, as another release "
+                "exported it. Export the show again with this release."
+            )
+    if inputs.keys() != known.keys() or _OUTPUT not in outputs:
         raise PuppetError(
             f"{path}: this network takes {', '.join(sorted(inputs))} and gives {', '.join(sorted(outputs))}; "
-            f"a puppet takes {', '.join(sorted(_INPUTS))} and gives {_OUTPUT}. Make one with bunraku export."
+            f"a puppet takes {', '.join(sorted(known))} and gives {_OUTPUT}. Make one with bunraku export."
         )
-    for name, shape in inputs.items():
-        if len(shape) != _INPUTS[name]:
-            raise PuppetError(
-                f"{path}: the network's input '{name}' has the shape {shape}, as another release exported "
-                "it. Export the show again with this release."
-            )
     return session, facts
 
 
-def _read_facts(path: Path, facts: dict[str, str]) -> tuple[tuple[str, ...], int, int, FloatArray]:
+def _read_facts(path: Path, facts: dict[str, str]) -> tuple[tuple[str, ...], int, FloatArray]:
     try:
-        joints = tuple(facts["bunraku.joints"].split(","))
+        joints, latents = tuple(facts["bunraku.joints"].split(",")), latent_size(facts)
         window = int(facts["bunraku.window"])
-        latent = int(facts["bunraku.latent"])
         rest = rest_pose(facts, len(joints))
         if window != WINDOW:
             raise ValueError(f"its windows are {window} poses long; the box dances windows of {WINDOW}")
+        if not latents:
+            raise ValueError("its latent has no size")
     except (KeyError, ValueError) as error:
         raise PuppetError(
             f"{path}: the network does not say what it moves ({_short(error)}). {_CURE}"
         ) from None
-    return joints, window, latent, rest
+    return joints, latents, rest
 
 
 def _short(error: Exception) -> str:

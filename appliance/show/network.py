@@ -14,12 +14,18 @@ from appliance.show.config_error import did_you_mean
 
 WINDOW = 8
 MOST_JOINTS = 1000
+MOST_LATENTS = 4096
 UNIT_TOLERANCE = 1e-3
 _MOST_NAMED = 5  # joints that a network has and the skeleton has not
 _LARGEST_REST = 1 << 20  # characters
 _EXPORT_AGAIN = "Export the show again with this release."
 
 Complaint = tuple[str, str]  # message, cure
+_TYPES: dict[type[np.generic], str] = {
+    np.float32: "tensor(float)",
+    np.bool_: "tensor(bool)",
+    np.int64: "tensor(int64)",
+}
 
 
 def moving_joints(facts: dict[str, str]) -> list[str]:
@@ -46,10 +52,14 @@ def inspect_network(path: Path, skeleton_joints: Sequence[str]) -> tuple[list[st
         return [], [(f"This cannot be read as a network ({why}).", COPY_AGAIN)]
     joints = moving_joints(facts)
     complaints = list(_fact_complaints(facts, joints, skeleton_joints))
-    complaints += _port_complaints("input", inputs, _inputs(len(joints)))
-    complaints += _port_complaints("output", outputs, _outputs(len(joints)))
+    latents = latent_size(facts)
+    if "window" in inputs and len(inputs["window"].shape) == 3:
+        complaints.append(("It takes one puppet, as an older release exported it.", _EXPORT_AGAIN))
+    elif latents:
+        complaints += _port_complaints("input", inputs, _inputs(len(joints), latents))
+        complaints += _port_complaints("output", outputs, _outputs(len(joints)))
     if not complaints:
-        complaints += _run_complaints(session, rest_pose(facts, len(joints)))
+        complaints += _run_complaints(session, resting_feed(rest_pose(facts, len(joints)), latents, 2))
     return joints, complaints
 
 
@@ -65,19 +75,53 @@ def rest_pose(facts: dict[str, str], joints: int) -> np.ndarray:
     return rest
 
 
-def _inputs(joints: int) -> dict[str, tuple[str, list[int]]]:
+def network_inputs(joints: int, latents: int) -> dict[str, tuple[type[np.generic], tuple[int, ...]]]:
+    """What a puppet gives its network, by name: kind of numbers, and shape; the network takes P of each."""
     return {
-        "window": ("tensor(float)", [WINDOW, joints, 4]),
-        "mask": ("tensor(bool)", [joints]),
-        "targets": ("tensor(float)", [WINDOW, joints, 4]),
-        "weights": ("tensor(float)", [joints]),
-        "coding_iterations": ("tensor(int64)", []),
-        "interaction_iterations": ("tensor(int64)", []),
+        "window": (np.float32, (WINDOW, joints, 4)),
+        "mask": (np.bool_, (joints,)),
+        "targets": (np.float32, (WINDOW, joints, 4)),
+        "weights": (np.float32, (joints,)),
+        "coding_iterations": (np.int64, ()),
+        "interaction_iterations": (np.int64, ()),
+        "liveliness": (np.float32, ()),
+        "noise": (np.float32, (latents,)),
+        "places": (np.float32, (joints, 3)),
+        "place_weights": (np.float32, (joints,)),
     }
 
 
-def _outputs(joints: int) -> dict[str, tuple[str, list[int]]]:
-    return {"poses": ("tensor(float)", [WINDOW, joints, 4])}
+def resting_feed(rest: np.ndarray, latents: int, puppets: int) -> dict[str, np.ndarray]:
+    """Inputs of a network for puppets that stand in the rest pose (M, 4): one free pass, nothing held."""
+    feed = {
+        name: np.zeros((puppets, *shape), dtype)
+        for name, (dtype, shape) in network_inputs(len(rest), latents).items()
+    }
+    feed["window"][:] = feed["targets"][:] = rest
+    feed["coding_iterations"][:] = 1
+    feed["liveliness"][:] = 1.0
+    return feed
+
+
+def latent_size(facts: dict[str, str]) -> int:
+    """How many numbers a window is coded in, from a network's metadata; 0 where that is not said."""
+    text = facts.get("bunraku.latent", "")
+    size = int(text) if text.isascii() and text.isdigit() and len(text) < 9 else 0
+    return size if size <= MOST_LATENTS else 0
+
+
+_Port = tuple[str, tuple[int | str, ...]]  # type, shape; a word: the file leaves this size open
+
+
+def _inputs(joints: int, latents: int) -> dict[str, _Port]:
+    return {
+        name: (_TYPES[dtype], ("P", *shape))
+        for name, (dtype, shape) in network_inputs(joints, latents).items()
+    }
+
+
+def _outputs(joints: int) -> dict[str, _Port]:
+    return {"poses": ("tensor(float)", ("P", WINDOW, joints, 4))}
 
 
 def _fact_complaints(
@@ -99,6 +143,9 @@ def _fact_complaints(
     if facts.get("bunraku.window") != str(WINDOW):
         found = facts.get("bunraku.window", "nothing")[:20]
         yield f"Its windows are {found} poses long; the box dances windows of {WINDOW}.", _EXPORT_AGAIN
+    if not latent_size(facts):
+        found = facts.get("bunraku.latent", "nothing")[:20]
+        yield f"Its latent has {found} numbers; the box knows 1 to {MOST_LATENTS}.", _EXPORT_AGAIN
     try:
         if joints:
             rest_pose(facts, len(joints))
@@ -109,9 +156,7 @@ def _fact_complaints(
         )
 
 
-def _port_complaints(
-    kind: str, by_name: dict[str, Any], wanted: dict[str, tuple[str, list[int]]]
-) -> Iterator[Complaint]:
+def _port_complaints(kind: str, by_name: dict[str, Any], wanted: dict[str, _Port]) -> Iterator[Complaint]:
     """Inputs or outputs that are missing, unknown, of another type or another shape."""
     for name in by_name.keys() - wanted.keys() if kind == "input" else ():
         yield f"It has an {kind} '{name}' that the box does not know.", _EXPORT_AGAIN
@@ -122,34 +167,25 @@ def _port_complaints(
         elif port.type != dtype:
             yield f"Its {kind} '{name}' is a {port.type}, not a {dtype}.", _EXPORT_AGAIN
         elif not _fits(port.shape, shape):
-            yield f"Its {kind} '{name}' has the shape {port.shape}, not {shape}.", _EXPORT_AGAIN
+            yield f"Its {kind} '{name}' has the shape {port.shape}, not {[*shape]}.", _EXPORT_AGAIN
 
 
-def _fits(found: Sequence[int | str | None], wanted: Sequence[int]) -> bool:
-    """Dimensions that the file leaves open fit."""
+def _fits(found: Sequence[int | str | None], wanted: Sequence[int | str]) -> bool:
+    """A size that the file leaves open fits any, and one that it must leave open no number."""
     return len(found) == len(wanted) and all(
         not isinstance(size, int) or size == right for size, right in zip(found, wanted, strict=True)
     )
 
 
-def _run_complaints(session: Any, rest: np.ndarray) -> Iterator[Complaint]:
+def _run_complaints(session: Any, feed: dict[str, np.ndarray]) -> Iterator[Complaint]:
     """One pass over the rest pose: a damaged file gives numbers that are no poses."""
-    joints = len(rest)
-    feed = {
-        "window": np.tile(rest, (WINDOW, 1, 1)),
-        "mask": np.zeros(joints, bool),
-        "targets": np.tile(rest, (WINDOW, 1, 1)),
-        "weights": np.zeros(joints, np.float32),
-        "coding_iterations": np.array(1, np.int64),
-        "interaction_iterations": np.array(0, np.int64),
-    }
     try:
         (poses,) = session.run(["poses"], feed)
     except Exception as error:
         yield f"It fails when it runs ({str(error).splitlines()[0][:120]}).", COPY_AGAIN
         return
-    if poses.shape != (WINDOW, joints, 4):
-        yield f"It gives poses of the shape {poses.shape}, not {(WINDOW, joints, 4)}.", _EXPORT_AGAIN
+    if poses.shape != feed["window"].shape:
+        yield f"It gives poses of the shape {poses.shape}, not {feed['window'].shape}.", _EXPORT_AGAIN
     elif not _are_unit(poses):
         yield (
             "It gives numbers that are no rotations (a damaged file, or one that learned nothing).",

@@ -10,8 +10,7 @@ import numpy as np
 
 from appliance.box.clock import Slot
 from appliance.box.live_pose import LivePose, LivePoseReader
-from appliance.dancer.puppet import Puppet
-from appliance.dancer.slerp import FloatArray
+from appliance.dancer.puppet import PuppetNetwork
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import unpacked
 from appliance.recorder.reading import Run
@@ -43,7 +42,7 @@ class Replay:
     def __init__(self, run: Run, show: Show) -> None:
         self.skipped = 0
         self._run = run
-        parts = assemble(show, _NO_PORTS)
+        parts = assemble(show, _NO_PORTS, network_of=_RecordedNetwork)
         hands = [hand["joint"] for hand in run.header["hands"]]
         is_same = hands == [hand.joint for hand in show.config.hands]
         is_same = is_same and run.header.get("puppets", []) == puppets_of(show)
@@ -53,10 +52,8 @@ class Replay:
                 f"('{run.header['show']}'). Name its bundle: --show DIR."
             )
         parts.link = self._link = _RecordedLink(run)
-        first = _RecordedPuppet(show)
-        self._puppets = [first, *(first.another() for _ in parts.puppets[1:])]
-        for one, recorded in zip(parts.puppets, self._puppets, strict=True):
-            one.puppet = recorded
+        assert isinstance(parts.network, _RecordedNetwork)
+        self._network = parts.network
         parts.live_inbox = self._live = _RecordedLive(run)
         parts.make_by(maker_of(show, parts.motion))
         self._wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
@@ -65,7 +62,7 @@ class Replay:
     @property
     def forced(self) -> int:
         """Ticks whose network failed then and not here."""
-        return sum(puppet.forced for puppet in self._puppets)
+        return self._network.forced
 
     def dance(self, comparison: Comparison, from_s: float = 0.0) -> Iterator[int]:
         """Run what was recorded, from the last keyframe before a second of the run on; tells `comparison` of
@@ -117,9 +114,8 @@ class Replay:
     def _dance_row(self, row: int, comparison: Comparison) -> None:
         recorded = self._run.ticks[row]
         self._link.row = self._live.row = row
-        flags = [recorded["flags"], *(recorded["others_flags"] if len(self._puppets) > 1 else ())]
-        for puppet, flag in zip(self._puppets, flags, strict=True):
-            puppet.fails = bool(flag & NOT_FINITE)
+        flags = [recorded["flags"], *(recorded["others_flags"] if len(self._network.puppets) > 1 else ())]
+        self._network.fails = [bool(flag & NOT_FINITE) for flag in flags]
         slot = Slot(
             int(recorded["tick"]),
             float(recorded["frame_time"]),
@@ -141,28 +137,21 @@ class Replay:
         comparison.note_order(order.name, done_then, done)
 
 
-class _RecordedPuppet(Puppet):
-    """The show's network; where it failed then, it fails here too."""
+class _RecordedNetwork(PuppetNetwork):
+    """The show's network; where it failed then, it fails here too.
 
-    def __init__(self, show: Show) -> None:
-        super().__init__(show.network, show.skeleton)
-        self.fails = False
-        self.forced = 0
+    fails: for each puppet, whether it failed then; forced: how often it did, and does not here.
+    """
 
-    def dance(
-        self,
-        window: FloatArray,
-        mask: np.ndarray[Any, np.dtype[np.bool_]],
-        targets: FloatArray,
-        weights: FloatArray,
-        coding_iterations: int,
-        interaction_iterations: int,
-    ) -> FloatArray:
-        poses = super().dance(window, mask, targets, weights, coding_iterations, interaction_iterations)
-        if self.fails and not self.is_broken:
-            self.forced += 1
-            self.is_broken = True
-        return poses
+    fails: Sequence[bool] = ()
+    forced = 0
+
+    def dance(self) -> None:
+        super().dance()
+        for puppet, fails in zip(self.puppets, self.fails, strict=True):
+            if fails and not puppet.is_broken:
+                self.forced += 1
+                puppet.is_broken = True
 
 
 class _RecordedLive(LivePoseReader):

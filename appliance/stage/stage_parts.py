@@ -20,7 +20,7 @@ from appliance.dancer.loop import Loop
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.phrase_cache import PhraseCache
-from appliance.dancer.puppet import Puppet, PuppetError
+from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 from appliance.dancer.puppeteers import WornSensor
 from appliance.dancer.springs import Springs
 from appliance.outputs.joint_frame import JointFrame
@@ -48,11 +48,13 @@ from appliance.stage.stage_puppet import Place, StagePuppet
 class StageParts:
     """Everything that dances, hears and speaks.
 
-    puppets: at least one; cues and commands lead the first. `worn`: which joints a sensor holds, of any
-    puppet; `mountings`: how it is worn for each of these; `complaints`: why sensors are not let in.
+    network: dances all puppets in one run. puppets: at least one; cues and commands lead the first. `worn`:
+    which joints a sensor holds, of any puppet; `mountings`: how it is worn for each of these; `complaints`:
+    why sensors are not let in.
     """
 
     skeleton: Skeleton
+    network: PuppetNetwork
     puppets: tuple[StagePuppet, ...]
     liveliness: Liveliness
     worn: dict[str, list[WornSensor]]
@@ -69,6 +71,11 @@ class StageParts:
     def first(self) -> StagePuppet:
         """The one that cues and commands lead."""
         return self.puppets[0]
+
+    @property
+    def are_due(self) -> bool:
+        """Whether the network is to dance in this tick: they share their hop, so all of them or none."""
+        return any(one.blending.is_due for one in self.puppets)
 
     @property
     def motion(self) -> Playback:
@@ -150,22 +157,25 @@ def assemble(
     profiles: Mapping[bytes, bytes] = MappingProxyType({}),
     box_file: Path | None = None,
     memory: Path | None = None,
+    network_of: Callable[[Path, Skeleton, int], PuppetNetwork] = PuppetNetwork,
 ) -> StageParts:
     """Open every port and file of a show; `profiles`: the sensors' calibrations that the box has kept;
-    `memory`: a folder where phrases that were made ready are kept for the next start.
+    `memory`: a folder where phrases that were made ready are kept for the next start; `network_of`: another
+    network in place of the show's own, from its file, the skeleton and the number of puppets.
 
     Raises StageError or ConfigError before anything dances. Keys that are missing are no reason not to dance:
     see `complaints`.
     """
     config = show.config
     try:
-        puppet = Puppet(show.network, show.skeleton)
-        show.require_moving(puppet.joints)
-        motion, floor = _playback(show, puppet.window, PhraseCache(show.directory, memory))
-        puppets = [_stage_puppet(show, 0, puppet, motion, floor)]
-        for number, one in enumerate(config.puppets[1:], 1):
+        network = network_of(show.network, show.skeleton, len(config.hands_of_puppets))
+        show.require_moving(network.joints)
+        motion, floor = _playback(show, network.window, PhraseCache(show.directory, memory))
+        first, *others = network.puppets
+        puppets = [_stage_puppet(show, 0, first, motion, floor)]
+        for number, (one, puppet) in enumerate(zip(config.puppets[1:], others, strict=True), 1):
             other = motion.another(one.phrase if one.phrase in motion.phrases else MAIN, one.start_s)
-            puppets.append(_stage_puppet(show, number, puppet.another(), other, floor))
+            puppets.append(_stage_puppet(show, number, puppet, other, floor))
     except PuppetError as error:
         raise StageError(str(error)) from error
     worn: dict[str, list[WornSensor]] = {}
@@ -178,6 +188,7 @@ def assemble(
     link, complaints = open_sensors(box, list(worn), profiles)
     return StageParts(
         skeleton=show.skeleton,
+        network=network,
         puppets=tuple(puppets),
         liveliness=Liveliness(config.dancer.liveliness, config.dancer.seed, puppets),
         worn=worn,
@@ -209,18 +220,19 @@ def _dance(parts: StageParts, show: Show) -> Callable[[int, int], object]:
     """Runs all puppets with their first windows and all hands; their poses go nowhere. None of them runs
     with more iterations than the show gives it, but where there is one puppet.
     """
-    runs = []
+    held = []
     for one, most in zip(parts.puppets, show.config.iterations_of_puppets, strict=True):
         mask = one.hands.mask.copy()
         mask[one.hand_places] = True
-        window = one.puppet.select(one.motion.window()).copy()
-        runs.append((one.puppet, most, (window, mask, one.hands.targets, one.hands.weights)))
+        one.puppet.select(one.motion.window())
+        held.append((one.puppet, most, (mask, one.hands.targets, one.hands.weights)))
 
     def dance(coding: int, interaction: int) -> object:
         try:
-            for puppet, most, held in runs:
-                times = (coding, interaction) if len(runs) == 1 else lowered(*most, coding)
-                puppet.dance(*held, *times)
+            for puppet, most, joints in held:
+                times = (coding, interaction) if len(held) == 1 else lowered(*most, coding)
+                puppet.hold(*joints, *times)
+            parts.network.dance()
         except Exception as error:  # onnxruntime has a class of its own for every way to fail
             raise StageError(
                 f"{show.network}: the network fails at {coding} coding iterations ({str(error)[:200]}). "
@@ -280,7 +292,7 @@ def _stage_puppet(
     config, times = show.config, show.config.iterations_of_puppets[number]
     hands, grounding = config.hands_of_puppets[number], Grounding(show.skeleton, floor)
     puppeteers = puppeteers_of(show, hands, puppet, grounding)
-    joints, window, placed = puppet.joints, puppet.window, config.puppets
+    joints, window, placed = puppet.joints, puppet.network.window, config.puppets
     made = StagePuppet(
         puppet=puppet,
         motion=motion,

@@ -53,8 +53,8 @@ class Place:
 
 @dataclass(slots=True)
 class StagePuppet:
-    """A figure, its parts, and what they make of a tick, in the order in which data flows: start, pull,
-    dance, blend, stand.
+    """A figure, its parts, and what they make of a tick, in the order in which data flows: start, pull, (the
+    network dances,) blend, stand.
 
     hand_places: where the hands' joints stand among the moving ones; place None: where its phrase has it;
     network_failed: the last good pose stays, because the network gave none. What the network takes besides:
@@ -109,27 +109,19 @@ class StagePuppet:
         self._window = self.puppet.select(window)
 
     def pull(self, now: float) -> None:
-        """Let the hands say where they hold their joints."""
-        self.hands.pull(now, self._window)
-
-    def dance(self) -> None:
-        """Let the puppet dance the window and blend it in."""
-        hands, times = self.hands, self.iterations
-        poses = self.puppet.dance(
-            self._window, hands.mask, hands.targets, hands.weights, times.coding, times.interaction
-        )
-        self.network_failed = self.puppet.is_broken
-        if not self.network_failed:
-            self.blending.add(poses)
-
-    def warm_up(self) -> None:
-        """One pass over the last window; its poses go nowhere."""
-        hands = self.hands
-        window = self.puppet.select(self.motion.window())
-        self.puppet.dance(window, hands.mask, hands.targets, hands.weights, 1, 0)
+        """Let the hands say where they hold their joints, and give all to the network."""
+        hands, times, row = self.hands, self.iterations, self.puppet
+        hands.pull(now, self._window)
+        row.hold(hands.mask, hands.targets, hands.weights, times.coding, times.interaction)
+        row.places[:], row.place_weights[:] = hands.places, hands.place_weights
+        row.liveliness, row.noise[:] = self.liveliness, self.noise
 
     def blend(self) -> None:
-        """Take the pose of this tick from the windows that cover it."""
+        """Blend in what the network has danced, if it was due, and take the pose of this tick."""
+        if self.blending.is_due:
+            self.network_failed = self.puppet.is_broken
+            if not self.network_failed:
+                self.blending.add(self.puppet.poses)
         if not self.network_failed:
             self._danced[:] = self._whole[0]
             self.puppet.restore(self.blending.take(), self._danced)

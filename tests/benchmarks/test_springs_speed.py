@@ -52,7 +52,7 @@ def test_springs(
 
 
 def test_the_puppet(measured: Callable[..., Any], parts: StageParts) -> None:
-    hands, window = parts.hands, parts.first.puppet.select(parts.motion.window())
-    measured("ten iterations of the puppet", GROUP, reference=True)(
-        lambda: parts.first.puppet.dance(window, hands.mask, hands.targets, hands.weights, 10, 9)
-    )
+    hands, puppet = parts.hands, parts.first.puppet
+    puppet.select(parts.motion.window())
+    puppet.hold(hands.mask, hands.targets, hands.weights, 10, 9)
+    measured("ten iterations of the puppet", GROUP, reference=True)(parts.network.dance)

@@ -77,7 +77,7 @@ def test_the_whole_tick(measured: Callable[..., Any], parts: StageParts, key: Se
         sensor.advance(slot.deadline)
         return (slot,), {}
 
-    label = f"datagram to sendto, {parts.first.puppet.architecture} {parts.first.puppet.precision}"
+    label = f"datagram to sendto, {parts.network.architecture} {parts.network.precision}"
     benchmark = measured(label, "the whole tick, back to back")
     benchmark.pedantic(tick.run, setup=next_slot, rounds=400)
     sensor.close()

@@ -41,7 +41,8 @@ def endless(show: Path, from_iterations: int) -> Path:
     body = helper.make_graph(
         [
             helper.make_node("Identity", ["so_far"], ["as_it_was"]),
-            helper.make_node("GreaterOrEqual", ["coding_iterations", "many"], ["again"]),
+            helper.make_node("ReduceMax", ["coding_iterations"], ["most"], keepdims=0),
+            helper.make_node("GreaterOrEqual", ["most", "many"], ["again"]),
         ],
         "body",
         [
@@ -69,7 +70,8 @@ def greedy(show: Path) -> Path:
         helper.make_tensor("last", TensorProto.INT64, [1], np.array([-1])),
     ]
     nodes = [
-        helper.make_node("Cast", ["coding_iterations"], ["number"], to=TensorProto.FLOAT),
+        helper.make_node("Cast", ["coding_iterations"], ["numbers"], to=TensorProto.FLOAT),
+        helper.make_node("ReduceMax", ["numbers"], ["number"], keepdims=0),
         helper.make_node("Expand", ["number", "shape"], ["enormous"]),
         helper.make_node("ReduceMin", ["enormous"], ["least"], keepdims=0),
         helper.make_node("Sub", ["least", "least"], ["nothing"]),

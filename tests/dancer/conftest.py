@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from appliance.dancer.puppet import Puppet
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
@@ -74,3 +75,18 @@ def random_quaternions(rng: np.random.Generator, *shape: int) -> np.ndarray:
     """Unit quaternions, uniform over all rotations and signs."""
     q = rng.normal(size=(*shape, 4))
     return (q / np.linalg.norm(q, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def dance(
+    puppet: Puppet,
+    window: np.ndarray,
+    mask: np.ndarray,
+    targets: np.ndarray,
+    weights: np.ndarray,
+    *times: int,
+) -> np.ndarray:
+    """What the puppet makes of a window (T, M, 4): its poses (T, M, 4). All others dance as well."""
+    puppet.window[:] = window
+    puppet.hold(mask, targets, weights, *times)
+    puppet.network.dance()
+    return puppet.poses.copy()

@@ -17,12 +17,13 @@ from appliance.dancer.blending import Blending
 from appliance.dancer.grounding import Grounding, survey
 from appliance.dancer.hands import Hands
 from appliance.dancer.motion_source import Playback
-from appliance.dancer.puppet import Puppet
+from appliance.dancer.puppet import Puppet, PuppetNetwork
 from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, TurningAxis
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.standing import measure_standing
+from tests.dancer.conftest import dance
 
 DEFAULT_SHOW = Path(appliance.show.__file__).parent / "default_show"
 HELD_OUT = {"salsa_29": 60.0, "indian_13": 120.0}  # takes kept apart from training, with their true rates
@@ -58,13 +59,13 @@ class Dancer:
         puppet = self.puppet
         motion = Playback(self.recording, floor=self.floor)
         hands = Hands([hand] if hand else [], puppet.joints)
-        blending = Blending(len(puppet.joints), puppet.window)
+        blending = Blending(len(puppet.joints), puppet.network.window)
         grounding = Grounding(self.recording.skeleton, self.floor)
         rows = []
         for tick in range(ticks):
             window = puppet.select(motion.window())
             hands.pull(tick * 0.02, window)
-            blending.add(puppet.dance(window, hands.mask, hands.targets, hands.weights, coding, interaction))
+            blending.add(dance(puppet, window, hands.mask, hands.targets, hands.weights, coding, interaction))
             assert not puppet.is_broken
             pose = motion.window()[0].copy()
             moved = blending.take().copy()
@@ -86,7 +87,7 @@ class Dancer:
     def target(self, joint: str, radians: float = 1.0) -> np.ndarray:
         """An orientation so far (about 60 degrees) from how the dancer usually carries a joint."""
         turn = quaternion.from_axis_angle([1.0, 0.5, 0.3], radians).astype(np.float32)
-        return quaternion.multiply(turn, self.puppet.rest[self.place(joint)])
+        return quaternion.multiply(turn, self.puppet.network.rest[self.place(joint)])
 
     def answer(self, coding: int, interaction: int, joint: str, weight: float = 1.0) -> float:
         """Degrees between the others with a hand on a joint and the same dance without it."""
@@ -140,7 +141,7 @@ def dancer(request: pytest.FixtureRequest, default_show: Path) -> Dancer:
         phrase = read_bvh(path, true_fps=HELD_OUT[request.param], drop_tpose=True).resampled(50.0)
     else:
         phrase = read_bvh(default_show / "phrase.bvh")
-    return Dancer(Puppet(default_show / "puppet.onnx", phrase.skeleton), phrase)
+    return Dancer(PuppetNetwork(default_show / "puppet.onnx", phrase.skeleton).puppets[0], phrase)
 
 
 @pytest.fixture(scope="module")
@@ -237,7 +238,7 @@ def test_a_kept_joint_stays_where_the_phrase_has_it(dancer: Dancer, joint: str, 
         hands.pull(tick * 0.02, window)
         motion.advance()
         if tick >= SETTLING:
-            poses = puppet.dance(window, hands.mask, hands.targets, hands.weights, times, times)
+            poses = dance(puppet, window, hands.mask, hands.targets, hands.weights, times, times)
             assert degrees(poses[:, place], window[:, place]).max() < 0.1
 
 
@@ -250,8 +251,8 @@ def test_the_deviation_from_the_phrase_grows_with_the_coding_iterations(dancer: 
 
 
 def test_a_still_pose_stays_still(still: Dancer) -> None:
-    for dance in (still.dance(1, 0), still.dance(10, 0), still.hold(10, 9, "lShldr")):
-        assert pace(dance.danced) < 0.1
+    for made in (still.dance(1, 0), still.dance(10, 0), still.hold(10, 9, "lShldr")):
+        assert pace(made.danced) < 0.1
 
 
 @pytest.mark.parametrize("joint", ["lShldr", "head"])

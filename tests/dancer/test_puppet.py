@@ -11,11 +11,13 @@ import pytest
 from onnx import numpy_helper
 
 from appliance.dancer.motion_source import Playback
-from appliance.dancer.puppet import Puppet, PuppetError
+from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
-from tests.dancer.conftest import random_quaternions
+from tests.dancer.conftest import dance, random_quaternions
+
+ALWAYS = ("window", "mask", "targets", "weights", "coding_iterations", "interaction_iterations")
 
 
 @pytest.fixture(scope="module")
@@ -25,13 +27,13 @@ def phrase(tiny_show: Path) -> Recording:
 
 @pytest.fixture
 def puppet(tiny_show: Path, phrase: Recording) -> Puppet:
-    return Puppet(tiny_show / "puppet.onnx", phrase.skeleton)
+    return PuppetNetwork(tiny_show / "puppet.onnx", phrase.skeleton).puppets[0]
 
 
 def free(puppet: Puppet) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mask, targets and weights of no hand at all."""
     count = len(puppet.joints)
-    targets = np.tile(quaternion.IDENTITY, (puppet.window, count, 1))
+    targets = np.tile(quaternion.IDENTITY, (len(puppet.window), count, 1))
     return np.zeros(count, bool), targets, np.zeros(count, np.float32)
 
 
@@ -79,7 +81,7 @@ def test_windows_of_all_joints_go_to_the_moving_ones_and_back(puppet: Puppet, ph
 def test_a_dance_gives_unit_quaternions_without_sign_jumps(
     puppet: Puppet, phrase: Recording, times: int
 ) -> None:
-    poses = puppet.dance(puppet.select(Playback(phrase).window()), *free(puppet), times, times)
+    poses = dance(puppet, puppet.select(Playback(phrase).window()).copy(), *free(puppet), times, times)
     assert poses.shape == (8, len(puppet.joints), 4)
     assert poses.dtype == np.float32
     assert np.linalg.norm(poses, axis=-1) == pytest.approx(1.0, abs=1e-4)
@@ -88,8 +90,8 @@ def test_a_dance_gives_unit_quaternions_without_sign_jumps(
 
 
 def test_iteration_counts_are_live(puppet: Puppet, phrase: Recording) -> None:
-    window = puppet.select(Playback(phrase).window())
-    once, twice, again = (puppet.dance(window, *free(puppet), times, 0) for times in (1, 2, 1))
+    window = puppet.select(Playback(phrase).window()).copy()
+    once, twice, again = (dance(puppet, window, *free(puppet), times, 0) for times in (1, 2, 1))
     assert quaternion.angle_between(once, twice).max() > 0.01
     assert np.array_equal(once, again)
 
@@ -98,85 +100,108 @@ def test_iteration_counts_are_live(puppet: Puppet, phrase: Recording) -> None:
 def test_the_held_orientation_shows_when_the_last_pass_is_held(
     puppet: Puppet, phrase: Recording, weight: float
 ) -> None:
-    window = puppet.select(Playback(phrase).window())
+    window = puppet.select(Playback(phrase).window()).copy()
     target = random_quaternions(np.random.default_rng(3))
     hands = holding(puppet, "lShldr", target, weight)
     place = puppet.joints.index("lShldr")
-    shown = puppet.dance(window, *hands, 3, 3)[:, place]
+    shown = dance(puppet, window, *hands, 3, 3)[:, place]
     if weight == 1.0:
         assert quaternion.angle_between(shown, target).max() < 0.01
-    free_last = puppet.dance(window, *hands, 3, 2)[:, place]
+    free_last = dance(puppet, window, *hands, 3, 2)[:, place]
     assert quaternion.angle_between(free_last, target).min() > 0.05
     assert quaternion.angle_between(shown, target).max() < quaternion.angle_between(free_last, target).max()
 
 
 def test_each_pose_of_the_window_is_held_at_its_own_target(puppet: Puppet, phrase: Recording) -> None:
-    window = puppet.select(Playback(phrase).window())
+    window = puppet.select(Playback(phrase).window()).copy()
     mask, targets, weights = holding(puppet, "lShldr", quaternion.IDENTITY)
     place = puppet.joints.index("lShldr")
     targets[:, place] = random_quaternions(np.random.default_rng(5), 8)
-    shown = puppet.dance(window, mask, targets, weights, 3, 3)[:, place]
+    shown = dance(puppet, window, mask, targets, weights, 3, 3)[:, place]
     assert quaternion.angle_between(shown, targets[:, place]).max() < 0.01
 
 
 def test_the_mask_and_the_weight_both_release_a_joint(puppet: Puppet, phrase: Recording) -> None:
-    window = puppet.select(Playback(phrase).window())
-    untouched = puppet.dance(window, *free(puppet), 3, 2)
+    window = puppet.select(Playback(phrase).window()).copy()
+    untouched = dance(puppet, window, *free(puppet), 3, 2)
     mask, targets, weights = holding(puppet, "head", random_quaternions(np.random.default_rng(4)))
     assert (
-        quaternion.angle_between(puppet.dance(window, mask, targets, weights, 3, 2), untouched).max() > 1e-3
+        quaternion.angle_between(dance(puppet, window, mask, targets, weights, 3, 2), untouched).max() > 1e-3
     )
     for released in ((~mask & False, targets, weights), (mask, targets, weights * 0)):
-        assert np.allclose(puppet.dance(window, *released, 3, 2), untouched, atol=1e-5)
+        assert np.allclose(dance(puppet, window, *released, 3, 2), untouched, atol=1e-5)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_network_that_gives_no_numbers_is_noticed_and_the_input_goes_through(
+def test_a_network_that_gives_no_numbers_is_noticed(
     tiny_show: Path, phrase: Recording, tmp_path: Path, value: float
 ) -> None:
     path = altered(tiny_show / "puppet.onnx", tmp_path, fill_weights_with(value))
-    broken = Puppet(path, phrase.skeleton)
+    (broken,) = PuppetNetwork(path, phrase.skeleton).puppets
     window = broken.select(Playback(phrase).window())
-    poses = broken.dance(window, *free(broken), 10, 9)
+    dance(broken, window, *free(broken), 10, 9)
     assert broken.is_broken
-    assert np.array_equal(poses, window)
 
 
-def test_after_a_failure_the_last_sound_window_is_given(puppet: Puppet, phrase: Recording) -> None:
-    window = puppet.select(Playback(phrase).window())
-    sound = puppet.dance(window, *free(puppet), 2, 0).copy()
-    poses = puppet.dance(np.full_like(window, np.nan), *free(puppet), 2, 0)
-    assert puppet.is_broken
-    assert np.array_equal(poses, sound)
-    puppet.dance(window, *free(puppet), 2, 0)
-    assert not puppet.is_broken
+def test_a_puppet_without_poses_is_noticed_and_breaks_no_other(tiny_show: Path, phrase: Recording) -> None:
+    first, second = PuppetNetwork(tiny_show / "puppet.onnx", phrase.skeleton, 2).puppets
+    window = first.select(Playback(phrase).window()).copy()
+    second.window[:] = window
+    second.hold(*free(second), 2, 0)
+    dance(first, np.full_like(window, np.nan), *free(first), 2, 0)
+    assert (first.is_broken, second.is_broken) == (True, False)
+    dance(first, window, *free(first), 2, 0)
+    assert not first.is_broken and np.array_equal(first.poses, second.poses)
+
+
+def test_each_of_four_dances_as_it_would_alone(tiny_show: Path, phrase: Recording, puppet: Puppet) -> None:
+    four = PuppetNetwork(tiny_show / "puppet.onnx", phrase.skeleton, 4).puppets
+    motion, chance = Playback(phrase), np.random.default_rng(7)
+    alone = []
+    for number, (one, joint, times) in enumerate(
+        zip(four, ("lShldr", "head", "chest", "lShldr"), ((3, 2), (10, 9), (1, 0), (2, 2)), strict=True)
+    ):
+        window = one.select(motion.window()).copy()
+        hands = holding(one, joint, random_quaternions(chance), 0.25 * (number + 1))
+        one.hold(*hands, *times)
+        alone.append(dance(puppet, window, *hands, *times))
+        for _ in range(10):
+            motion.advance()
+    four[0].network.dance()
+    for one, expected in zip(four, alone, strict=True):
+        np.testing.assert_allclose(one.poses, expected, atol=1e-5)
+    assert quaternion.angle_between(four[0].poses, four[3].poses).max() > 0.1
+    before = four[0].network.poses.copy()
+    four[0].network.warm_up()
+    four[2].hold(*free(four[2]), 1, 0)  # all iterations are given anew for each dance
+    assert not np.array_equal(four[0].network.poses, before)
 
 
 def test_facts_come_from_the_file(puppet: Puppet) -> None:
-    assert puppet.window == 8
-    assert len(puppet.joints) == 17
-    assert puppet.rest.shape == (17, 4)
-    assert np.linalg.norm(puppet.rest, axis=-1) == pytest.approx(1.0, abs=1e-4)
-    assert (puppet.architecture, puppet.precision) == ("mlp", "fp32")
+    network = puppet.network
+    assert (network.window, network.latent, len(network.joints)) == (8, 16, 17)
+    assert network.rest.shape == (17, 4)
+    assert np.linalg.norm(network.rest, axis=-1) == pytest.approx(1.0, abs=1e-4)
+    assert (network.architecture, network.precision) == ("mlp", "fp32")
 
 
 def test_a_missing_file_is_refused(tmp_path: Path, phrase: Recording) -> None:
     with pytest.raises(PuppetError, match="no such network file"):
-        Puppet(tmp_path / "none.onnx", phrase.skeleton)
+        PuppetNetwork(tmp_path / "none.onnx", phrase.skeleton)
 
 
 @pytest.mark.parametrize("content", [b"", b"this is no network", bytes(range(256)) * 100])
 def test_a_file_that_is_no_network_is_refused(tmp_path: Path, phrase: Recording, content: bytes) -> None:
     (tmp_path / "puppet.onnx").write_bytes(content)
     with pytest.raises(PuppetError, match=r"puppet\.onnx: .*(cannot read|this network takes)"):
-        Puppet(tmp_path / "puppet.onnx", phrase.skeleton)
+        PuppetNetwork(tmp_path / "puppet.onnx", phrase.skeleton)
 
 
 def test_a_truncated_file_is_refused(tiny_show: Path, tmp_path: Path, phrase: Recording) -> None:
     whole = (tiny_show / "puppet.onnx").read_bytes()
     (tmp_path / "puppet.onnx").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(PuppetError, match="copy the bundle again"):
-        Puppet(tmp_path / "puppet.onnx", phrase.skeleton)
+        PuppetNetwork(tmp_path / "puppet.onnx", phrase.skeleton)
 
 
 def test_a_network_with_other_inputs_is_refused(tiny_show: Path, tmp_path: Path, phrase: Recording) -> None:
@@ -188,29 +213,29 @@ def test_a_network_with_other_inputs_is_refused(tiny_show: Path, tmp_path: Path,
                 node.input[:] = ["pose_window" if name == "window" else name for name in node.input]
 
     with pytest.raises(PuppetError, match=r"takes .*pose_window.*bunraku export"):
-        Puppet(altered(tiny_show / "puppet.onnx", tmp_path, rename), phrase.skeleton)
+        PuppetNetwork(altered(tiny_show / "puppet.onnx", tmp_path, rename), phrase.skeleton)
 
 
 def test_a_network_of_an_older_release_is_refused_with_the_cure(
     tiny_show: Path, tmp_path: Path, phrase: Recording
 ) -> None:
-    """It took one orientation for each hand, not one for each pose of the window."""
+    """It took one puppet, and neither liveliness nor noise."""
 
-    def hold_still(model: onnx.ModelProto) -> None:
-        (targets,) = (port for port in model.graph.input if port.name == "targets")
-        del targets.type.tensor_type.shape.dim[0]
-        frozen = onnx.helper.make_node("Concat", ["one_pose"] * 8, ["one_target_a_pose"], axis=0)
-        axis = numpy_helper.from_array(np.array([0]), "first_axis")
-        model.graph.initializer.append(axis)
-        for node in model.graph.node:
-            node.input[:] = ["one_target_a_pose" if name == "targets" else name for name in node.input]
-        model.graph.node.insert(0, frozen)
-        model.graph.node.insert(
-            0, onnx.helper.make_node("Unsqueeze", ["targets", "first_axis"], ["one_pose"])
-        )
+    def take_one_puppet(model: onnx.ModelProto) -> None:
+        kept = [port for port in model.graph.input if port.name in ALWAYS]
+        for port in kept:
+            del port.type.tensor_type.shape.dim[0]
+            widen = onnx.helper.make_node("Unsqueeze", [port.name, "first_axis"], [f"{port.name}_of_one"])
+            for node in model.graph.node:
+                node.input[:] = [f"{name}_of_one" if name == port.name else name for name in node.input]
+            model.graph.node.insert(0, widen)
+        model.graph.initializer.append(numpy_helper.from_array(np.array([0]), "first_axis"))
+        others = [port for port in model.graph.input if port.name not in ALWAYS]
+        for port in others:
+            model.graph.input.remove(port)
 
-    with pytest.raises(PuppetError, match=r"'targets' has the shape \[17, 4\].*again with this release"):
-        Puppet(altered(tiny_show / "puppet.onnx", tmp_path, hold_still), phrase.skeleton)
+    with pytest.raises(PuppetError, match=r"'window' has the shape \[8, 17, 4\].*again with this release"):
+        PuppetNetwork(altered(tiny_show / "puppet.onnx", tmp_path, take_one_puppet), phrase.skeleton)
 
 
 @pytest.mark.parametrize("key", ["bunraku.joints", "bunraku.window", "bunraku.rest"])
@@ -223,9 +248,9 @@ def test_a_network_that_does_not_say_what_it_moves_is_refused(
         model.metadata_props.extend(kept)
 
     with pytest.raises(PuppetError, match="does not say what it moves"):
-        Puppet(altered(tiny_show / "puppet.onnx", tmp_path, forget), phrase.skeleton)
+        PuppetNetwork(altered(tiny_show / "puppet.onnx", tmp_path, forget), phrase.skeleton)
 
 
 def test_a_network_of_another_skeleton_is_refused_with_the_joint(tiny_show: Path, swaying: Recording) -> None:
     with pytest.raises(PuppetError, match=r"'abdomen'.*trained on"):
-        Puppet(tiny_show / "puppet.onnx", swaying.skeleton)
+        PuppetNetwork(tiny_show / "puppet.onnx", swaying.skeleton)

@@ -51,7 +51,7 @@ def save_network(
     targets: list[int] | None = None,
 ) -> None:
     """A network with a puppet's inputs and outputs; `node` makes the poses out of the window."""
-    poses = helper.make_tensor_value_info("poses", TensorProto.FLOAT, [WINDOW, len(joints), 4])
+    poses = helper.make_tensor_value_info("poses", TensorProto.FLOAT, ["P", WINDOW, len(joints), 4])
     inputs = [one for one in puppet_inputs(len(joints), targets) if one.name != without]
     graph = helper.make_graph([helper.make_node(node, ["window"], ["poses"])], "puppet", inputs, [poses])
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from appliance.cli.run_with_timeout import run_with_timeout
-from appliance.dancer.puppet import Puppet, PuppetError
+from appliance.dancer.puppet import PuppetError, PuppetNetwork
 from appliance.show.bundle import CHECKSUMS, MOST_FILES, write_checksums
 from appliance.show.check import verify_bundle
 from appliance.show.config_error import ConfigError
@@ -132,7 +132,7 @@ def test_a_rest_pose_that_is_none_is_refused(bundle: Path, rest: str) -> None:
     save_network(bundle / "puppet.onnx", facts={"rest": rest})
     assert "rest pose" in about(bundle, "puppet.onnx")
     with pytest.raises(PuppetError, match="does not say what it moves"):
-        Puppet(bundle / "puppet.onnx", skeleton())
+        PuppetNetwork(bundle / "puppet.onnx", skeleton())
 
 
 @pytest.mark.parametrize("word", [b"[[1.0", b"targets", b"bunraku.joints", b"poses"])
@@ -141,7 +141,7 @@ def test_a_network_with_metadata_that_is_not_text_is_refused(bundle: Path, word:
     (bundle / "puppet.onnx").write_bytes(content.replace(word, b"\xd7" + word[1:]))
     assert about(bundle, "puppet.onnx")
     with pytest.raises(PuppetError):
-        Puppet(bundle / "puppet.onnx", skeleton())
+        PuppetNetwork(bundle / "puppet.onnx", skeleton())
 
 
 def test_a_network_of_very_many_joints_is_refused_in_few_words(bundle: Path) -> None:
@@ -174,4 +174,4 @@ def test_a_network_reads_no_other_file(bundle: Path, monkeypatch: pytest.MonkeyP
     assert "cannot be read as a network" in about(bundle, "puppet.onnx")
     monkeypatch.chdir(bundle)
     with pytest.raises(PuppetError, match="cannot read this network"):
-        Puppet(bundle / "puppet.onnx", skeleton())
+        PuppetNetwork(bundle / "puppet.onnx", skeleton())

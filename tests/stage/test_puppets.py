@@ -200,10 +200,10 @@ def test_a_rule_of_lights_names_a_puppet_of_the_show(tmp_path: Path) -> None:
 
 
 def _count(puppet: Any, number: int, ran: list[tuple[int, int, int]]) -> None:
-    real = puppet.dance
+    real = puppet.hold
 
-    def dance(*held: Any) -> Any:
+    def hold(*held: Any) -> Any:
         ran.append((number, *held[-2:]))
         return real(*held)
 
-    puppet.dance = dance
+    puppet.hold = hold

@@ -16,6 +16,7 @@ from appliance.pose import quaternion
 from appliance.show.bundle import default_show_path
 from appliance.studio.evaluation.coders import OnnxCoder
 from appliance.studio.evaluation.evaluation import evaluate, load_takes
+from tests.studio.test_export import pass_of
 
 RANDOM_LATENTS = 2000
 
@@ -32,13 +33,11 @@ def report(show: Path) -> dict[str, Any]:
 
 
 def decoder_of(path: Path) -> onnxruntime.InferenceSession:
-    """The part of a puppet's loop from the latent to the poses, as a network of its own."""
+    """The part of a puppet's pass from the latents to the poses, as a network of its own."""
     model = onnx.load(path)
-    loop = next(node for node in model.graph.node if node.op_type == "Loop").attribute[0].g
-    _, poses, latent = (output.name for output in loop.output)
-    made_by = {output: node for node in loop.node for output in node.output}
-    if made_by[latent].op_type == "Identity":  # the loop's output may be a copy of what the decoder reads
-        latent = made_by[latent].input[0]
+    one_pass = pass_of(model)
+    poses, _, latent = (output.name for output in one_pass.output)
+    made_by = {output: node for node in one_pass.node for output in node.output}
     needed, open_names = [], [poses]
     while open_names:
         name = open_names.pop()
@@ -46,14 +45,14 @@ def decoder_of(path: Path) -> onnxruntime.InferenceSession:
             needed.append(made_by[name])
             open_names += made_by[name].input
     for node in needed:
-        if "iteration" in node.input:  # the bias of this pass: without a hand it is the layer's own
-            node.CopyFrom(helper.make_node("Identity", ["decoder.last.bias"], node.output))
-    nodes = [node for node in loop.node if node in needed]
+        # What this pass is told, as its bias: without a hand that is the layer's own
+        node.input[:] = ["decoder.last.bias" if name == "decoder_told" else name for name in node.input]
+    nodes = [node for node in one_pass.node if node in needed]
     size = next(int(entry.value) for entry in model.metadata_props if entry.key == "bunraku.latent")
-    inputs = [helper.make_tensor_value_info(latent, TensorProto.FLOAT, [1, size])]
+    inputs = [helper.make_tensor_value_info(latent, TensorProto.FLOAT, ["P", size])]
     used = {name for node in nodes for name in node.input}
     weights = [tensor for tensor in model.graph.initializer if tensor.name in used]
-    graph = helper.make_graph(nodes, "decoder", inputs, [loop.output[1]], weights)
+    graph = helper.make_graph(nodes, "decoder", inputs, [one_pass.output[0]], weights)
     alone = helper.make_model(graph, opset_imports=model.opset_import, ir_version=model.ir_version)
     return onnxruntime.InferenceSession(alone.SerializeToString(), providers=["CPUExecutionProvider"])
 
@@ -72,7 +71,7 @@ def test_random_latents_decode_to_poses_within_the_range_of_the_recordings(
     ranges = np.array([report["joint_range_degrees"][name] for name in coder.joints])
     name, size = decoder.get_inputs()[0].name, decoder.get_inputs()[0].shape[1]
     noise = np.random.default_rng(0).standard_normal((RANDOM_LATENTS, 1, size)).astype(np.float32)
-    poses = np.stack([decoder.run(None, {name: latent})[0] for latent in noise])
+    poses = np.concatenate([decoder.run(None, {name: latent})[0] for latent in noise])
     angles = np.degrees(quaternion.angle_between(poses, coder.rest))
     assert angles.max() > 30.0, "the dancer stands still whatever the latent"
     beyond = np.maximum(angles - ranges, 0.0)

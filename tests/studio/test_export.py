@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import onnx
+import onnxruntime
 import pytest
 import torch
 from onnx import numpy_helper
 
 from appliance.pose import quaternion
+from appliance.show.network import resting_feed
 from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.autoencoder.models import PUPPETS
 from appliance.studio.evaluation.coders import OnnxCoder
@@ -20,6 +22,7 @@ from tests.studio.test_autoencoder import some_windows
 from tests.studio.tiny import moving, skeleton, untrained
 
 NAMES = [skeleton().names[j] for j in moving()]
+TIMES = (10, 3, 1, 4), (9, 2, 0, 6)  # coding and interaction iterations of four rows
 
 
 @pytest.fixture(scope="module", params=sorted(PUPPETS))
@@ -55,6 +58,61 @@ def test_onnx_is_pytorch(network: str, exported: dict[str, Path], coding: int, i
         np.testing.assert_allclose(played_latents, latents.numpy(), atol=1e-3)
 
 
+def pass_of(model: onnx.ModelProto) -> onnx.GraphProto:
+    """The nodes of one pass."""
+    (passes,) = (node for node in model.graph.node if node.op_type == "Scan")
+    return next(attribute.g for attribute in passes.attribute if attribute.name == "body")
+
+
+def rows(coder: OnnxCoder, each: list[int] | slice = slice(None)) -> dict[str, np.ndarray]:
+    """What four puppets give their network, or some of them: windows, hands and iterations of their own."""
+    chance, count = np.random.default_rng(11), len(NAMES)
+    feed = resting_feed(coder.rest, 16, 4)
+    feed["window"][:] = some_windows(4).numpy()
+    feed["targets"][:] = quaternion.normalize(chance.normal(size=(4, 8, count, 4)))
+    feed["mask"][:] = chance.uniform(size=(4, count)) < 0.2
+    feed["weights"][:] = chance.uniform(size=(4, count))
+    feed["coding_iterations"][:], feed["interaction_iterations"][:] = TIMES
+    return {name: values[each] for name, values in feed.items()}
+
+
+def run(path: Path, feed: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    poses, latents = session.run(["poses", "latent"], feed)
+    return poses, latents
+
+
+def test_each_row_has_iterations_and_hands_of_its_own(network: str, exported: dict[str, Path]) -> None:
+    autoencoder, feed = untrained(network), rows(OnnxCoder(exported["fp32"]))
+    poses, latents = run(exported["fp32"], feed)
+    for row, times in enumerate(zip(*TIMES, strict=True)):
+        own = (torch.from_numpy(feed[name][row]) for name in ("mask", "targets", "weights"))
+        with torch.no_grad():
+            trained, coded = autoencoder.iterate(
+                torch.from_numpy(feed["window"][row, None]), *times, HeldJoints(*own)
+            )
+        same = quaternion.aligned(poses[row], trained[0].numpy())
+        np.testing.assert_allclose(same, trained[0].numpy(), atol=1e-4)
+        np.testing.assert_allclose(latents[row], coded[0].numpy(), atol=1e-3)
+
+
+def test_a_row_is_what_it_would_be_alone(exported: dict[str, Path]) -> None:
+    coder = OnnxCoder(exported["fp32"])
+    together, latents = run(exported["fp32"], rows(coder))
+    for row in range(4):
+        alone, latent = run(exported["fp32"], rows(coder, [row]))
+        np.testing.assert_allclose(together[row], alone[0], atol=5e-5)
+        np.testing.assert_allclose(latents[row], latent[0], atol=5e-5)
+
+
+def test_int8_rows_share_a_range_and_are_the_same_each_time(exported: dict[str, Path]) -> None:
+    coder = OnnxCoder(exported["int8"])
+    together, again = (run(exported["int8"], rows(coder))[0] for _ in range(2))
+    np.testing.assert_array_equal(together, again)
+    alone = np.concatenate([run(exported["int8"], rows(coder, [row]))[0] for row in range(4)])
+    assert np.degrees(quaternion.angle_between(together, alone)).mean() < 1.0
+
+
 def test_poses_are_unit_and_without_jumps_of_sign(exported: dict[str, Path]) -> None:
     for path in exported.values():
         (poses,), _ = OnnxCoder(path).iterate(some_windows(3)[1:2].numpy(), 10)
@@ -73,8 +131,7 @@ def test_int8_weights_are_u8_around_128(network: str, exported: dict[str, Path])
         assert levels.dtype == zero.dtype == np.uint8, name
         assert (zero == 128).all() and zero.size == levels.shape[-1] == scale.size, name
         assert levels.min() >= 1, name
-    loop = next(node for node in model.graph.node if node.op_type == "Loop")
-    kinds = [node.op_type for node in loop.attribute[0].g.node]
+    kinds = [node.op_type for node in pass_of(model).node]
     assert "DynamicQuantizeMatMul" in kinds and "LSTM" not in kinds
     # In float stay the layer that sees the pose, where int8 loses most, and the mlp's two small ones around
     # the latent, where it gains nothing.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose.foreign_file import opened
-from appliance.show.network import WINDOW
+from appliance.show.network import WINDOW, latent_size, resting_feed
 from appliance.show.show import load_show
 from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.model_uses import IMPROVISER, USES
@@ -76,22 +76,19 @@ class OnnxCoder:
             facts = self._session.get_modelmeta().custom_metadata_map
             self.joints = tuple(facts["bunraku.joints"].split(","))
             self.rest = np.array(json.loads(facts["bunraku.rest"]), dtype=np.float32)
+            self._at_rest = resting_feed(self.rest, latent_size(facts), 1)
         except Exception as error:  # onnxruntime raises another class for each kind of damage
             raise StudioError(
                 f"{path} is not a network that bunraku exported, or it is damaged. Give "
                 "a show folder, a puppet.onnx or a checkpoint.pt."
             ) from error
+        if {port.name for port in self._session.get_inputs()} != self._at_rest.keys():
+            raise StudioError(f"{path}: another release exported this network. Export the show again.")
         self.facts = {
             "file": path.name,
             "architecture": facts.get("bunraku.architecture", "unknown"),
             "precision": facts.get("bunraku.precision", "unknown"),
         }
-        joints = len(self.joints)
-        self._free: HeldJoints[NDArray[Any]] = HeldJoints(
-            np.zeros(joints, dtype=bool),
-            np.tile(self.rest, (WINDOW, 1, 1)),
-            np.zeros(joints, dtype=np.float32),
-        )
 
     def iterate(
         self,
@@ -100,17 +97,20 @@ class OnnxCoder:
         interaction_iterations: int = 0,
         hold: HeldJoints[NDArray[Any]] | None = None,
     ) -> tuple[Poses, Poses]:
-        feed = {
-            **(self._free if hold is None else hold)._asdict(),
-            "coding_iterations": np.array(coding_iterations, dtype=np.int64),
-            "interaction_iterations": np.array(interaction_iterations, dtype=np.int64),
-        }
-        coded = []
-        for number, window in enumerate(windows):
+        feed = dict(self._at_rest)
+        feed["coding_iterations"] = np.full(1, coding_iterations, dtype=np.int64)
+        feed["interaction_iterations"] = np.full(1, interaction_iterations, dtype=np.int64)
+        if hold is not None:
+            feed["mask"], feed["weights"] = hold.mask[None], hold.weights[None]
+        poses, latents = [], []
+        for number in range(len(windows)):
+            feed["window"] = windows[number : number + 1]
             if hold is not None:
-                feed["targets"] = hold.targets[number]
-            coded.append(self._session.run(["poses", "latent"], {**feed, "window": window}))
-        return np.stack([poses for poses, _ in coded]), np.stack([latent for _, latent in coded])
+                feed["targets"] = hold.targets[number : number + 1]
+            coded = self._session.run(["poses", "latent"], feed)
+            poses.append(coded[0])
+            latents.append(coded[1])
+        return np.concatenate(poses), np.concatenate(latents)
 
 
 class TorchCoder:

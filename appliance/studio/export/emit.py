@@ -1,6 +1,6 @@
 """Each architecture's encoder and decoder as ONNX nodes.
 
-A window enters as (T, M, 4) and leaves as (T, M, 4) before normalisation; the latent is (1, Z).
+P windows enter as (P, T, M, 4) and leave as (P, T, M, 4) before normalisation; the latents are (P, Z).
 
 Two kinds of dense layers stay in float, also in int8 files. The one that sees the pose itself: eight bits
 over the range of whole orientations are a step of 1.2 degrees (quantized, it alone made 0.59 of 0.61 degrees
@@ -25,17 +25,19 @@ EXACT = Layers(int8=False)
 def encode(
     graph: Graph, layers: Layers, network: Network, shape: Shape, window: str, out: str, bias: str = ""
 ) -> str:
-    """Nodes of the encoder: window (T, M, 4) -> latent (1, Z), named out; bias: of its first layer."""
+    """Nodes of the encoder: windows (P, T, M, 4) -> latents (P, Z), named out; bias (P, W): of its first
+    layer.
+    """
     encoder = network.encoder
     if isinstance(encoder, networks.MlpEncoder):
-        steps = _reshaped(graph, window, shape.window, shape.pose)
+        steps = _reshaped(graph, window, -1, shape.window, shape.pose)
         basis = graph.constant("curves", encoder.time.curves.numpy())
-        amounts = _reshaped(graph, graph.op("MatMul", basis, steps), 1, shape.curves * shape.pose)
+        amounts = _reshaped(graph, graph.op("MatMul", basis, steps), -1, shape.curves * shape.pose)
         return dense_stack(graph, layers, encoder.stack, amounts, "encoder", out, bias)
     if isinstance(encoder, networks.ConvEncoder):
         return _conv_encoder(graph, layers, encoder, shape, window, out)
     if isinstance(encoder, networks.LstmEncoder):
-        steps = _reshaped(graph, window, shape.window, 1, shape.pose)
+        steps = graph.op("Transpose", _reshaped(graph, window, -1, shape.window, shape.pose), perm=[1, 0, 2])
         last = layers.lstm(graph, steps, encoder.lstm, "encoder.lstm", "last")
         inner = layers.elu(graph, layers.linear(graph, last, encoder.dense, "encoder.dense"))
         return layers.linear(graph, inner, encoder.last, "encoder.last", out)
@@ -45,25 +47,26 @@ def encode(
 def condition(
     graph: Graph, network: Conditional, shape: Shape, start: str, goal: str, weight: str, gates: str
 ) -> tuple[str, str]:
-    """(K, W), (K, C * M * 4): biases of the encoder's first layer and the decoder's last in every pass.
+    """(K, P, W), (K, P, C * M * 4): biases of the encoder's first layer and the decoder's last in every pass.
 
-    start, goal (T, M, 4), weight (M), gates (K).
+    start, goal (P, T, M, 4), weight (P, M), gates (K, P).
     ConditionalEncoder.condition and ConditionalDecoder.forward node for node, once for all passes.
     """
     encoder = network.encoder
     column = graph.op("Unsqueeze", goal, graph.constant("axis_last", [-1], np.int64))
     row = graph.op("Unsqueeze", goal, graph.constant("axis_before_last", [-2], np.int64))
-    products = _reshaped(graph, graph.op("Mul", column, row), shape.window, shape.joints, 16)
+    products = _reshaped(graph, graph.op("Mul", column, row), -1, shape.window, shape.joints, 16)
     matrices = graph.op("MatMul", products, graph.constant("matrix", encoder.matrix.numpy()))
-    matrices = graph.op("Mul", matrices, _reshaped(graph, weight, 1, shape.joints, 1))
-    steps = _reshaped(graph, matrices, shape.window, shape.joints * 9)
+    matrices = graph.op("Mul", matrices, _reshaped(graph, weight, -1, 1, shape.joints, 1))
+    steps = _reshaped(graph, matrices, -1, shape.window, shape.joints * 9)
     basis = graph.constant("curves", encoder.time.curves.numpy())
-    held = _reshaped(graph, graph.op("MatMul", basis, steps), 1, shape.curves * shape.joints * 9)
-    phrase = graph.op("MatMul", basis, _reshaped(graph, start, shape.window, shape.pose))
-    phrase = graph.op("Mul", phrase, graph.op("ReduceMax", weight, keepdims=1))
-    phrase = _reshaped(graph, phrase, 1, shape.curves * shape.pose)
-    seen = graph.op("Concat", held, _reshaped(graph, weight, 1, shape.joints), phrase, axis=1)
-    gate = _reshaped(graph, gates, -1, 1)
+    held = _reshaped(graph, graph.op("MatMul", basis, steps), -1, shape.curves * shape.joints * 9)
+    phrase = graph.op("MatMul", basis, _reshaped(graph, start, -1, shape.window, shape.pose))
+    phrase = _reshaped(graph, phrase, -1, shape.curves * shape.pose)
+    strongest = graph.op("ReduceMax", weight, graph.constant("axis_last", [-1], np.int64), keepdims=1)
+    phrase = graph.op("Mul", phrase, strongest)
+    seen = graph.op("Concat", held, weight, phrase, axis=1)
+    gate = graph.unsqueezed(gates, 2)
 
     def biases(x: str, told: nn.Linear, layer: nn.Module, name: str) -> str:
         """What a pass in which something is held is told, on top of the layer's own bias."""
@@ -79,11 +82,13 @@ def condition(
 
 
 def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent: str, bias: str = "") -> str:
-    """Nodes of the decoder: latent (1, Z) -> raw window (T, M, 4); bias: of its last layer."""
+    """Nodes of the decoder: latents (P, Z) -> raw windows (P, T, M, 4); bias (P, C * M * 4): of its last
+    layer.
+    """
     decoder = network.decoder
     if isinstance(decoder, networks.MlpDecoder):
         amounts = dense_stack(graph, layers, decoder.stack, latent, "decoder", bias=bias)
-        amounts = _reshaped(graph, amounts, shape.curves, shape.pose)
+        amounts = _reshaped(graph, amounts, -1, shape.curves, shape.pose)
         basis = graph.constant("curves_back", decoder.time.curves.numpy().T)
         flat = graph.op("MatMul", basis, amounts)
     elif isinstance(decoder, networks.ConvDecoder):
@@ -92,13 +97,14 @@ def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent:
         held = layers.elu(graph, layers.linear(graph, latent, decoder.dense, "decoder.dense"))
         steps = layers.lstm_of_repeated(graph, held, decoder.lstm, "decoder.lstm.0", shape.window)
         steps = layers.lstm(graph, steps, decoder.lstm, "decoder.lstm", "steps", first=1)
-        rows = _reshaped(graph, steps, shape.window, shape.width)
+        steps = graph.op("Transpose", steps, perm=[1, 0, 2])
+        rows = _reshaped(graph, steps, -1, shape.width)
         flat = layers.linear(graph, rows, decoder.last, "decoder.last")
     elif isinstance(decoder, networks.AutoregressiveDecoder):
         flat = _autoregressive_decoder(graph, layers, decoder, shape, latent)
     else:
         raise TypeError(f"No ONNX form is known for the decoder {type(decoder).__name__}.")
-    return _reshaped(graph, flat, shape.window, shape.joints, 4)
+    return _reshaped(graph, flat, -1, shape.window, shape.joints, 4)
 
 
 def dense_stack(
@@ -143,12 +149,13 @@ def _reshaped(graph: Graph, x: str, *sizes: int) -> str:
 def _conv_encoder(
     graph: Graph, layers: Layers, encoder: networks.ConvEncoder, shape: Shape, window: str, out: str
 ) -> str:
-    rows = _reshaped(graph, window, shape.window, shape.pose)
-    x = layers.elu(graph, EXACT.conv_as_matmul(graph, rows, encoder.first, "encoder.first", shape.window))
-    more = layers.conv_as_matmul(graph, x, encoder.second, "encoder.second", shape.window)
-    x = graph.op("Add", x, layers.elu(graph, more))
-    channels_first = graph.op("Transpose", x, perm=[1, 0])  # torch flattens channels before time
-    flat = _reshaped(graph, channels_first, 1, shape.width * shape.window)
+    steps = _reshaped(graph, window, -1, shape.window, shape.pose)
+    x = layers.elu(graph, EXACT.conv_as_matmul(graph, steps, encoder.first, "encoder.first", shape.window))
+    steps = _reshaped(graph, x, -1, shape.window, shape.width)
+    more = layers.conv_as_matmul(graph, steps, encoder.second, "encoder.second", shape.window)
+    x = _reshaped(graph, graph.op("Add", x, layers.elu(graph, more)), -1, shape.window, shape.width)
+    channels_first = graph.op("Transpose", x, perm=[0, 2, 1])  # torch flattens channels before time
+    flat = _reshaped(graph, channels_first, -1, shape.width * shape.window)
     return layers.linear(graph, flat, encoder.last, "encoder.last", out)
 
 
@@ -156,31 +163,34 @@ def _conv_decoder(
     graph: Graph, layers: Layers, decoder: networks.ConvDecoder, shape: Shape, latent: str
 ) -> str:
     x = layers.elu(graph, layers.linear(graph, latent, decoder.first, "decoder.first"))
-    rows = graph.op("Transpose", _reshaped(graph, x, shape.width, shape.window), perm=[1, 0])
-    more = layers.conv_as_matmul(graph, rows, decoder.second, "decoder.second", shape.window)
-    rows = graph.op("Add", rows, layers.elu(graph, more))
-    return layers.conv_as_matmul(graph, rows, decoder.last, "decoder.last", shape.window)
+    steps = graph.op("Transpose", _reshaped(graph, x, -1, shape.width, shape.window), perm=[0, 2, 1])
+    more = layers.conv_as_matmul(graph, steps, decoder.second, "decoder.second", shape.window)
+    more = _reshaped(graph, layers.elu(graph, more), -1, shape.window, shape.width)
+    steps = graph.op("Add", steps, more)
+    return layers.conv_as_matmul(graph, steps, decoder.last, "decoder.last", shape.window)
 
 
 def _autoregressive_decoder(
     graph: Graph, layers: Layers, decoder: networks.AutoregressiveDecoder, shape: Shape, latent: str
 ) -> str:
-    """The steps stand one after the other: a Loop inside the Loop would not prepack its weights."""
+    """The steps stand one after the other: a Loop inside the Scan would not prepack its weights."""
     state = graph.op("Tanh", layers.linear(graph, latent, decoder.state, "decoder.state"))
     parts = [graph.name("state") for _ in range(4)]
-    graph.ops("Split", [_reshaped(graph, state, 4, 1, shape.width)], parts, axis=0, num_outputs=4)
-    wide = [_reshaped(graph, part, 1, 1, shape.width) for part in parts]
-    (h0, h1), (c0, c1) = wide[:2], wide[2:]
+    graph.ops("Split", [state], parts, axis=1, num_outputs=4)
+    h0, h1, c0, c1 = (graph.unsqueezed(part, 0) for part in parts)
     first, second = _cell(decoder.first), _cell(decoder.second)
-    pose = graph.constant("no_pose", np.zeros((1, shape.pose)))
-    poses = []
+    before = graph.constant("no_pose_before", [0, shape.pose, 0, 0], np.int64)
+    seen = graph.op("Pad", latent, before)
+    poses: list[str] = []
     for _ in range(shape.window):
-        seen = _reshaped(graph, graph.op("Concat", pose, latent, axis=1), 1, 1, shape.pose + shape.latent)
-        h0, c0 = layers.lstm_node(graph, seen, first, "decoder.cell0", ["last", "cell"], h0, c0)
+        if poses:
+            seen = graph.op("Concat", poses[-1], latent, axis=1)
+        step = graph.unsqueezed(seen, 0)
+        h0, c0 = layers.lstm_node(graph, step, first, "decoder.cell0", ["last", "cell"], h0, c0)
         h1, c1 = layers.lstm_node(graph, h0, second, "decoder.cell1", ["last", "cell"], h1, c1)
-        pose = layers.linear(graph, _reshaped(graph, h1, 1, shape.width), decoder.last, "decoder.last")
-        poses.append(pose)
-    return graph.op("Concat", *poses, axis=0)
+        rows = _reshaped(graph, h1, -1, shape.width)
+        poses.append(layers.linear(graph, rows, decoder.last, "decoder.last"))
+    return graph.op("Concat", *poses, axis=1)
 
 
 def _cell(cell: nn.LSTMCell) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The whole iteration as one ONNX graph: Loop, holding, coding and normalisation inside the file."""
+"""The whole iteration as one ONNX graph: the passes, holding, coding and normalisation inside the file."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper
 
+from appliance.show.network import network_inputs
 from appliance.studio.autoencoder.autoencoder import NEAR, Autoencoder
 from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.export import emit
@@ -18,66 +19,58 @@ from appliance.studio.export.graph import MICROSOFT, OPSET, Graph, Layers, info
 def export(
     autoencoder: Autoencoder, joints: list[str], path: Path, *, int8: bool, architecture: str
 ) -> onnx.ModelProto:
-    """Write the puppet's network file.
+    """Write the puppets' network file: the windows of P puppets in one run, each with its own iterations.
 
-    Inputs: window (T, M, 4), mask (M) bool, targets (T, M, 4), weights (M), coding_iterations and
-    interaction_iterations (int64 scalars). Outputs: poses (T, M, 4) unit quaternions, latent (Z) of the last
-    pass. What it computes is Autoencoder.iterate, node for node. Precision: float32, or dynamic int8 with u8
-    weights per channel. Joint names and sizes travel in the file's metadata.
+    Inputs: show.network.network_inputs, P of each; coding_iterations are at least 1. Liveliness, noise,
+    places and place_weights change nothing here. Outputs: poses (P, T, M, 4) unit quaternions, latent (P, Z)
+    of the last pass. What it computes is Autoencoder.iterate, node for node. Precision: float32, or dynamic
+    int8 with u8 weights per channel. Joint names and sizes travel in the file's metadata.
+
+    All rows go through as many passes as the one that has most; each is taken as its own last pass left it.
+    In int8 the rows' activations share a range, so that a row depends a little on the others
+    (docs/results.md); the same rows give the same bits.
     """
     shape = autoencoder.shape
     main = Graph()
     facing = _heading(main, shape.window)
-    poses = main.op("Concat", "window", "targets", axis=0)  # turned and aligned together
+    poses = main.op("Concat", "window", "targets", axis=1)  # turned and aligned together
     level = _turned_root(main, poses, facing, inverse=True)
     x, goal = _split_goal(main, _aligned(main, level, autoencoder.rest.cpu().numpy()), shape.window)
     goal = main.op("Mul", goal, main.constant("near", NEAR))
     weight = main.op("Mul", main.op("Cast", "mask", to=TensorProto.FLOAT), "weights")
     held = _held(main, weight, shape.joints)
     gates = _gates(main)
-    shares = _gated(main, held, gates)
+    shares = _gated(main, held, main.unsqueezed(gates, 2, 3, 4))
 
     body = Graph("pass_", main.constants)
     layers = Layers(int8)
     network = autoencoder.network
+    told = {"shares": shares}  # by its name in a pass, what each pass takes: (K, P, ..)
     if isinstance(network, Conditional):
-        told = emit.condition(main, network, shape, x, goal, weight, gates)
-        first, last = (body.op("Gather", biases, "iteration", axis=0) for biases in told)
-        own = main.op("Gather", shares, main.constant("own", [0], np.int64), axis=-1)
-        seen = body.op("Mul", "x", body.op("Gather", own, "iteration", axis=0))
+        own = main.op("Gather", shares, main.constant("first_of_last", [0], np.int64), axis=-1)
+        first, last = emit.condition(main, network, shape, x, goal, weight, gates)
+        told = {"own_share": own, "encoder_told": first, "decoder_told": last}
+        seen = body.op("Mul", "x", "own_share")
+        latent = emit.encode(body, layers, network, shape, seen, "latent_out", "encoder_told")
+        raw = emit.decode(body, layers, network, shape, latent, "decoder_told")
     else:
-        first = last = ""
-        seen = _slerp(body, "x", goal, body.op("Gather", shares, "iteration", axis=0))
-    latent = emit.encode(body, layers, network, shape, seen, "latent_out", first)
-    raw = emit.decode(body, layers, network, shape, latent, last)
+        seen = _slerp(body, "x", goal, "shares")
+        latent = emit.encode(body, layers, network, shape, seen, "latent_out")
+        raw = emit.decode(body, layers, network, shape, latent)
     body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
-    loop = helper.make_graph(
-        body.nodes,
-        "one_coding_iteration",
-        [
-            info("iteration", [], TensorProto.INT64),
-            info("going_on", [], TensorProto.BOOL),
-            info("x", [shape.window, shape.joints, 4]),
-            info("latent_in", [1, shape.latent]),
-        ],
-        [
-            info("going_on", [], TensorProto.BOOL),  # handed on
-            info("x_out", [shape.window, shape.joints, 4]),
-            info("latent_out", [1, shape.latent]),
-        ],
-    )
-    nothing = main.constant("no_latent", np.zeros((1, shape.latent)))
-    always = main.constant("always", True, np.bool_)
-    main.ops("Loop", ["coding_iterations", always, x, nothing], ["coded", "last_latent"], body=loop)
-    mirror = main.op(
-        "Cast",
-        main.op("Not", main.op("Less", "interaction_iterations", "coding_iterations")),
-        to=TensorProto.FLOAT,
-    )
-    shown = _slerp(main, "coded", goal, _gated(main, held, mirror))
+    window = [None, shape.window, shape.joints, 4]
+    inputs = [info("x", window), *(info(name, None) for name in told)]
+    outputs = [info("x_out", window), info(raw, window), info("latent_out", [None, shape.latent])]
+    one_pass = helper.make_graph(body.nodes, "one_coding_iteration", inputs, outputs)
+    every = [main.name("every_raw"), main.name("every_latent")]
+    ends = main.name("x")
+    main.ops("Scan", [x, *told.values()], [ends, *every], body=one_pass, num_scan_inputs=len(told))
+    coded = main.op("LpNormalization", _last(main, every[0]), axis=-1, p=2)
+    _last(main, every[1], out="latent")
+    mirror = main.op("Not", main.op("Less", "interaction_iterations", "coding_iterations"))
+    mirror = main.unsqueezed(main.op("Cast", mirror, to=TensorProto.FLOAT), 1, 2, 3)
+    shown = _slerp(main, coded, goal, _gated(main, held, mirror))
     _turned_root(main, shown, facing, inverse=False, out="poses")
-    flat = main.constant(f"shape_{shape.latent}", [shape.latent], np.int64)
-    main.op("Reshape", "last_latent", flat, out="latent")
 
     model = _model(main, autoencoder)
     precision = "int8" if int8 else "fp32"
@@ -99,43 +92,49 @@ def export(
 
 def _model(main: Graph, autoencoder: Autoencoder) -> onnx.ModelProto:
     shape = autoencoder.shape
-    m = shape.joints
     inputs = [
-        info("window", [shape.window, m, 4]),
-        info("mask", [m], TensorProto.BOOL),
-        info("targets", [shape.window, m, 4]),
-        info("weights", [m]),
-        info("coding_iterations", [], TensorProto.INT64),
-        info("interaction_iterations", [], TensorProto.INT64),
+        info(name, ["P", *sizes], helper.np_dtype_to_tensor_dtype(np.dtype(dtype)))
+        for name, (dtype, sizes) in network_inputs(shape.joints, shape.latent).items()
     ]
-    outputs = [info("poses", [shape.window, m, 4]), info("latent", [shape.latent])]
-    graph = helper.make_graph(main.nodes, "bunraku_puppet", inputs, outputs, main.initializers())
+    outputs = [
+        info("poses", ["P", shape.window, shape.joints, 4]),
+        info("latent", ["P", shape.latent]),
+    ]
+    graph = helper.make_graph(main.nodes, "bunraku_puppets", inputs, outputs, main.initializers())
     opsets = [helper.make_opsetid("", OPSET), helper.make_opsetid(MICROSOFT, 1)]
     return helper.make_model(graph, opset_imports=opsets, ir_version=8, producer_name="bunraku")
 
 
+def _last(graph: Graph, every: str, out: str | None = None) -> str:
+    """What each row's own last pass gave: (K, P, ..) -> (P, ..)."""
+    turned = graph.op("ReverseSequence", every, "coding_iterations", time_axis=0, batch_axis=1)
+    return graph.op("Gather", turned, graph.constant("first", 0, np.int64), out=out, axis=0)
+
+
 def _heading(graph: Graph, window: int) -> str:
-    """Twist about the vertical (4) of the root joint in the window's middle; a hair of w guards w = y = 0."""
-    middle = graph.op("Gather", "window", graph.constant("middle", window // 2, np.int64), axis=0)
-    root = graph.op("Gather", middle, graph.constant("first", 0, np.int64), axis=0)
+    """Twists about the vertical (P, 4) of the root joint in the middle of each window; a hair of w guards
+    w = y = 0.
+    """
+    middle = graph.op("Gather", "window", graph.constant("middle", window // 2, np.int64), axis=1)
+    root = graph.op("Gather", middle, graph.constant("first", 0, np.int64), axis=1)
     twist = graph.op("Mul", root, graph.constant("vertical", [1.0, 0.0, 1.0, 0.0]))
     guarded = graph.op("Add", twist, graph.constant("hair", [1e-9, 0.0, 0.0, 0.0]))
     return graph.op("LpNormalization", guarded, axis=-1, p=2)
 
 
 def _turned_root(graph: Graph, poses: str, facing: str, *, inverse: bool, out: str | None = None) -> str:
-    """The root of (P, M, 4) turned by the heading (or back): the product as a 4 x 4 matrix of the heading."""
+    """The roots of (P, N, M, 4) turned by the headings (or back): products as 4 x 4 matrices of these."""
     sign = -1.0 if inverse else 1.0
     turn = np.zeros((4, 16), dtype=np.float32)  # w and y of the heading -> transposed left matrix, row by row
     turn[0, [0, 5, 10, 15]] = 1.0
     turn[2, [2, 13]] = sign  # w -> y, z -> x
     turn[2, [8, 7]] = -sign  # y -> w, x -> z
     matrix = graph.op("MatMul", facing, graph.constant(f"turn{'_back' if inverse else ''}", turn))
-    matrix = graph.op("Reshape", matrix, graph.constant("shape_4x4", [4, 4], np.int64))
-    axis, start = graph.constant("axis1", [1], np.int64), graph.constant("at0", [0], np.int64)
+    matrix = graph.op("Reshape", matrix, graph.constant("shape_Px1x4x4", [-1, 1, 4, 4], np.int64))
+    axis, start = graph.constant("axis2", [2], np.int64), graph.constant("at0", [0], np.int64)
     one, end = graph.constant("at1", [1], np.int64), graph.constant("at_end", [1 << 31], np.int64)
     root = graph.op("MatMul", graph.op("Slice", poses, start, one, axis), matrix)
-    return graph.op("Concat", root, graph.op("Slice", poses, one, end, axis), out=out, axis=1)
+    return graph.op("Concat", root, graph.op("Slice", poses, one, end, axis), out=out, axis=2)
 
 
 def _aligned(graph: Graph, poses: str, rest: np.ndarray) -> str:
@@ -150,22 +149,23 @@ def _aligned(graph: Graph, poses: str, rest: np.ndarray) -> str:
 def _split_goal(graph: Graph, poses: str, window: int) -> tuple[str, str]:
     x, goal = graph.name("x"), graph.name("goal")
     sizes = graph.constant("window_and_goal", [window, window], np.int64)
-    graph.ops("Split", [poses, sizes], [x, goal], axis=0)
+    graph.ops("Split", [poses, sizes], [x, goal], axis=1)
     return x, goal
 
 
 def _held(graph: Graph, weight: str, joints: int) -> str:
-    """(1, M, 2): what an interactive pass adds to the shares (1, 0) of pose and target; weight (M)."""
-    column = graph.op("Reshape", weight, graph.constant(f"shape_1x{joints}x1", [1, joints, 1], np.int64))
+    """(P, 1, M, 2): what an interactive pass adds to the shares (1, 0) of pose and target; weight (P, M)."""
+    shape = graph.constant(f"shape_Px1x{joints}x1", [-1, 1, joints, 1], np.int64)
+    column = graph.op("Reshape", weight, shape)
     return graph.op("Mul", column, graph.constant("give_and_take", [[[-1.0, 1.0]]]))
 
 
 def _gates(graph: Graph) -> str:
-    """(K, 1, 1, 1): 1 in the interactive passes, 0 once they are over."""
+    """(K, P): 1 in the interactive passes of each row, 0 once they are over."""
     zero, one = graph.constant("zero_int", 0, np.int64), graph.constant("one_int", 1, np.int64)
-    passes = graph.op("Range", zero, "coding_iterations", one)
-    interactive = graph.op("Cast", graph.op("Less", passes, "interaction_iterations"), to=TensorProto.FLOAT)
-    return graph.op("Reshape", interactive, graph.constant("shape_column", [-1, 1, 1, 1], np.int64))
+    most = graph.op("ReduceMax", "coding_iterations", keepdims=0)
+    passes = graph.unsqueezed(graph.op("Range", zero, most, one), 1)
+    return graph.op("Cast", graph.op("Less", passes, "interaction_iterations"), to=TensorProto.FLOAT)
 
 
 def _gated(graph: Graph, held: str, gate: str) -> str:
@@ -174,14 +174,14 @@ def _gated(graph: Graph, held: str, gate: str) -> str:
 
 
 def _slerp(graph: Graph, x: str, goal: str, shares: str) -> str:
-    """autoencoder.slerp_towards as nodes: x (T, M, 4) towards goal (T, M, 4) by shares (1, M, 2)."""
+    """autoencoder.slerp_towards as nodes: x (P, T, M, 4) towards goal, by shares (P, 1, M, 2) of both."""
     dot = graph.op(
         "ReduceSum", graph.op("Mul", x, goal), graph.constant("axis_last", [-1], np.int64), keepdims=1
     )
     angle = graph.op("Acos", graph.op("Abs", dot))
     sines = graph.op("Sin", graph.op("Mul", angle, shares))
     of_x, of_goal = graph.name("of_x"), graph.name("of_goal")
-    graph.ops("Split", [sines], [of_x, of_goal], axis=2, num_outputs=2)
+    graph.ops("Split", [sines], [of_x, of_goal], axis=-1, num_outputs=2)
     signed = graph.op("Mul", of_goal, graph.op("Sign", dot))
     mixed = graph.op("Add", graph.op("Mul", of_x, x), graph.op("Mul", signed, goal))
     return graph.op("LpNormalization", mixed, axis=-1, p=2)

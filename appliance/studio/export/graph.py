@@ -9,6 +9,7 @@ activations quantized per call by onnxruntime's DynamicQuantize* operators.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,11 @@ class Graph:
         """Add a node with any number of outputs ('' leaves one out)."""
         self.nodes.append(helper.make_node(kind, inputs, outputs, domain=domain, **attributes))
 
+    def unsqueezed(self, x: str, *axes: int) -> str:
+        """x with new axes of size 1 at these places."""
+        name = "axes_" + "_".join(map(str, axes))
+        return self.op("Unsqueeze", x, self.constant(name, axes, np.int64))
+
     def constant(self, name: str, value: Any, dtype: Any = np.float32) -> str:
         """A constant tensor; the same name is stored once and shared with every graph around."""
         if name not in self.constants:
@@ -63,14 +69,17 @@ class Layers:
         self.int8 = int8
 
     def linear(
-        self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None, bias: str = ""
+        self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None, told: str = ""
     ) -> str:
-        """(B, in) -> (B, out); bias: a value of the graph in place of the layer's own."""
+        """(B, in) -> (B, out); told: (B, out) in place of the layer's own bias."""
         weight = _array(layer.weight).T
-        bias = bias or graph.constant(f"{name}.bias", _array(layer.bias))
+        bias = told or graph.constant(f"{name}.bias", _array(layer.bias))
         if not self.int8:
             return graph.op("Gemm", x, graph.constant(f"{name}.weight", weight), bias, out=out)
         quantized = _quantized(graph, f"{name}.weight", weight)
+        if told:  # the quantized product takes one bias for all rows
+            product = graph.op("DynamicQuantizeMatMul", x, *quantized, domain=MICROSOFT)
+            return graph.op("Add", product, told, out=out)
         return graph.op("DynamicQuantizeMatMul", x, *quantized, bias, out=out, domain=MICROSOFT)
 
     def layer_norm(
@@ -90,20 +99,18 @@ class Layers:
         return graph.op("Elu", x, alpha=1.0)
 
     def conv_as_matmul(self, graph: Graph, x: str, layer: nn.Conv1d, name: str, steps: int) -> str:
-        """A short convolution over (1, steps, in) as shifted matrix products: (steps, in) -> (steps, out).
+        """A short convolution over (P, steps, in) as shifted matrix products: rows (P * steps, out).
 
         Three rows side by side (zeros at the ends) times one matrix: quantizes like any dense layer.
         """
         taps = layer.kernel_size[0]
-        pad = graph.constant(f"pad{taps // 2}", [taps // 2, 0, taps // 2, 0], np.int64)
+        pad = graph.constant(f"pad{taps // 2}", [0, taps // 2, 0, 0, taps // 2, 0], np.int64)
         padded = graph.op("Pad", x, pad)
         rows = np.arange(steps)[:, None] + np.arange(taps)
         at = graph.constant(f"taps{taps}x{steps}", rows, np.int64)
-        wide = graph.op("Gather", padded, at, axis=0)  # (steps, taps, in)
-        shape = graph.constant(
-            f"wide{steps}x{taps * layer.in_channels}", [steps, taps * layer.in_channels], np.int64
-        )
-        flat = graph.op("Reshape", wide, shape)
+        wide = graph.op("Gather", padded, at, axis=1)  # (P, steps, taps, in)
+        sizes = [-1, taps * layer.in_channels]
+        flat = graph.op("Reshape", wide, graph.constant(f"wide{sizes[1]}", sizes, np.int64))
         weight = _array(layer.weight).transpose(2, 1, 0).reshape(taps * layer.in_channels, layer.out_channels)
         dense = nn.Linear(weight.shape[0], weight.shape[1])
         dense.weight.data = torch.from_numpy(weight.T.copy())
@@ -112,7 +119,7 @@ class Layers:
         return self.linear(graph, flat, dense, name)
 
     def lstm(self, graph: Graph, x: str, layer: nn.LSTM, name: str, keep: str, first: int = 0) -> str:
-        """(T, 1, in) -> all steps (T, 1, H) for keep='steps', the last (1, H) for keep='last'."""
+        """(T, P, in) -> all steps (T, P, H) for keep='steps', the last (P, H) for keep='last'."""
         for level in range(first, layer.num_layers):
             last = keep == "last" and level == layer.num_layers - 1
             kind = "last" if last else "steps"
@@ -150,20 +157,10 @@ class Layers:
         return [out for out in outputs if out]
 
     def lstm_of_repeated(self, graph: Graph, x: str, layer: nn.LSTM, name: str, steps: int) -> str:
-        """First level of an LSTM whose input (1, in) is the same at each step: (steps, 1, H).
-
-        The input's product with its weights is computed once and handed over as the bias; the node itself
-        gets steps of nothing. Saves steps - 1 of the products.
-        """
-        w, r, b = _level(layer, 0)
-        size = r.shape[-1]
-        dense = nn.Linear(w.shape[-1], 4 * size)
-        dense.weight.data, dense.bias.data = torch.from_numpy(w[0]), torch.from_numpy(b[0, : 4 * size])
-        held = self.linear(graph, x, dense, f"{name}.input")
-        bias = graph.op("Concat", held, graph.constant(f"{name}.recurrent", b[:, 4 * size :]), axis=1)
-        nothing = graph.constant(f"nothing{steps}", np.zeros((steps, 1, 1)))
-        weights = (np.zeros((1, 4 * size, 1), dtype=np.float32), r, b)
-        out = self.lstm_node(graph, nothing, weights, name, ["steps"], bias=bias)[0]
+        """First level of an LSTM whose inputs (P, in) are the same at each step: (steps, P, H)."""
+        sizes = graph.constant(f"repeated{steps}", [steps, 1, 1], np.int64)
+        repeated = graph.op("Expand", graph.unsqueezed(x, 0), sizes)
+        out = self.lstm_node(graph, repeated, _level(layer, 0), name, ["steps"])[0]
         return graph.op("Squeeze", out, graph.constant("axis1", [1], np.int64))
 
 
@@ -185,7 +182,9 @@ def lstm_weights(
     return ordered(weight_ih)[None], ordered(weight_hh)[None], bias[None]
 
 
-def info(name: str, shape: list[int], kind: int = TensorProto.FLOAT) -> onnx.ValueInfoProto:
+def info(
+    name: str, shape: Sequence[int | str | None] | None, kind: int = TensorProto.FLOAT
+) -> onnx.ValueInfoProto:
     return helper.make_tensor_value_info(name, kind, shape)
 
 
