@@ -58,7 +58,19 @@ class Blending:
         if not 1 <= ticks <= self._window:
             raise ValueError(f"hop is {ticks}; a window of {self._window} poses allows 1 to {self._window}.")
         self._hop = ticks
-        self._weights[:] = np.repeat(weights(self._window, ticks, self._shape), self._joints)
+        counted = weights(self._window, ticks, self._shape)
+        self._weights[:] = np.repeat(counted, self._joints)
+        self._shares: FloatArray = counted / counted.sum()
+
+    @property
+    def shares(self) -> FloatArray:
+        """(window,): how much of a blended pose comes from each pose of a window; their sum is 1."""
+        return self._shares
+
+    @property
+    def ahead(self) -> float:
+        """Ticks from the start of a window to what is used of it on average."""
+        return float(self._shares @ np.arange(self._window))
 
     @property
     def is_due(self) -> bool:

@@ -112,6 +112,11 @@ class Hands:
             self.holds[self._placed_at[0]] = self._hips.held_weight
 
     @property
+    def has_places(self) -> bool:
+        """Whether any of them holds its joint by place."""
+        return bool(self._placed)
+
+    @property
     def hips_drawn(self) -> tuple[float, float, float]:
         """Where the last pull drew the root: x and z on the puppet's own floor (metres), and the weight."""
         if self._hips is None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from appliance.box.clock import TICK_S
 from appliance.box.live_pose import LivePose, LivePoseReader
 from appliance.box.realtime import borrowed_priority
 from appliance.dancer.blending import Blending
@@ -224,6 +225,8 @@ def _dance(parts: StageParts, show: Show) -> Callable[[int, int], object]:
     for one, most in zip(parts.puppets, show.config.iterations_of_puppets, strict=True):
         mask = one.hands.mask.copy()
         mask[one.hand_places] = True
+        mask &= ~one.hands.by_place
+        one.puppet.place_weights[:] = one.hands.by_place
         one.puppet.select(one.motion.window())
         held.append((one.puppet, most, (mask, one.hands.targets, one.hands.weights)))
 
@@ -293,19 +296,23 @@ def _stage_puppet(
     hands, grounding = config.hands_of_puppets[number], Grounding(show.skeleton, floor)
     puppeteers = puppeteers_of(show, hands, puppet, grounding)
     joints, window, placed = puppet.joints, puppet.network.window, config.puppets
+    blending = Blending(len(joints), window, config.dancer.hop, config.dancer.blending)
+    place = Place(placed[number], motion.roots()[0]) if placed else None
     made = StagePuppet(
         puppet=puppet,
         motion=motion,
-        blending=Blending(len(joints), window, config.dancer.hop, config.dancer.blending),
+        blending=blending,
         grounding=grounding,
-        hands=Hands(puppeteers, joints, window),
+        hands=Hands(
+            puppeteers, joints, window, None if place is None else place.placement, TICK_S * blending.ahead
+        ),
         hand_places=[joints.index(hand.joint) for hand in hands],
         iterations=Iterations(*times, MOST_ITERATIONS, times),
         frame=JointFrame(len(show.skeleton)),
         crossfade_s=config.motion.crossfade_s,
         live=Live(len(show.skeleton), window) if config.motion.live else None,
         springs=next((one for one in puppeteers if isinstance(one, Springs)), None),
-        place=Place(placed[number], motion.roots()[0]) if placed else None,
+        place=place,
     )
     if number and placed[number].phrase == LIVE:
         made.play(LIVE, 0.0)

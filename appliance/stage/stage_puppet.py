@@ -17,7 +17,7 @@ from appliance.dancer.live import Live
 from appliance.dancer.loop import Placement, turns_about_y
 from appliance.dancer.material.material_file import Material
 from appliance.dancer.motion_source import Playback
-from appliance.dancer.puppet import Puppet
+from appliance.dancer.puppet import Puppet, weights_of_one_pass
 from appliance.dancer.slerp import FloatArray
 from appliance.dancer.springs import Springs
 from appliance.outputs.joint_frame import JointFrame
@@ -36,6 +36,7 @@ class Place:
         """root (3,): of the puppet's first pose, metres."""
         moved = Placement(math.radians(config.turned), config.x, config.z)
         moved = moved.after(Placement(0.0, -float(root[0]), -float(root[2])))
+        self.placement = moved  # from the puppet's own floor to the stage
         x, z = moved.x, moved.z
         cosine, sine = math.cos(moved.yaw), math.sin(moved.yaw)
         self._turn = turns_about_y(np.array(moved.yaw)).astype(np.float32)
@@ -111,9 +112,15 @@ class StagePuppet:
     def pull(self, now: float) -> None:
         """Let the hands say where they hold their joints, and give all to the network."""
         hands, times, row = self.hands, self.iterations, self.puppet
-        hands.pull(now, self._window)
+        if hands.has_places:
+            path = self.blending.shares @ self._roots + self.grounding.shift
+            hands.pull(now, self._window, path, self.grounding.figure.positions)
+            self.grounding.draw_hips(*hands.hips_drawn)
+        else:
+            hands.pull(now, self._window)
         row.hold(hands.mask, hands.targets, hands.weights, times.coding, times.interaction)
-        row.places[:], row.place_weights[:] = hands.places, hands.place_weights
+        row.places[:] = hands.places
+        row.place_weights[:] = weights_of_one_pass(hands.place_weights, times.interaction)
         row.liveliness, row.noise[:] = self.liveliness, self.noise
 
     def blend(self) -> None:
@@ -129,7 +136,7 @@ class StagePuppet:
     def stand(self) -> None:
         """Put the danced pose on the floor and into the world."""
         frame, grounding = self.frame, self.grounding
-        self.puppet.restore(self.hands.weights, frame.holds)
+        self.puppet.restore(self.hands.holds, frame.holds)
         figure = grounding.ground_pose(
             self._danced,
             self._roots[0],

@@ -1,0 +1,127 @@
+"""Joints held by place on the stage: what the network is given, the hips, turned puppets, and the replay."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.dancer.held_places import in_room
+from appliance.dancer.puppet import weights_of_one_pass
+from appliance.pose import quaternion
+from appliance.recorder.reading import read_journal
+from appliance.show.show import load_show
+from appliance.stage.comparison import Comparison
+from appliance.stage.replay import Replay
+from tests.bundles import FIGURE, MOVING, write_show
+from tests.recorder.night import Night
+
+ARM, LEG = "lForeArm", "lThigh"
+HANDS: list[dict[str, object]] = [
+    {"osc": True, "joint": ARM, "by": "position"},
+    {"osc": True, "joint": "Hips", "by": "position"},
+    {"fixed": {"orientation": [0.8, 0.6, 0, 0]}, "joint": "rThigh"},
+]
+PLACE = (0.35, 1.2, 0.2)
+
+
+@pytest.fixture
+def night(tmp_path: Path) -> Iterator[Night]:
+    night = Night(write_show(tmp_path / "show", HANDS), tmp_path / "runtime")
+    with contextlib.closing(night.recorder):
+        yield night
+    night.parts.close()
+
+
+def given(night: Night, puppet: int = 0) -> np.ndarray:
+    """The arm's place (3,) that the network has, back in the room."""
+    one = night.parts.puppets[puppet]
+    window = one.puppet.window
+    facing, root = quaternion.heading(window[len(window) // 2, 0]), one.grounding.root
+    placed = in_room(one.puppet.places[MOVING.index(ARM)], root, facing)
+    if one.place is None:
+        return placed
+    x, z = one.place.placement.point(placed[0], placed[2])
+    return np.array([x, placed[1], z])
+
+
+def test_the_network_is_given_the_place_and_the_weight_of_one_pass(night: Night) -> None:
+    row, arm = night.parts.first.puppet, MOVING.index(ARM)
+    night.dance(20)
+    assert not row.place_weights.any()
+    night.order("place", *PLACE, text=ARM)
+    night.dance(15)
+    growing = float(night.parts.hands.place_weights[arm])
+    assert 0.1 < growing < 0.9
+    assert row.place_weights[arm] == pytest.approx(weights_of_one_pass(np.float32(growing), 2), abs=1e-6)
+    night.dance(60)
+    assert given(night) == pytest.approx(PLACE, abs=5e-3)
+    assert row.place_weights.tolist() == [float(joint == ARM) for joint in MOVING]
+    assert night.tick.frame.holds[FIGURE.index(ARM)] == 1.0
+    night.order("release", text=ARM)
+    night.dance(60)
+    assert not row.place_weights.any()
+    assert night.tick.frame.holds[FIGURE.index(ARM)] == 0.0
+
+
+def test_a_turned_puppet_has_the_place_in_the_room(tmp_path: Path) -> None:
+    puppets = [
+        {"name": "left", "x": -0.8},
+        {"name": "right", "x": 1.0, "z": -0.5, "turned": 70, "hands": [dict(HANDS[0])]},
+    ]
+    night = Night(write_show(tmp_path / "show", HANDS, puppets=puppets), tmp_path / "runtime")
+    place = (1.2, 1.2, -0.3)
+    night.order("place", *place, text=ARM)
+    night.dance(80)
+    assert given(night, 1) == pytest.approx(place, abs=5e-3)
+    frame = night.parts.puppets[1].frame
+    reach = np.linalg.norm(frame.positions[FIGURE.index(ARM)] - frame.root)
+    assert reach < 1.0  # else the place would be no place of that puppet
+    night.parts.close()
+
+
+def test_the_hips_go_to_their_place_with_the_feet_on_the_floor(night: Night) -> None:
+    night.dance(20)
+    begun = night.tick.frame.root.copy()
+    night.order("place", 0.4, 0.3, -0.3, text="Hips")
+    roots = []
+    for _ in range(200):
+        night.dance(1)
+        roots.append(night.tick.frame.root.copy())
+        assert not night.parts.first.puppet.place_weights.any()
+    assert roots[-1][[0, 2]] == pytest.approx([0.4, -0.3], abs=0.02)
+    assert roots[-1][1] == pytest.approx(begun[1], abs=0.05)  # the height is the legs'
+    assert np.linalg.norm(np.diff(roots, axis=0), axis=1).max() < 0.03
+    assert night.tick.frame.holds[FIGURE.index("Hips")] == 1.0
+
+
+def test_a_night_with_places_dances_again_bit_for_bit(night: Night, tmp_path: Path) -> None:
+    night.dance(30)
+    night.order("place", *PLACE, text=ARM)
+    night.dance(200)
+    night.order("place", 0.5, 1.0, 0.0, text="Hips")
+    night.order("place", -0.2, 1.3, 0.3, 0.4, text=ARM)
+    night.dance(500)
+    night.order("hand", 0.0, text="Hips")
+    night.order("hand", 1.0, text=ARM)
+    night.dance(100)
+    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    hands = run.header["hands"]
+    assert [hand["by"] for hand in hands] == ["position", "position", "orientation"]
+    places = run.ticks["targets"][:, 0]
+    assert not places[:, 0].any() and len(np.unique(places, axis=0)) > 100
+    assert run.ticks["weights"][200].tolist() == pytest.approx([1.0, 0.0, 1.0])
+    for from_s in (0.0, 12.0):
+        replay = Replay(run, load_show(tmp_path / "show"))
+        comparison = Comparison(float(run.ticks["frame_time"][0]), 0.0)
+        for _ in replay.dance(comparison, from_s):
+            pass
+        assert comparison.first is None
+        assert comparison.ticks > 200
+        row, again = night.parts.first.puppet, replay.tick.parts.first.puppet
+        assert again.places.tobytes() == row.places.tobytes()
+        assert again.place_weights.tobytes() == row.place_weights.tobytes()
+        assert row.place_weights.any()
