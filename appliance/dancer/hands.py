@@ -140,7 +140,11 @@ class Hands:
                 x, z, weight = self.hips_drawn
                 root = [path[0] + weight * (x - path[0]), path[1], path[2] + weight * (z - path[2])]
         facing = quaternion.heading(window[len(window) // 2, 0])
-        self.places[self._placed_at] = in_figure(self._points, np.array(root, np.float32), facing)
+        found = in_figure(self._points, np.array(root, np.float32), facing)
+        for row, puppeteer in enumerate(self._placed):
+            if puppeteer.habitual is not None:
+                found[row] = puppeteer.habitual.bounded(found[row])
+        self.places[self._placed_at] = found
 
     def _pull_orientations(self, now: float, window: FloatArray) -> None:
         np.copyto(self._before, self._present)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from appliance.dancer.puppeteers import Puppeteer
+from appliance.dancer.reach import Reach
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
@@ -64,8 +65,10 @@ class HeldPlace(Puppeteer):
 
     The place starts where the joint is when the hand takes it, and follows what it is told within Limits: a
     place that jumps moves the figure no faster than a dancer does. It stays above the floor and within
-    `reach` of the root.
+    `reach` of the root. habitual: where this dancer's joint goes at all, if known.
     """
+
+    habitual: Reach | None = None
 
     def __init__(self, joint: str, skeleton: Skeleton, weight: float = 1.0) -> None:
         super().__init__(joint, weight)

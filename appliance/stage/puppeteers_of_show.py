@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from appliance.dancer.grounding import Grounding
-from appliance.dancer.held_places import FixedPlace, RemotePlace
+from appliance.dancer.held_places import FixedPlace, HeldPlace, RemotePlace
+from appliance.dancer.played import Played
 from appliance.dancer.puppet import Puppet
 from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
+from appliance.dancer.reach import reach_in
 from appliance.dancer.springs import Springs
 from appliance.pose.skeleton import Skeleton
 from appliance.sensor.neutral import Mounting, joint_from_reading
@@ -18,9 +20,11 @@ from appliance.stage.stage_error import StageError
 
 
 def puppeteers_of(
-    show: Show, hands: Sequence[HandConfig], puppet: Puppet, grounding: Grounding
+    show: Show, hands: Sequence[HandConfig], puppet: Puppet, grounding: Grounding, motion: Played
 ) -> list[Puppeteer]:
-    """The hands of one puppet in their order; springs know the others, whose joints they leave alone."""
+    """The hands of one puppet in their order; springs know the others, whose joints they leave alone, and
+    hands by place where its phrases take their joints.
+    """
     made = {
         place: _puppeteer(hand, show.skeleton) for place, hand in enumerate(hands) if hand.springs is None
     }
@@ -32,6 +36,10 @@ def puppeteers_of(
                 made[place] = Springs(*facts, hand.springs, hand.weight, others, show.config.strings)
             except ValueError as error:
                 raise StageError(f"{show.file.path}: {error}") from error
+    for one in others:
+        if isinstance(one, HeldPlace) and not one.is_root:
+            phrases = [motion.loop_of(name).poses for name in motion.phrases]
+            one.habitual = reach_in(phrases, show.skeleton, one.number)
     for place, hand in enumerate(hands):
         made[place].enabled = hand.from_start
     return [made[place] for place in range(len(hands))]

@@ -294,7 +294,7 @@ def _stage_puppet(
     """One of the show's puppets; the first one has number 0."""
     config, times = show.config, show.config.iterations_of_puppets[number]
     hands, grounding = config.hands_of_puppets[number], Grounding(show.skeleton, floor)
-    puppeteers = puppeteers_of(show, hands, puppet, grounding)
+    puppeteers = puppeteers_of(show, hands, puppet, grounding, motion)
     joints, window, placed = puppet.joints, puppet.network.window, config.puppets
     blending = Blending(len(joints), window, config.dancer.hop, config.dancer.blending)
     place = Place(placed[number], motion.roots()[0]) if placed else None

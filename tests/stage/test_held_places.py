@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.dancer.held_places import in_room
+from appliance.dancer.held_places import HeldPlace, in_room
 from appliance.dancer.puppet import weights_of_one_pass
 from appliance.pose import quaternion
 from appliance.recorder.reading import read_journal
@@ -25,7 +25,7 @@ HANDS: list[dict[str, object]] = [
     {"osc": True, "joint": "Hips", "by": "position"},
     {"fixed": {"orientation": [0.8, 0.6, 0, 0]}, "joint": "rThigh"},
 ]
-PLACE = (0.35, 1.2, 0.2)
+PLACE = (0.45, 1.4, 0.08)
 
 
 @pytest.fixture
@@ -67,13 +67,26 @@ def test_the_network_is_given_the_place_and_the_weight_of_one_pass(night: Night)
     assert night.tick.frame.holds[FIGURE.index(ARM)] == 0.0
 
 
+def test_a_place_that_this_dancer_never_goes_to_is_brought_within_its_reach(night: Night) -> None:
+    night.order("place", 0.4, 1.0, -0.5, text=ARM)
+    night.dance(80)
+    away = given(night) - np.array((0.4, 1.0, -0.5))
+    assert np.linalg.norm(away) > 0.1
+    hand = night.parts.hands.puppeteers[0]
+    assert isinstance(hand, HeldPlace) and hand.habitual is not None
+    row = night.parts.first.puppet.places[MOVING.index(ARM)]
+    assert hand.habitual.bounded(row) == pytest.approx(row, abs=1e-5)
+
+
 def test_a_turned_puppet_has_the_place_in_the_room(tmp_path: Path) -> None:
     puppets = [
         {"name": "left", "x": -0.8},
         {"name": "right", "x": 1.0, "z": -0.5, "turned": 70, "hands": [dict(HANDS[0])]},
     ]
     night = Night(write_show(tmp_path / "show", HANDS, puppets=puppets), tmp_path / "runtime")
-    place = (1.2, 1.2, -0.3)
+    night.dance(20)
+    x, y, z = night.parts.puppets[1].frame.positions[FIGURE.index(ARM)].tolist()
+    place = (x, y - 0.05, z - 0.05)
     night.order("place", *place, text=ARM)
     night.dance(80)
     assert given(night, 1) == pytest.approx(place, abs=5e-3)
