@@ -28,7 +28,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 class NetworkName(StrEnum):
     """Architectures, by their names in architectures.NETWORKS; models.MODELS says which a model takes."""
 
-    conditional = "conditional"
+    coupled = "coupled"
     mlp = "mlp"
     conv = "conv"
     lstm = "lstm"
@@ -84,7 +84,7 @@ def train(
         typer.Option(
             help="Architecture. As published: lstm (puppet), dense64 (pose), lstm384 (sequence), "
             "lstm-mixtures (improviser).",
-            show_default="conditional; mlp; of improvisers moves",
+            show_default="coupled; mlp; of improvisers moves",
         ),
     ] = None,
     window: Annotated[
@@ -104,7 +104,7 @@ def train(
     latent: Annotated[int, typer.Option(min=0, help="Size of the latent. 0: as the network has it.")] = 0,
     width: Annotated[int, typer.Option(min=0, help="Width of the layers. 0: as the network has it.")] = 0,
     depth: Annotated[
-        int, typer.Option(min=0, help="Blocks of conditional and mlp, layers of an lstm. 0: its own.")
+        int, typer.Option(min=0, help="Blocks of coupled and mlp, layers of an lstm. 0: its own.")
     ] = 0,
     mixtures: Annotated[
         int, typer.Option(min=0, max=64, help="Gaussians of an improviser; published: 3 to 25. 0: its own.")
@@ -215,6 +215,12 @@ def evaluate(
         typer.Option(help="K/J, coding and interaction iterations; repeatable. Default: 1/1 to 30/29."),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG: phrase, pasted arm, dancer's answer.")] = None,
+    other_dancer: Annotated[
+        Path | None, typer.Option(help="Folder of another dancer's recordings: the ceiling of FID.")
+    ] = None,
+    baselines: Annotated[
+        bool, typer.Option(help="Critic, coupling, motion matching and more beside --hands.")
+    ] = True,
     *,
     reading: ReadingOptions,
 ) -> None:
@@ -233,6 +239,8 @@ def evaluate(
                 joints=tuple(joint or ()),
                 iterations=tuple(iterations or ()),
                 picture=picture,
+                other_dancer=other_dancer,
+                compared=baselines,
             )
         )
 

@@ -15,7 +15,6 @@ from appliance.studio.studio_error import StudioError
 from appliance.studio.train_options import TrainOptions
 
 LEARNING_RATE = 2e-4  # a fifth of a new network's: at that one it forgets in 200 steps what it knows
-ENERGY_SHARE = 1.05  # asked for a new network's, one that has learned to move moves more than the dance
 _OF_THE_NETWORK = ("network", "window", "latent", "width", "depth")
 
 
@@ -51,8 +50,7 @@ def settings_of(start: TorchCoder, settings: AnySettings, options: TrainOptions)
         width=shape.width,
         depth=shape.depth,
         learning_rate=options.learning_rate or LEARNING_RATE,
-        weights=replace(settings.weights, energy_share=ENERGY_SHARE),
-        answers=replace(settings.answers, full_progress=0.0),  # it can already take all passes
+        alive_from=0.0,
     )
 
 

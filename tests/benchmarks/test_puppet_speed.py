@@ -26,7 +26,7 @@ from tests.studio.tiny import moving, skeleton, swaying
 GROUP = "ten coding iterations, one thread"
 NAMES = [skeleton().names[j] for j in moving()]
 TITLES = {
-    "conditional": "default",
+    "coupled": "default",
     "mlp": "plain mlp",
     "lstm": "paper's LSTM",
     "lstm-autoregressive": "paper's LSTM, autoregressive",

@@ -10,7 +10,7 @@ from torch import Tensor
 from appliance.studio.autoencoder import losses, rotation
 from appliance.studio.autoencoder.architectures import NETWORKS
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.autoencoder.conditional import matrix_of_products
+from appliance.studio.autoencoder.coupled import CALM, Coupled, matrix_of_products
 from appliance.studio.autoencoder.held_joints import HeldJoints
 from tests.studio.tiny import moving, swaying, untrained
 
@@ -83,23 +83,64 @@ def test_each_window_of_a_batch_may_have_targets_and_weights_of_its_own() -> Non
         torch.testing.assert_close(together[place], alone[0], atol=1e-5, rtol=0)
 
 
-def test_a_conditional_network_sees_rotations_not_quaternions() -> None:
+def coupled_pull(autoencoder: Autoencoder, goal: Tensor, held: Tensor, **changed: Tensor) -> Tensor:
+    network, windows = autoencoder.network, some_windows()
+    assert isinstance(network, Coupled)
+    latents, whole = autoencoder.encode(windows), torch.ones(len(windows))
+    given = {"liveliness": whole, "noise": torch.zeros_like(latents), **changed}
+    return network.pull(latents, windows, goal, held, **given)
+
+
+def holding(autoencoder: Autoencoder, joint: int = 3) -> Tensor:
+    held = torch.zeros(len(some_windows()), autoencoder.shape.joints)
+    held[:, joint] = 1.0
+    return held
+
+
+def test_a_coupled_network_sees_rotations_not_quaternions() -> None:
     """A target and its negative are the same rotation: a hand that passes half a turn makes no jump."""
-    autoencoder, windows = untrained("conditional"), some_windows()
-    held = torch.zeros(len(windows), autoencoder.shape.joints)
-    held[:, 3] = 1.0
-    latents = autoencoder.encode_held(windows, windows, windows.roll(1, 0), held)
-    torch.testing.assert_close(autoencoder.encode_held(windows, windows, -windows.roll(1, 0), held), latents)
-    elsewhere = windows.clone()
-    elsewhere[:, :, 3] = windows[:, :, 4]  # where a held joint was does not matter
-    torch.testing.assert_close(autoencoder.encode_held(elsewhere, windows, windows.roll(1, 0), held), latents)
+    autoencoder, goal = untrained("coupled"), some_windows().roll(1, 0)
+    held = holding(autoencoder)
+    pull = coupled_pull(autoencoder, goal, held)
+    assert pull.abs().max() > 1e-3
+    torch.testing.assert_close(coupled_pull(autoencoder, -goal, held), pull)
+    elsewhere = goal.clone()
+    elsewhere[:, :, 5] = goal[:, :, 4]  # where joints that nothing holds are wanted does not matter
+    torch.testing.assert_close(coupled_pull(autoencoder, elsewhere, held), pull)
+
+
+def test_a_hand_where_the_phrase_has_its_joint_pulls_nothing() -> None:
+    autoencoder = untrained("coupled")
+    pull = coupled_pull(autoencoder, some_windows(), holding(autoencoder))
+    torch.testing.assert_close(pull, torch.zeros_like(pull), atol=1e-6, rtol=0)
+
+
+def test_less_liveliness_leaves_less_of_the_phrases_own() -> None:
+    """Without liveliness, CALM of what distinguishes the window from the usual one stays."""
+    autoencoder, windows = untrained("coupled"), some_windows()
+    assert isinstance(autoencoder.network, Coupled)
+    held, latents = holding(autoencoder), autoencoder.encode(windows)
+    usual = autoencoder.network.hands(latents, windows, held)
+    pull = coupled_pull(autoencoder, windows, held, liveliness=torch.zeros(len(windows)))
+    torch.testing.assert_close(latents + pull - usual, CALM * (latents - usual), atol=1e-5, rtol=0)
+
+
+def test_noise_moves_a_held_dance_and_no_free_one() -> None:
+    autoencoder, windows = untrained("coupled"), some_windows()
+    noise = torch.ones(autoencoder.shape.latent)
+    hand = held(autoencoder)
+    plain, drawn = (autoencoder.iterate(windows, 3, 2, hand, noise=each)[0] for each in (None, noise))
+    assert rotation.angle_between(plain, drawn).max() > 1e-4
+    plain, drawn = (autoencoder.iterate(windows, 3, 0, None, noise=each)[0] for each in (None, noise))
+    assert torch.equal(plain, drawn)
 
 
 def test_a_hand_without_weight_is_no_hand() -> None:
-    autoencoder, windows = untrained("conditional"), some_windows()
-    nothing = torch.zeros(len(windows), autoencoder.shape.joints)
-    told = autoencoder.encode_held(windows, windows, windows.roll(1, 0), nothing)
-    torch.testing.assert_close(told, autoencoder.encode(windows))
+    autoencoder, windows = untrained("coupled"), some_windows()
+    hand = held(autoencoder)
+    nothing = hand._replace(weights=torch.zeros_like(hand.weights))
+    made, free = autoencoder.iterate(windows, 3, 2, nothing)[0], autoencoder.iterate(windows, 3)[0]
+    torch.testing.assert_close(made, free)
 
 
 def test_the_matrix_of_products_is_the_rotation() -> None:
@@ -117,8 +158,7 @@ def test_the_priors_gradient_reaches_every_layer_of_the_encoder(network: str) ->
     autoencoder = untrained(network).requires_grad_(True)
     critic = PriorCritic(autoencoder.shape.latent)
     windows = some_windows()
-    held = torch.ones(len(windows), autoencoder.shape.joints) / 2
-    losses.prior_loss(critic, autoencoder.encode_held(windows, windows, windows, held)).backward()
+    losses.prior_loss(critic, autoencoder.encode(windows)).backward()
     for name, parameter in autoencoder.network.encoder.named_parameters():
         assert parameter.grad is not None and parameter.grad.abs().max() > 0, name
     assert all(p.grad is None for p in autoencoder.network.decoder.parameters())

@@ -38,7 +38,7 @@ def test_the_command_writes_page_strips_recordings_and_figures_of_two_networks_s
     )
     report = json.loads((tmp_path / "out/experiments.json").read_text())
     assert report["excerpts"]["mine"]["take"] == "solo"
-    assert [name.partition(",")[0] for name in report["networks"]] == ["conditional", "mlp"]
+    assert [name.partition(",")[0] for name in report["networks"]] == ["coupled", "mlp"]
     for network in report["networks"].values():
         assert set(network["claims"]) == set("abcdefg")
     page = (tmp_path / "out/experiments.html").read_text()
@@ -50,6 +50,6 @@ def test_the_command_writes_page_strips_recordings_and_figures_of_two_networks_s
     assert "http" not in page, "it opens without a network"
     assert page.count("data:image/jpeg;base64,") == (13 if long_run else 0)
     assert (tmp_path / "out/experiments.png").exists() == long_run
-    danced = sorted((tmp_path / "out").glob("conditional*/mine/*.bvh"))
+    danced = sorted((tmp_path / "out").glob("coupled*/mine/*.bvh"))
     assert len(danced) == len(CONDITIONS) + 1
     assert len(read_bvh(next(path for path in danced if path.name == "turning_5s_10_10.bvh"))) == 750

@@ -28,7 +28,7 @@ def constants(path: Path) -> dict[str, np.ndarray]:
     return {each.name: numpy_helper.to_array(each) for each in onnx.load(path).graph.initializer}
 
 
-@pytest.mark.parametrize("network", ["conditional", "mlp"])
+@pytest.mark.parametrize("network", ["coupled", "mlp"])
 def test_what_is_read_back_computes_what_the_file_computes(tmp_path: Path, network: str) -> None:
     file, count = tmp_path / "puppet.onnx", len(NAMES)
     export(untrained(network), NAMES, file, int8=False, architecture=network)

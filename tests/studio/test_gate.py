@@ -62,11 +62,11 @@ def test_the_gate_looks_at_the_answer_to_hands_too(tmp_path: Path) -> None:
         def iterate(self, windows, coding_iterations, interaction_iterations=0, *held):  # type: ignore[no-untyped-def]
             return super().iterate(windows, coding_iterations)
 
-    path, autoencoder = tmp_path / "fp32.onnx", untrained("conditional")
+    path, autoencoder = tmp_path / "fp32.onnx", untrained("coupled")
     with torch.no_grad():
         autoencoder.network.encoder.told.weight *= 30
         autoencoder.network.decoder.stack[-1].weight *= 5
-    export(autoencoder, NAMES, path, int8=False, architecture="conditional")
+    export(autoencoder, NAMES, path, int8=False, architecture="coupled")
     verdict = gate.judge(OnnxCoder(path), Deaf(path), some_windows(8).numpy())
     assert verdict.mean["10"] == 0.0
     assert verdict.mean["10/9"] > 1.5 and not verdict.passed

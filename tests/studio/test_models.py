@@ -71,7 +71,7 @@ def test_a_variational_model_is_drawn_to_the_prior_by_the_weight_of_its_divergen
         ("pose", "lstm", 0, "has the networks mlp, dense64, not lstm"),
         ("pose", None, 8, "takes one pose"),
         ("sequence", None, 8, "takes 16 to 128 poses"),
-        ("puppet", "dense64", 0, "has the networks conditional"),
+        ("puppet", "dense64", 0, "has the networks coupled"),
     ],
 )
 def test_what_does_not_fit_a_model_is_refused(

@@ -122,7 +122,7 @@ def test_networks_compute_in_bfloat16_on_a_gpu_alone(dancer: Dataset) -> None:
     assert asked == [("cuda", torch.bfloat16, True), ("cuda", torch.bfloat16, False)]
 
 
-@pytest.mark.parametrize("network", ["mlp", "conditional"])
+@pytest.mark.parametrize("network", ["mlp", "coupled"])
 def test_losses_stay_fp32_where_networks_compute_in_bfloat16(dancer: Dataset, network: str) -> None:
     """As on a GPU, by the processor's own bfloat16."""
     training = Training(dancer, Settings(network=network, steps=30, width=32, latent=8, batch=32))

@@ -16,8 +16,8 @@ from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder
 from appliance.studio.data.dataset import Dataset, load_dataset
 
-FEW = AnswerSettings(reserve=96, wandering=16, nearness=Nearness(neighbours=4, searched=256))
-TINY = Settings(steps=40, width=32, latent=12, batch=32, answers=FEW)
+FEW = AnswerSettings(reserve=96, uses=2, nearness=Nearness(searched=256))
+TINY = Settings(network="coupled", steps=40, width=32, latent=12, batch=32, answers=FEW, sequences=4)
 
 
 @pytest.fixture(scope="module")
@@ -44,10 +44,10 @@ def same(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
-LEARNED = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer", "lessons", "random", "step")
+LEARNED = (*Training.saved, "lessons", "sequences", "random", "step")
 
 
-@pytest.mark.parametrize("network", ["conditional", "mlp", "lstm"])
+@pytest.mark.parametrize("network", ["coupled", "mlp", "lstm"])
 def test_interrupted_and_resumed_is_uninterrupted_bit_for_bit(
     dancer: Dataset, tmp_path: Path, network: str
 ) -> None:
@@ -79,7 +79,7 @@ def test_the_seed_alone_decides(dancer: Dataset, tmp_path: Path) -> None:
     assert same(weights[0], weights[1]) and not same(weights[0], weights[2])
 
 
-@pytest.mark.parametrize(("network", "steps"), [("mlp", 200), ("conditional", 300)])
+@pytest.mark.parametrize(("network", "steps"), [("mlp", 200), ("coupled", 300)])
 def test_training_reduces_the_error(dancer: Dataset, tmp_path: Path, network: str, steps: int) -> None:
     training = Training(dancer, replace(TINY, network=network, steps=steps, width=64))
     training.held_windows = training.train_windows  # the tiny takes have nothing in common to generalise
@@ -95,7 +95,7 @@ def test_training_reduces_the_error(dancer: Dataset, tmp_path: Path, network: st
 
 def test_only_a_prior_of_some_weight_moves_the_encoder(dancer: Dataset) -> None:
     nothing = LossWeights(rotation=0.0, pace=0.0, unit_norm=0.0, position=0.0, prior=0.0)
-    nothing = replace(nothing, hands=0.0)
+    nothing = replace(nothing, hands=0.0, alive=0.0, off_hand=0.0)
     for prior, moves in ((0.0, False), (0.01, True)):
         training = Training(dancer, replace(TINY, weights=replace(nothing, prior=prior)))
         before = {k: v.clone() for k, v in training.autoencoder.network.encoder.state_dict().items()}

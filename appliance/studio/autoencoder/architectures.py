@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.coupled import Coupled
 from appliance.studio.autoencoder.dense import Dense
 from appliance.studio.autoencoder.networks import Conv, Lstm, LstmAutoregressive, Mlp, Network, Shape
 
-DEFAULT = "conditional"
+DEFAULT = "coupled"
 NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {
-    DEFAULT: (Conditional, {"latent": 64, "width": 384, "depth": 1}),
-    "coupled": (Coupled, {"latent": 64, "width": 384, "depth": 1}),
+    DEFAULT: (Coupled, {"latent": 64, "width": 384, "depth": 1}),
     "mlp": (Mlp, {"latent": 64, "width": 384, "depth": 1}),
     "conv": (Conv, {"latent": 64, "width": 160}),
     "lstm": (Lstm, {"latent": 32, "width": 512, "depth": 2}),

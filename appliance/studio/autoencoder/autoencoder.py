@@ -10,7 +10,6 @@ import torch
 from torch import Tensor, nn
 
 from appliance.studio.autoencoder import rotation
-from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.coupled import Coupled, share_of_pass
 from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.autoencoder.networks import Network, Shape
@@ -50,24 +49,9 @@ class Autoencoder(nn.Module):
         mean, log_variance = self.network.encode(windows.flatten(1)).chunk(2, dim=-1)
         return mean, log_variance.clamp(-12.0, 4.0)
 
-    def encode_held(self, windows: Tensor, start: Tensor, goal: Tensor, held: Tensor) -> Tensor:
-        """Latents (B, Z) of heading-free windows, overwritten by goal (B, T, M, 4) as held (B, M) says.
-
-        A conditional network sees the goal and the window that the iteration started with; for any other
-        network SLERP overwrites the window's joints.
-        """
-        if isinstance(self.network, Conditional):
-            condition = self.network.encoder.condition(start, goal, held)
-            return self.network.encode_held(windows, held, condition)
-        return self.encode(slerp_towards(windows, goal, held[:, None, :, None]))
-
-    def decode_raw(self, latents: Tensor, start: Tensor | None = None, held: Tensor | None = None) -> Tensor:
-        """Latents -> heading-free windows before normalisation; start and held as given to encode_held."""
-        if start is not None and held is not None and isinstance(self.network, Conditional):
-            raw = self.network.decode_held(latents, self.network.decoder.condition(start, held))
-        else:
-            raw = self.network.decode(latents)
-        return raw.view(-1, self.shape.window, self.shape.joints, 4)
+    def decode_raw(self, latents: Tensor) -> Tensor:
+        """Latents -> heading-free windows before normalisation."""
+        return self.network.decode(latents).view(-1, self.shape.window, self.shape.joints, 4)
 
     def decode(self, latents: Tensor) -> Tensor:
         return rotation.normalize(self.decode_raw(latents))
@@ -103,14 +87,7 @@ class Autoencoder(nn.Module):
             lively = x.new_full((len(x),), liveliness)
             drawn = latents if noise is None else noise.expand_as(latents)
             pull = coupled.pull(self.encode(start), start, meant, (held > 0).float(), lively, drawn)
-        if isinstance(self.network, Conditional) and led:
-            told = self.network.encoder.condition(start, goal, held)
-            phrase = self.network.decoder.condition(start, held)
         for k in range(coding_iterations):
-            if k < led and isinstance(self.network, Conditional):
-                latents = self.network.encode_held(x, held, told)
-                x = rotation.normalize(self.network.decode_held(latents, phrase).view_as(x))
-                continue
             if k < led and coupled is None:
                 x = slerp_towards(x, goal, held[:, None, :, None])
             latents = self.encode(x)

@@ -2,11 +2,11 @@
 
 A plain autoencoder sees a held joint only as an unusual input among others, and learns to copy it with them.
 Here a second network, the hand encoder, gives the mean latent of this dancer near a window while joints are
-at given orientations. A hand moves the latent by a difference vector: that mean with the joints where the hand
-wants them, less that mean with the joints where the phrase has them. What the phrase has of its own, the
-residual, stays. So the answer keeps the dance's spread and energy whatever the hand asks for, and a hand that
-holds a joint where the phrase has it changes nothing. A network that learns the answer itself by distance gives
-the mean of all good ones instead, and the mean stands still (docs/results.md).
+at given orientations. A hand moves the latent by a difference vector: that mean with the joints where the
+hand wants them, less that mean with the joints where the phrase has them. What the phrase has of its own,
+the residual, stays. So the answer keeps the dance's spread and energy whatever the hand asks for, and a hand
+that holds a joint where the phrase has it changes nothing. A network that learns the answer itself by
+distance gives the mean of all good ones instead, and the mean stands still (docs/results.md).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from appliance.studio.autoencoder.networks import Mlp, Shape, TimeBasis
 
-STEP = 0.35  # share of the remaining way that one interaction takes: 35 % of it at 2/1, 98 % at 10/9
+STEP = 0.5  # share of the remaining way that one interaction takes: half of it at 2/1, 99.8 % at 10/9
 HAND_WIDTH = 320
 CALM = 0.6  # share of the residual that liveliness 0 keeps: as calm as the answers of release 0.1
 NOISE = 0.25  # of a latent's standard deviation, at liveliness 1

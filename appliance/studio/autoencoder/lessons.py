@@ -16,41 +16,30 @@ from appliance.studio.training_loop import ALONE
 
 @dataclass(frozen=True)
 class Hands:
-    """Joints held in all passes of a lesson but the last, as on stage.
+    """Held joints of a batch.
 
-    goal (B, T, M, 4): their orientations; held (B, M): how firmly; first (B, T, M, 4): the windows that the
-    first pass should give. The second half of the batch has the same dances a few poses later.
+    goal (B, T, M, 4): the orientations to reach, hands that hold lightly on the way from the windows'; held
+    (B, M): which are held, and how firmly.
     """
 
     goal: Tensor
     held: Tensor
-    first: Tensor
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """A batch of heading-free windows (B, T, M, 4) and what should come out after a number of passes.
-
-    rows: places of its wandering windows in their pool.
-    """
+    """A batch of heading-free windows (B, T, M, 4) and what should become of them."""
 
     windows: Tensor
     answer: Tensor
-    passes: int = 1
     hands: Hands | None = None
-    rows: Tensor | None = None
 
 
 class Lessons(Protocol):
-    """A source of lessons that sees the network's results."""
+    """A source of lessons."""
 
-    def draw(self, batch: int, progress: float) -> list[Lesson]:
-        """The next lessons of this process, `batch` windows in all, at a progress of 0 to 1 through the
-        training.
-        """
-
-    def follow(self, lesson: Lesson, made: Tensor) -> None:
-        """Receive the windows that the network made of a lesson."""
+    def draw(self, batch: int) -> list[Lesson]:
+        """The next lessons of this process, `batch` windows in all."""
 
     def state(self) -> dict[str, Any]:
         """What later lessons depend on besides the random numbers, for `restore`."""
@@ -65,14 +54,11 @@ class Copies:
     def __init__(self, windows: Tensor, noise_degrees: float = 0.0, processes: Processes = ALONE) -> None:
         self._windows, self._noise_degrees, self._processes = windows, noise_degrees, processes
 
-    def draw(self, batch: int, progress: float) -> list[Lesson]:
+    def draw(self, batch: int) -> list[Lesson]:
         whole = batch * self._processes.count
         rows = torch.randint(len(self._windows), (whole,), device=self._windows.device)
         windows = self._windows[self._processes.share(rows)]
         return [Lesson(_shaken(windows, self._noise_degrees), windows)]
-
-    def follow(self, lesson: Lesson, made: Tensor) -> None:
-        return
 
     def state(self) -> dict[str, Any]:
         return {}

@@ -16,11 +16,7 @@ POSITION_POSES = 2  # of a window's 8, redrawn each step: as good a gradient at 
 
 @dataclass(frozen=True)
 class LossWeights:
-    """Weights of the losses. Unit norm and positions as in the papers; the prior's as measured.
-
-    energy_share: of the dance's own energy that is asked for. Blending the overlapping windows takes about a
-    tenth of it away again; a network that has learned long moves more by itself.
-    """
+    """Weights of the losses. Unit norm and positions as in the papers; the others as measured."""
 
     rotation: float = 1.0
     pace: float = 1.0
@@ -30,11 +26,9 @@ class LossWeights:
     prior: float = 0.003  # of the adversarial prior; 0: none
     speed: float = 0.0  # how much each joint moves within windows, as a mean over the batch
     divergence: float = 0.001  # of a variational network's latents from the prior
-    advance: float = 1.0
-    energy: float = 8.0
-    energy_share: float = 1.12
-    first: float = 0.5  # of rotations after the first pass of several
-    hands: float = 0.8  # of all losses of dances with hands
+    pull: float = 1.0  # of a hand's pull on the latent, mean square
+    alive: float = 0.05  # of what the motion critic says
+    off_hand: float = 0.06  # of how far held joints are from their hands
 
 
 def reconstruction_losses(
@@ -43,7 +37,7 @@ def reconstruction_losses(
     """Losses of raw decoded quaternions (B, T, M, 4) against heading-free windows of the same shape.
 
     rotation: see rotation_loss; pace: the same for steps between poses, 0 for a window of one; speed: of the
-    size of those steps, see advance_losses; unit_norm: squared; position: mean distance in metres; squared:
+    mean size of those steps; unit_norm: squared; position: mean distance in metres; squared:
     of the components, summed over a joint. speed and squared are left out where they have no weight.
     """
     made = rotation.normalize(raw)
@@ -63,21 +57,6 @@ def reconstruction_losses(
     if weights.squared:
         parts["squared"] = (raw - windows).square().sum(-1).mean()
     return parts
-
-
-def advance_losses(raw: Tensor, windows: Tensor, share: float) -> dict[str, Tensor]:
-    """What changes from the first half of a batch to its second, the same dances a few poses later.
-
-    Overlapping windows are blended: the dance moves as fast as its windows change from tick to tick, however
-    fast each of them moves by itself. In radians, as `pace`: advance, the change as a vector; energy,
-    how much each joint changes on average over the batch, against a share of what is wanted. A network
-    answers what it cannot predict with the mean, which hardly moves. Therefore energy rewards how much joints
-    move, beside where they move to, and as an average over the batch: per window, it would shrink as the
-    direction does.
-    """
-    (made, later), (given, given_later) = rotation.normalize(raw).chunk(2), windows.chunk(2)
-    change, wanted = later - made, given_later - given
-    return {"advance": 2 * _length(change - wanted), "energy": _mean_size_loss(change, wanted, share)}
 
 
 def divergence(mean: Tensor, log_variance: Tensor) -> Tensor:
@@ -117,10 +96,10 @@ def rotation_loss(raw: Tensor, windows: Tensor) -> Tensor:
     return 2 * _length(rotation.normalize(raw) - windows)
 
 
-def _mean_size_loss(changes: Tensor, wanted: Tensor, share: float = 1.0) -> Tensor:
-    """In radians: how far each joint's mean change is from a share of the wanted one's."""
+def _mean_size_loss(changes: Tensor, wanted: Tensor) -> Tensor:
+    """In radians: how far each joint's mean change is from the wanted one's."""
     sizes, sizes_wanted = (_sizes(each).mean((0, 1)) for each in (changes, wanted))
-    return 2 * (sizes - share * sizes_wanted).abs().mean()
+    return 2 * (sizes - sizes_wanted).abs().mean()
 
 
 def _length(differences: Tensor) -> Tensor:

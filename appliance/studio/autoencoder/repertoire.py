@@ -1,10 +1,12 @@
-"""The repertoire: the recorded windows, searched for what the dancer does while a joint is held.
+"""The repertoire: the recorded windows, searched for what the dancer does while joints are held.
 
-What the dancer usually does near a window is the mean of the nearest recorded windows, weighted by their
-nearness (a kernel regression); with a hand, nearness includes how the joint is held. A single nearest window
-would jump between takes from tick to tick. The answer is the usual with the hand, plus the share `own` of
-what distinguishes the window from the usual without it: with 1, a hand that holds a joint where the phrase
-has it changes nothing.
+What the dancer usually does near a window is the mean of all recorded windows, each weighted by how near it
+is (a kernel regression, Nadaraya and Watson 1964); with a hand, nearness includes how the joint is held. A
+single nearest window would jump between takes from tick to tick.
+
+The answer to a hand is a difference: what is usual with the hand, less what is usual with the joints as the
+window has them, added to the window itself. Both means are equally smooth, so nothing of the dance's spread
+is lost between them. The mean with the hand, which earlier releases taught, is calmer than any dance.
 """
 
 from __future__ import annotations
@@ -18,54 +20,71 @@ from torch import Tensor
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import slerp_towards
 
-_SEARCH_ROWS = 512  # at a time: each search is a matrix product
+_SEARCH_ROWS = 256  # at a time: each search is a matrix product
 _BELIEVED_RADIANS = 1.5  # a hand this far from everything that the dancer does has weight e^-1
-_SHARPNESS = 3.0  # the furthest neighbour has e^-3 of the nearest one's weight
+_FAR = 1e9
 
 
 @dataclass(frozen=True)
 class Nearness:
-    """What makes a recorded window the answer to a hand.
+    """What makes a recorded window near.
 
-    The sum of: squared chords (half the angle) of the free joints, and of their change over the window times
-    `change`; the held joints' squared angle to the hand (radians) times `hand`, and the squared chord between
-    their changes times `hand_change`.
+    The distance is the sum of: squared chords (half the angle) of the free joints, and of their change over
+    the window times `change`, over `bandwidth`; for each held joint its squared angle to the hand in units of
+    `hand_degrees`, halved, and the squared chord between their changes times `hand_change`.
     """
 
-    neighbours: int = 60
-    searched: int = 24_000  # windows at most, evenly spaced: always the same ones, for one answer
+    searched: int = 12_000  # windows at most, evenly spaced: always the same ones, for one answer
     change: float = 1.5
-    hand: float = 120.0
+    bandwidth: float = 0.35  # smaller: nearer to single recorded windows, and rougher
+    hand_degrees: float = 12.0
     hand_change: float = 2.0
-    own: float = 0.78  # of what distinguishes the window from the usual, kept in the free joints
+    steps: int = 2  # differences, one after the other: the second finds what the first missed
 
 
 class Repertoire:
     """Heading-free windows (N, T, M, 4), thinned out, with the features that are searched."""
 
-    def __init__(self, windows: Tensor, nearness: Nearness) -> None:
+    def __init__(self, windows: Tensor, takes: Tensor, nearness: Nearness) -> None:
+        """takes (N,): the number of each window's take."""
         self._nearness = nearness
-        self._windows = windows[:: max(math.ceil(len(windows) / nearness.searched), 1)].contiguous()
+        every = max(math.ceil(len(windows) / nearness.searched), 1)
+        self._windows, self._takes = windows[::every].contiguous(), takes[::every].contiguous()
         self._middle, self._change = middle(self._windows), change(self._windows)
         self._features = _features(self._middle, self._change, nearness.change)
 
-    def usual(self, windows: Tensor) -> Tensor:
-        """What the dancer usually does near windows (L, T, M, 4)."""
-        nobody = windows.new_zeros(1, windows.shape[2])
-        costs = (self._distance_of_the_free(rows, nobody) for rows in torch.split(windows, _SEARCH_ROWS))
-        return torch.cat([self._mean_of_the_nearest(cost) for cost in costs])
+    def answers(self, windows: Tensor, hands: Tensor, held: Tensor, takes: Tensor) -> Tensor:
+        """What becomes of windows when hands, both (L, T, M, 4), hold the joints where held (L, M) is not 0.
 
-    def answers(self, windows: Tensor, hands: Tensor, held: Tensor) -> Tensor:
-        """What the dancer does near windows with hands, both (L, T, M, 4), held by weights (L, M)."""
-        rows = (torch.split(all_rows, _SEARCH_ROWS) for all_rows in (windows, hands, held))
-        return torch.cat([self._answers(*row) for row in zip(*rows, strict=True)])
+        takes (L,): the windows' own takes, which are not searched: on stage the dancer's phrase is new.
+        """
+        rows = (torch.split(all_rows, _SEARCH_ROWS) for all_rows in (windows, hands, held, takes))
+        return torch.cat([self._answer(*row) for row in zip(*rows, strict=True)])
 
-    def _answers(self, windows: Tensor, hands: Tensor, held: Tensor) -> Tensor:
+    def _answer(self, windows: Tensor, hands: Tensor, held: Tensor, takes: Tensor) -> Tensor:
+        answer = windows
+        for _ in range(self._nearness.steps):
+            there = self._mean(answer, hands, held, takes)
+            here = self._mean(answer, answer, held, takes)
+            own = rotation.multiply(rotation.inverse(here), answer)
+            answer = rotation.normalize(rotation.multiply(there, own))
+        is_held = (held > 0).to(answer.dtype)[:, None, :, None].expand_as(answer[..., :1])
+        return slerp_towards(answer, hands, is_held)
+
+    def _mean(self, windows: Tensor, hands: Tensor, held: Tensor, takes: Tensor) -> Tensor:
+        """(L, T, M, 4): mean of the recorded windows near windows, with the joints held as in hands."""
         near = self._nearness
-        cost = self._distance_of_the_free(windows, held)
-        usual = self._mean_of_the_nearest(cost)
+        cost = self._distance_of_the_free(windows, held) / near.bandwidth
+        self._add_distance_of_the_held(cost, hands, held)
+        cost.masked_fill_(takes[:, None] == self._takes, _FAR)
+        share = torch.softmax(cost.amin(dim=1, keepdim=True) - cost, dim=-1)
+        mean = share @ self._windows.flatten(1)
+        return rotation.normalize(mean.view(-1, *self._windows.shape[1:]))
+
+    def _add_distance_of_the_held(self, cost: Tensor, hands: Tensor, held: Tensor) -> None:
+        near = self._nearness
         hand_middle, hand_change = middle(hands), change(hands)
-        for joint in range(windows.shape[2]):
+        for joint in range(hands.shape[2]):
             rows = (held[:, joint] > 0).nonzero()[:, 0]
             if len(rows):
                 cosine = hand_middle[rows, joint] @ self._middle[:, joint].T
@@ -77,20 +96,8 @@ class Repertoire:
                     - 2 * cosine.sign() * (hand_change[rows, joint] @ theirs.T)
                 )
                 believed = torch.exp(-(angle.amin(dim=1, keepdim=True) / _BELIEVED_RADIANS).square())
-                weight = held[rows, joint][:, None] * believed
-                cost[rows] += weight * (near.hand * angle.square() + near.hand_change * apart)
-        with_hand = self._mean_of_the_nearest(cost)
-        own = rotation.multiply(rotation.inverse(usual), windows)
-        still = torch.tensor([1.0, 0.0, 0.0, 0.0], device=windows.device).expand_as(own)
-        share = (near.own * (held == 0))[:, None, :, None].expand_as(own[..., :1])
-        return rotation.multiply(with_hand, slerp_towards(still, own, share))
-
-    def _mean_of_the_nearest(self, cost: Tensor) -> Tensor:
-        """(L, T, M, 4): mean of the windows with the least cost (L, N)."""
-        distance, nearest = cost.topk(min(self._nearness.neighbours, cost.shape[1]), largest=False)
-        spread = (distance[:, -1:] - distance[:, :1]).clamp_min(1e-6)
-        share = torch.softmax(-_SHARPNESS * (distance - distance[:, :1]) / spread, dim=-1)
-        return rotation.normalize(torch.einsum("lk,lktmq->ltmq", share, self._windows[nearest]))
+                held_apart = 0.5 * (angle / math.radians(near.hand_degrees)).square()
+                cost[rows] += believed * (held_apart + near.hand_change * apart)
 
     def _distance_of_the_free(self, windows: Tensor, held: Tensor) -> Tensor:
         """(L, N): squared distance of windows to the recorded ones in the free joints."""

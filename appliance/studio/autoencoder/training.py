@@ -13,18 +13,22 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from appliance.studio.autoencoder import losses, rotation
+from appliance.studio.autoencoder import losses, motion_critic, rotation
 from appliance.studio.autoencoder.answers import Answers, AnswerSettings
 from appliance.studio.autoencoder.architectures import DEFAULT, build
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.autoencoder.conditional import Conditional
-from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
+from appliance.studio.autoencoder.coupled import Coupled, share_of_pass
+from appliance.studio.autoencoder.lessons import Copies, Hands, Lesson, Lessons
+from appliance.studio.autoencoder.motion_critic import MotionCritic, Sequences
 from appliance.studio.autoencoder.networks import Mlp
 from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.data.dataset import WINDOW, Dataset, window_starts, windows
 from appliance.studio.processes import Processes
 from appliance.studio.training_loop import ALONE, TrainingLoop
 
+FEW_TAKES = 4
+ADVERSARIAL_BETAS = (0.5, 0.99)  # of Adam, where two networks learn against each other
+SAMPLED_SEQUENCES = 500  # to measure how the dancer moves
 SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
 
 
@@ -44,6 +48,10 @@ class Settings:
     steps: int = 0
     batch: int = 256
     learning_rate: float = 1e-3
+    betas: tuple[float, float] = (
+        0.9,
+        0.999,
+    )  # of Adam; a network that follows the motion critic: (0.5, 0.99)
     critic_learning_rate: float = 5e-4
     smoothing: float = 0.999  # of the averaged weights
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
@@ -51,6 +59,11 @@ class Settings:
     mixed: bool = True  # precision, on a GPU
     mirror: bool = True
     critic_every: int = 2  # steps; the prior moves slowly
+    sequences: int = 20  # dances that the motion critic sees in a step; 0: there is no critic
+    passes: int = 10  # of them at most, the last one without hands
+    free_sequences: float = 0.3  # of them without a hand: these wander, coded again and again
+    alive_from: float = 0.25  # of the training, when the network begins to follow the motion critic
+    motion_learning_rate: float = 4e-4
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
     answers: AnswerSettings = field(default_factory=AnswerSettings)
 
@@ -82,7 +95,15 @@ class Training(TrainingLoop[Report]):
     """State of a training: networks, optimisers, averages, history."""
 
     report_type = Report
-    saved = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer")
+    saved = (
+        "autoencoder",
+        "averaged",
+        "critic",
+        "optimizer",
+        "critic_optimizer",
+        "motion_critic",
+        "motion_optimizer",
+    )
 
     def __init__(
         self,
@@ -121,19 +142,36 @@ class Training(TrainingLoop[Report]):
         self.held_windows = torch.tensor(
             windows(dataset.held_out, dataset.moving, window=settings.window, hop=settings.hop)
         ).to(self.device)
+        betas = ADVERSARIAL_BETAS if isinstance(network, Coupled) else (0.9, 0.999)
         self.optimizer = torch.optim.Adam(
-            self.autoencoder.parameters(), lr=settings.learning_rate, fused=True
+            self.autoencoder.parameters(), lr=settings.learning_rate, betas=betas, fused=True
         )
         self.critic_optimizer = torch.optim.Adam(
             self.critic.parameters(), lr=settings.critic_learning_rate, betas=(0.5, 0.999), fused=True
         )
-        conditional = isinstance(network, Conditional)
-        own = self._own_windows() if mirror else self.train_windows
-        self.lessons: Lessons = (
-            Answers(self.train_windows, own, self.holding_chances(), settings.answers)
-            if conditional
-            else Copies(self.train_windows, settings.input_noise_degrees, processes)
+        chances = self.holding_chances()
+        if isinstance(network, Coupled):
+            own, takes = self._own_windows(mirror)
+            answers = Answers(self.train_windows, own, takes, chances, settings.answers)
+            self.lessons: Lessons = answers
+        else:
+            self.lessons = Copies(self.train_windows, settings.input_noise_degrees, processes)
+        self._chances = chances
+        self.sequences: Sequences | None = None
+        poses = max(motion_critic.blended_poses(settings.window), 3)
+        self.motion_critic = MotionCritic(shape.joints, poses).to(self.device)
+        self.motion_optimizer = torch.optim.Adam(
+            self.motion_critic.parameters(),
+            lr=settings.motion_learning_rate,
+            betas=ADVERSARIAL_BETAS,
+            fused=True,
         )
+        if isinstance(network, Coupled) and settings.sequences:
+            sequences = Sequences(dataset, settings.window, self.device)
+            if len(sequences):
+                self.sequences = sequences
+                known = motion_critic.blended(sequences.draw(SAMPLED_SEQUENCES).windows)
+                self.motion_critic.measure(motion_critic.level(known)[0])
         self._go_apart()
         self._critic_loss = torch.zeros((), device=self.device)
 
@@ -147,15 +185,16 @@ class Training(TrainingLoop[Report]):
         total = torch.zeros((), device=self.device)
         reported: dict[str, Tensor] = {}
         latents = []
-        for lesson in self.lessons.draw(settings.batch // self.processes.count, self.fraction):
-            raw, coded, parts = self._code(lesson)
-            weight, suffix = (settings.weights.hands, "_with_hands") if lesson.hands else (1.0, "")
+        for lesson in self.lessons.draw(settings.batch // self.processes.count):
+            coded, parts = self._pull(lesson, lesson.hands) if lesson.hands else self._code(lesson)
             for name, part in parts.items():
-                total = total + weight * getattr(settings.weights, name) * part
-                reported[name + suffix] = part
+                total = total + getattr(settings.weights, name) * part
+                reported[name] = part
             latents.append(coded)
-            self.lessons.follow(lesson, rotation.normalize(raw.detach()))
         coded = torch.cat(latents)
+        if self.sequences is not None:
+            loss, parts = self._see_motion(self.sequences)
+            total, reported = total + loss, reported | parts
         if settings.weights.prior:
             if self.step % settings.critic_every == 0:
                 self._critic_loss = self._train_critic(coded)
@@ -169,21 +208,13 @@ class Training(TrainingLoop[Report]):
             reported |= {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
         return {name: part.detach() for name, part in reported.items()}
 
-    def _code(self, lesson: Lesson) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
-        """Run a lesson's passes: raw windows (B, T, M, 4) and latents (B, Z) of the last, and the losses.
+    def _code(self, lesson: Lesson) -> tuple[Tensor, dict[str, Tensor]]:
+        """Code a batch once: latents (B, Z), and the losses.
 
         The decoder sees noisy latents, or samples of a variational network's; those that are returned, for
         the critic, have no noise.
         """
-        windows, hands, parts = lesson.windows, lesson.hands, {}
-        for taken in range(lesson.passes - 1 if hands is not None else 0):
-            assert hands is not None
-            with self.mixed:
-                coded = self.autoencoder.encode_held(windows, lesson.windows, hands.goal, hands.held)
-                raw = self.autoencoder.decode_raw(coded, lesson.windows, hands.held).float()
-            if taken == 0:
-                parts["first"] = losses.rotation_loss(raw, hands.first)
-            windows = rotation.normalize(raw)
+        windows, parts = lesson.windows, {}
         if self.settings.variational:
             with self.mixed:
                 coded, log_variance = self.autoencoder.encode_gaussian(windows)
@@ -198,9 +229,78 @@ class Training(TrainingLoop[Report]):
         with self.mixed:
             raw = self.autoencoder.decode_raw(seen).float()
         parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body, self.settings.weights))
-        if hands is not None:
-            parts.update(losses.advance_losses(raw, lesson.answer, self.settings.weights.energy_share))
-        return raw, coded, parts
+        return coded, parts
+
+    def _pull(self, lesson: Lesson, hands: Hands) -> tuple[Tensor, dict[str, Tensor]]:
+        """Latents (B, Z) of a batch, and how far the hands' pulls are from where the answers lie."""
+        network = self.autoencoder.network
+        assert isinstance(network, Coupled)
+        with self.mixed:
+            coded = self.autoencoder.encode(lesson.windows).float()
+            with torch.no_grad():
+                way = self.autoencoder.encode(lesson.answer).float() - coded
+            held, lively = (hands.held > 0).float(), coded.new_ones(len(coded))
+            pull = network.pull(
+                coded.detach(), lesson.windows, hands.goal, held, lively, torch.zeros_like(coded)
+            )
+        return coded, {"pull": (pull.float() - way).square().mean()}
+
+    def _led(self, windows: Tensor, hands: Hands, passes: int) -> Tensor:
+        """Heading-free windows (B, T, M, 4) after passes in which the hands hold their joints."""
+        network = self.autoencoder.network
+        assert isinstance(network, Coupled)
+        start, lively = windows, windows.new_ones(len(windows))
+        with self.mixed:
+            latents = self.autoencoder.encode(start)
+            pull = network.pull(latents, start, hands.goal, (hands.held > 0).float(), lively, 0 * latents)
+            for number in range(passes):
+                if number:
+                    latents = self.autoencoder.encode(windows)
+                raw = self.autoencoder.decode_raw(latents + share_of_pass(number) * pull)
+                windows = rotation.normalize(raw.float())
+        return windows
+
+    def _see_motion(self, sequences: Sequences) -> tuple[Tensor, dict[str, Tensor]]:
+        """One step of the motion critic, and the network's loss for what it says of dances with hands."""
+        settings, weights = self.settings, self.settings.weights
+        count = max(2, settings.sequences // self.processes.count)
+        dances, hands, real = sequences.draw(count), sequences.draw(count), sequences.draw(2 * count)
+        free = round(count * settings.free_sequences)
+        wandering = sequences.wandering(free)
+        dances.windows[:free] = wandering.windows
+        held = motion_critic.draw_hands(count, self._chances, free)
+        held_real = motion_critic.draw_hands(2 * count, self._chances, 2 * free)
+        passes = motion_critic.draw_passes(settings.passes)
+        goal = hands.as_hands_of(dances.windows)
+        whole = self._danced(dances.windows.flatten(0, 1), goal.flatten(0, 1), held, passes)
+        danced = whole.view_as(dances.windows)
+        wandering.go_on(danced[:free], passes)
+        motion = motion_critic.blended(danced)
+        target = motion_critic.middle_target(goal)
+        seen = self.motion_critic.requires_grad_(False)
+        made, features = motion_critic.made_losses(seen, motion, target, held)
+        seen.requires_grad_(True)
+        own = motion_critic.level(
+            motion_critic.blended(real.windows), motion_critic.middle_target(real.targets)
+        )
+        true = self.motion_critic.features(*own, held_real)
+        with_penalty = self.step % motion_critic.PENALTY_EVERY == 0
+        judged = motion_critic.critic_loss(self.motion_critic, true, features, with_penalty)
+        self._descend(judged, self.motion_optimizer)
+        grown = min(max(self.fraction - settings.alive_from, 0.0) / 0.05, 1.0) if settings.alive_from else 1.0
+        loss = grown * weights.alive * made.alive + weights.off_hand * made.off_hand
+        return loss, {"alive": made.alive, "off_hand": made.off_hand, "motion_critic": judged}
+
+    def _danced(self, windows: Tensor, goal: Tensor, held: Tensor, passes: int) -> Tensor:
+        """Windows (B * W, T, M, 4), goal alike, with headings, danced as on stage; held (B, M)."""
+        autoencoder = self.autoencoder
+        facing = autoencoder.facing(windows)
+        start = autoencoder.without_heading(windows, facing)
+        each = held.repeat_interleave(len(windows) // len(held), dim=0)
+        x = self._led(start, Hands(autoencoder.without_heading(goal, facing), each), passes - 1)
+        with self.mixed:
+            x = rotation.normalize(autoencoder.decode_raw(autoencoder.encode(x)).float())
+        return autoencoder.with_heading(x, facing)
 
     def _train_critic(self, latents: Tensor) -> Tensor:
         loss = losses.critic_loss(self.critic, latents, self.processes.noise(latents))
@@ -243,19 +343,21 @@ class Training(TrainingLoop[Report]):
             "random_gpu": torch.cuda.get_rng_state(self.device) if self.device.type == "cuda" else None,
             "latent_moments": self.latent_moments(),
             "lessons": self.lessons.state(),
+            "sequences": {} if self.sequences is None else self.sequences.state(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         super().restore(state)
         self.lessons.restore(state["lessons"])
+        if self.sequences is not None:
+            self.sequences.restore(state["sequences"])
         if self.device.type == "cuda" and state.get("random_gpu") is not None:
             torch.cuda.set_rng_state(state["random_gpu"].cpu(), self.device)
         self._go_apart()
 
     def _go_apart(self) -> None:
-        """Processes that answer hands draw lessons of their own, for a lesson costs more than to learn it.
-
-        All other chance is the same in all of them, and each takes its share: as one process would.
+        """When batches contain simulated hands, each rank is seeded differently: building a batch costs more
+        than the step. All other random numbers are the same in all ranks, and each takes its share.
         """
         if isinstance(self.lessons, Answers) and not self.processes.leads:
             torch.manual_seed(1_000_003 * (self.step + 1) + 1009 * self.settings.seed + self.processes.rank)
@@ -267,12 +369,21 @@ class Training(TrainingLoop[Report]):
         parts, network = torch.split(torch.tensor(poses).to(self.device), 4096), self.autoencoder
         return torch.cat([network.without_heading(part, network.facing(part)) for part in parts])
 
-    def _own_windows(self) -> Tensor:
-        """Those of the training windows that are no mirror images: the first half of each take's."""
-        settings = self.settings
-        counts = [len(window_starts(take, settings.hop, settings.window)) for take in self.dataset.training]
-        halves = torch.split(self.train_windows, [count for count in counts for _ in range(2)])
-        return torch.cat(halves[::2])
+    def _own_windows(self, mirror: bool) -> tuple[Tensor, Tensor]:
+        """Those of the training windows that are no mirror images, and the numbers of their takes (N,).
+
+        Of few takes each is counted as several, so that a window is answered by what it is not part of.
+        """
+        settings, takes = self.settings, self.dataset.training
+        counts = [len(window_starts(take, settings.hop, settings.window)) for take in takes]
+        names = sorted({take.take for take in takes})
+        parts = 1 if len(names) >= FEW_TAKES else FEW_TAKES
+        numbers = [
+            names.index(take.take) * parts + torch.arange(count, device=self.device) * parts // max(count, 1)
+            for take, count in zip(takes, counts, strict=True)
+        ]
+        windows = torch.split(self.train_windows, [count for count in counts for _ in range(1 + mirror)])
+        return torch.cat(windows[:: 1 + mirror]), torch.cat(numbers)
 
     def _pace_learning(self) -> None:
         warm = min(1.0, (self.step + 1) / 200)
@@ -281,6 +392,8 @@ class Training(TrainingLoop[Report]):
             group["lr"] = self.settings.learning_rate * warm * max(cosine, 0.005)
         for group in self.critic_optimizer.param_groups:
             group["lr"] = self.settings.critic_learning_rate * max(cosine, 0.1)
+        for group in self.motion_optimizer.param_groups:
+            group["lr"] = self.settings.motion_learning_rate * max(cosine, 0.1)
 
 
 def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]]:

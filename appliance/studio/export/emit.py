@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 import torch
+from onnx import TensorProto
 from torch import nn
 
 from appliance.studio.autoencoder import networks
-from appliance.studio.autoencoder.conditional import Conditional
+from appliance.studio.autoencoder.coupled import CALM, NOISE, STEP, Coupled, HandEncoder
 from appliance.studio.autoencoder.networks import Network, Shape
 from appliance.studio.export.graph import Graph, Layers, lstm_weights
 
@@ -44,41 +45,45 @@ def encode(
     raise TypeError(f"No ONNX form is known for the encoder {type(encoder).__name__}.")
 
 
-def condition(
-    graph: Graph, network: Conditional, shape: Shape, start: str, goal: str, weight: str, gates: str
-) -> tuple[str, str]:
-    """(K, P, W), (K, P, C * M * 4): biases of the encoder's first layer and the decoder's last in every pass.
+def pulls(
+    graph: Graph, layers: Layers, network: Coupled, shape: Shape, start: str, goal: str, held: str, gates: str
+) -> str:
+    """(K, P, Z): what each pass adds to the latents. Coupled.pull node for node, and share_of_pass.
 
-    start, goal (P, T, M, 4), weight (P, M), gates (K, P).
-    ConditionalEncoder.condition and ConditionalDecoder.forward node for node, once for all passes.
+    start, goal (P, T, M, 4), the goal brought as near as the weights say; held (P, M), 0 or 1; gates (K, P).
     """
-    encoder = network.encoder
-    column = graph.op("Unsqueeze", goal, graph.constant("axis_last", [-1], np.int64))
-    row = graph.op("Unsqueeze", goal, graph.constant("axis_before_last", [-2], np.int64))
+    axis_last = graph.constant("axis_last", [-1], np.int64)
+    latent = encode(graph, layers, network, shape, start, graph.name("latent"))
+    here, there = (_hands(graph, network.hands, shape, latent, each, held) for each in (start, goal))
+    lively = graph.unsqueezed("liveliness", 1)
+    less = graph.op("Sub", lively, graph.constant("plus", 1.0))
+    calmed = graph.op("Mul", less, graph.constant("calmable", 1 - CALM))
+    residual = graph.op("Mul", calmed, graph.op("Sub", latent, here))
+    drawn = graph.op("Mul", graph.op("Mul", lively, graph.constant("noise_share", NOISE)), "noise")
+    pull = graph.op("Sum", graph.op("Sub", there, here), residual, drawn)
+    pull = graph.op("Mul", graph.op("ReduceMax", held, axis_last, keepdims=1), pull)
+    zero, one = graph.constant("zero_int", 0, np.int64), graph.constant("one_int", 1, np.int64)
+    most = graph.op("ReduceMax", "coding_iterations", keepdims=0)
+    passes = graph.op("Cast", graph.op("Range", zero, most, one), to=TensorProto.FLOAT)
+    left = graph.op("Pow", graph.constant("left_by_a_pass", 1 - STEP), passes)
+    shares = graph.unsqueezed(graph.op("Mul", left, graph.constant("step", STEP)), 1)
+    return graph.op("Mul", graph.unsqueezed(graph.op("Mul", gates, shares), 2), pull)
+
+
+def _hands(graph: Graph, hands: HandEncoder, shape: Shape, latent: str, windows: str, held: str) -> str:
+    """HandEncoder.forward node for node, in float: it runs once for all passes."""
+    column = graph.op("Unsqueeze", windows, graph.constant("axis_last", [-1], np.int64))
+    row = graph.op("Unsqueeze", windows, graph.constant("axis_before_last", [-2], np.int64))
     products = _reshaped(graph, graph.op("Mul", column, row), -1, shape.window, shape.joints, 16)
-    matrices = graph.op("MatMul", products, graph.constant("matrix", encoder.matrix.numpy()))
-    matrices = graph.op("Mul", matrices, _reshaped(graph, weight, -1, 1, shape.joints, 1))
+    matrices = graph.op("MatMul", products, graph.constant("matrix", hands.matrix.numpy()))
+    matrices = graph.op("Mul", matrices, _reshaped(graph, held, -1, 1, shape.joints, 1))
     steps = _reshaped(graph, matrices, -1, shape.window, shape.joints * 9)
-    basis = graph.constant("curves", encoder.time.curves.numpy())
-    held = _reshaped(graph, graph.op("MatMul", basis, steps), -1, shape.curves * shape.joints * 9)
-    phrase = graph.op("MatMul", basis, _reshaped(graph, start, -1, shape.window, shape.pose))
-    phrase = _reshaped(graph, phrase, -1, shape.curves * shape.pose)
-    strongest = graph.op("ReduceMax", weight, graph.constant("axis_last", [-1], np.int64), keepdims=1)
-    phrase = graph.op("Mul", phrase, strongest)
-    seen = graph.op("Concat", held, weight, phrase, axis=1)
-    gate = graph.unsqueezed(gates, 2)
-
-    def biases(x: str, told: nn.Linear, layer: nn.Module, name: str) -> str:
-        """What a pass in which something is held is told, on top of the layer's own bias."""
-        assert isinstance(layer, nn.Linear)
-        weights = graph.constant(f"{name}.told", told.weight.detach().numpy().T)
-        gated = graph.op("Mul", gate, graph.op("MatMul", x, weights))
-        return graph.op("Add", gated, graph.constant(f"{name}.bias", layer.bias.detach().numpy()))
-
-    return (
-        biases(seen, encoder.told, encoder.stack[0], "encoder.first"),
-        biases(phrase, network.decoder.phrase, network.decoder.stack[-1], "decoder.last"),
-    )
+    basis = graph.constant("curves", hands.time.curves.numpy())
+    curves = _reshaped(graph, graph.op("MatMul", basis, steps), -1, shape.curves * shape.joints * 9)
+    seen = graph.op("Concat", latent, curves, held, axis=1)
+    x = EXACT.elu(graph, EXACT.linear(graph, seen, hands.first, "hands.first"))
+    more = EXACT.elu(graph, EXACT.linear(graph, x, hands.second, "hands.second"))
+    return EXACT.linear(graph, graph.op("Add", x, more), hands.last, "hands.last")
 
 
 def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent: str, bias: str = "") -> str:

@@ -11,7 +11,7 @@ from onnx import TensorProto, helper
 
 from appliance.show.network import network_inputs
 from appliance.studio.autoencoder.autoencoder import NEAR, Autoencoder
-from appliance.studio.autoencoder.conditional import Conditional
+from appliance.studio.autoencoder.coupled import Coupled
 from appliance.studio.export import emit
 from appliance.studio.export.graph import MICROSOFT, OPSET, Graph, Layers, info
 
@@ -21,9 +21,10 @@ def export(
 ) -> onnx.ModelProto:
     """Write the puppets' network file: the windows of P puppets in one run, each with its own iterations.
 
-    Inputs: show.network.network_inputs, P of each; coding_iterations are at least 1. Liveliness, noise,
-    places and place_weights change nothing here. Outputs: poses (P, T, M, 4) unit quaternions, latent (P, Z)
-    of the last pass. What it computes is Autoencoder.iterate, node for node. Precision: float32, or dynamic
+    Inputs: show.network.network_inputs, P of each; coding_iterations are at least 1. Liveliness and noise
+    are a coupled network's; places and place_weights change nothing here. Outputs: poses (P, T, M, 4) unit
+    quaternions, latent (P, Z) of the last pass. What it computes is Autoencoder.iterate, node for node.
+    Precision: float32, or dynamic
     int8 with u8 weights per channel. Joint names and sizes travel in the file's metadata.
 
     All rows go through as many passes as the one that has most; each is taken as its own last pass left it.
@@ -40,31 +41,30 @@ def export(
     weight = main.op("Mul", main.op("Cast", "mask", to=TensorProto.FLOAT), "weights")
     held = _held(main, weight, shape.joints)
     gates = _gates(main)
-    shares = _gated(main, held, main.unsqueezed(gates, 2, 3, 4))
 
     body = Graph("pass_", main.constants)
     layers = Layers(int8)
     network = autoencoder.network
-    told = {"shares": shares}  # by its name in a pass, what each pass takes: (K, P, ..)
-    if isinstance(network, Conditional):
-        own = main.op("Gather", shares, main.constant("first_of_last", [0], np.int64), axis=-1)
-        first, last = emit.condition(main, network, shape, x, goal, weight, gates)
-        told = {"own_share": own, "encoder_told": first, "decoder_told": last}
-        seen = body.op("Mul", "x", "own_share")
-        latent = emit.encode(body, layers, network, shape, seen, "latent_out", "encoder_told")
-        raw = emit.decode(body, layers, network, shape, latent, "decoder_told")
+    if isinstance(network, Coupled):
+        zero = main.constant("zero", 0.0)
+        is_held = main.op("Cast", main.op("Greater", weight, zero), to=TensorProto.FLOAT)
+        meant = _slerp(main, x, goal, _gated(main, _held(main, _whole(main, weight), shape.joints), "plus"))
+        each_pass = {"pull": emit.pulls(main, layers, network, shape, x, meant, is_held, gates)}
+        coded = emit.encode(body, layers, network, shape, "x", body.name("coded"))
+        latent = body.op("Add", coded, "pull", out="latent_out")
     else:
+        each_pass = {"shares": _gated(main, held, main.unsqueezed(gates, 2, 3, 4))}
         seen = _slerp(body, "x", goal, "shares")
         latent = emit.encode(body, layers, network, shape, seen, "latent_out")
-        raw = emit.decode(body, layers, network, shape, latent)
+    raw = emit.decode(body, layers, network, shape, latent)
     body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
     window = [None, shape.window, shape.joints, 4]
-    inputs = [info("x", window), *(info(name, None) for name in told)]
+    inputs = [info("x", window), *(info(name, None) for name in each_pass)]
     outputs = [info("x_out", window), info(raw, window), info("latent_out", [None, shape.latent])]
     one_pass = helper.make_graph(body.nodes, "one_coding_iteration", inputs, outputs)
     every = [main.name("every_raw"), main.name("every_latent")]
     ends = main.name("x")
-    main.ops("Scan", [x, *told.values()], [ends, *every], body=one_pass, num_scan_inputs=len(told))
+    main.ops("Scan", [x, *each_pass.values()], [ends, *every], body=one_pass, num_scan_inputs=len(each_pass))
     coded = main.op("LpNormalization", _last(main, every[0]), axis=-1, p=2)
     _last(main, every[1], out="latent")
     mirror = main.op("Not", main.op("Less", "interaction_iterations", "coding_iterations"))
@@ -158,6 +158,16 @@ def _held(graph: Graph, weight: str, joints: int) -> str:
     shape = graph.constant(f"shape_Px1x{joints}x1", [-1, 1, joints, 1], np.int64)
     column = graph.op("Reshape", weight, shape)
     return graph.op("Mul", column, graph.constant("give_and_take", [[[-1.0, 1.0]]]))
+
+
+def _whole(graph: Graph, weight: str) -> str:
+    """(P, M): how far all interactions together bring a joint; weight (P, M): by how much one does."""
+    one = graph.constant("plus", 1.0)
+    least = graph.op(
+        "Max", graph.unsqueezed("interaction_iterations", 1), graph.constant("once", [1], np.int64)
+    )
+    times = graph.op("Cast", least, to=TensorProto.FLOAT)
+    return graph.op("Sub", one, graph.op("Pow", graph.op("Sub", one, weight), times))
 
 
 def _gates(graph: Graph) -> str:

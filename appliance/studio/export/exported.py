@@ -19,12 +19,12 @@ from torch import nn
 from appliance.pose.foreign_file import opened
 from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.autoencoder.conditional import Conditional
+from appliance.studio.autoencoder.coupled import Coupled
 from appliance.studio.autoencoder.networks import Mlp, Residual
 from appliance.studio.evaluation.coders import TorchCoder
 from appliance.studio.studio_error import StudioError
 
-READABLE = ("conditional", "mlp")  # architectures that come back; the others' layers are emitted in parts
+READABLE = ("coupled", "mlp")  # architectures that come back; the others' layers are emitted in parts
 
 
 def read_exported(path: Path) -> TorchCoder:
@@ -61,12 +61,10 @@ def _rebuilt(
     assert isinstance(network, Mlp)
     for side, stack in (("encoder", network.encoder.stack), ("decoder", network.decoder.stack)):
         _read_stack(stack, side, constants)
-    if isinstance(network, Conditional):
-        encoder, decoder = network.encoder, network.decoder
-        _read(encoder.told.weight, constants["encoder.first.told"].T)
-        _read(_bias(encoder.stack[0]), constants["encoder.first.bias"])
-        _read(decoder.phrase.weight, constants["decoder.last.told"].T)
-        _read(_bias(decoder.stack[-1]), constants["decoder.last.bias"])
+    if isinstance(network, Coupled):
+        for name, layer in network.hands.named_children():
+            if isinstance(layer, nn.Linear):
+                _read_layer(layer, f"hands.{name}", constants)
     return Autoencoder(network, shape, rest).requires_grad_(False).eval()
 
 
@@ -87,8 +85,7 @@ def _read_layer(layer: nn.Module, name: str, constants: dict[str, NDArray[Any]])
         _read(layer.bias, constants[f"{name}.bias"])
     elif isinstance(layer, nn.Linear):
         _read(layer.weight, _weight(name, constants).T)
-        if f"{name}.bias" in constants:  # a conditional network's first and last have theirs elsewhere
-            _read(layer.bias, constants[f"{name}.bias"])
+        _read(layer.bias, constants[f"{name}.bias"])
 
 
 def _weight(name: str, constants: dict[str, NDArray[Any]]) -> NDArray[Any]:
@@ -98,11 +95,6 @@ def _weight(name: str, constants: dict[str, NDArray[Any]]) -> NDArray[Any]:
     levels, zero = (constants[f"{name}.weight.{part}"].astype(np.float32) for part in ("q", "zero"))
     weight: NDArray[Any] = (levels - zero) * constants[f"{name}.weight.scale"]
     return weight
-
-
-def _bias(layer: nn.Module) -> torch.Tensor:
-    assert isinstance(layer, nn.Linear)
-    return layer.bias
 
 
 def _read(parameter: torch.Tensor, values: NDArray[Any]) -> None:
