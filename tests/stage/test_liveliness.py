@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.box.clock import Slot
 from appliance.dancer.latent_noise import LatentNoise
 from appliance.recorder.keyframe import packed, unpacked
 from appliance.show.show import Show, load_show
@@ -18,7 +19,10 @@ from appliance.stage.carry_out import obey
 from appliance.stage.liveliness import LEAST_FADE_S
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import Resumption
+from appliance.stage.sensor_fit import SensorFit
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts, assemble
+from appliance.stage.tick import Tick
 from tests.bundles import write_show
 from tests.stage.declared import Commanded
 from tests.stage.places import PLACE, put
@@ -77,6 +81,23 @@ def test_puppets_share_the_liveliness_and_each_has_its_own_noise(tmp_path: Path)
     for number, one in enumerate(parts.puppets):
         assert one.liveliness == 1.0
         np.testing.assert_allclose(one.noise, LatentNoise(number, 1, 1).at(30)[0], rtol=1e-6)
+    parts.close()
+
+
+def test_a_tick_gives_both_to_the_network(tmp_path: Path) -> None:
+    """Into the rows of the batch that it runs on."""
+    show = write_show(tmp_path / "show", puppets=[{"name": "a"}, {"name": "b", "x": 1.0}])
+    parts = assemble(load_show(show), BOX)
+    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), parts.first.iterations, 1.0)
+    for number in range(20):
+        slot = Slot(number, 10 + 0.02 * number, 10 + 0.02 * number, 0)
+        tick.run(slot)
+        tick.after(slot)
+        if number == 9:
+            parts.liveliness.ask(0.0, 1.0)
+    for number, one in enumerate(parts.puppets):
+        assert one.puppet.liveliness == pytest.approx(1.0 - 9 / 50)
+        np.testing.assert_array_equal(one.puppet.noise, LatentNoise(number, 1, 1).at(19)[0])
     parts.close()
 
 
