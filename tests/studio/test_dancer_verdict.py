@@ -63,6 +63,7 @@ def legs(energy: float, spread: float = 1.0) -> dict[str, Any]:
         (legs(0.5, 0.5), {}, "average", "nearly stand .* and the legs stay near", "liveliness"),
         ({"roughness": 2.2}, {}, "trembles", "but it trembles", "Lower liveliness"),
         (legs(1.9), {}, "trembles", "the legs are restless .1.90", "Lower liveliness"),
+        ({"free_energy": 2.3}, {}, "trembles", "without a hand it is restless .2.30", "Lower liveliness"),
         ({"plausibility": 1.22}, {}, "foreign", "poses are not the dancer's", "held joint goes"),
         ({"fits": False}, {}, "foreign", "nothing that the dancer did", "held joint goes"),
         ({"off_hand": 30.0}, {}, "off", "stays 30 degrees off the hand", "interaction_iterations"),

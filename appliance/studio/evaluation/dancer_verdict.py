@@ -135,6 +135,8 @@ def _reservations(seen: Seen) -> list[tuple[str, str]]:
             ("it", "is") if worst == "whole" else (LIMBS[worst], "is" if worst in SINGULAR else "are")
         )
         found.append(("trembles", f"{named} {verb} restless ({quick[worst]:.2f} of the dancer's speed)"))
+    if _above(seen.free_energy, RESTLESS):
+        found.append(("trembles", f"without a hand it is restless ({seen.free_energy:.2f} of the speed)"))
     if _above(seen.off_hand, OFF_HAND):
         found.append(("off", f"the held joint stays {seen.off_hand:.0f} degrees off the hand"))
     if not found and _above(seen.critic, TOLD):
