@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 import torch
 
-from appliance.dancer.puppet import Puppet
+from appliance.dancer.puppet import PuppetNetwork
 from appliance.pose.bvh import read_bvh
+from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import default_show_path
 from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
@@ -71,6 +72,16 @@ def inputs(joints: int) -> tuple[Any, ...]:
     return window, mask, targets, np.ones(joints, dtype=np.float32)
 
 
+def held(network: Path, figure: Skeleton, puppets: int = 1) -> PuppetNetwork:
+    """A network whose puppets each have a window and a hand."""
+    dancers = PuppetNetwork(network, figure, puppets)
+    window, mask, targets, weights = inputs(len(dancers.joints))
+    for one in dancers.puppets:
+        one.window[:] = window
+        one.hold(mask, targets, weights, 10, 9)
+    return dancers
+
+
 @pytest.mark.filterwarnings("ignore:TF32 acceleration")  # torch's switch for oneDNN speaks of Intel's GPUs
 @pytest.mark.parametrize("onednn", [True, False], ids=["defaults", "oneDNN-off"])
 def test_pytorch_eager(measured: Callable[..., Any], one_thread: None, onednn: bool) -> None:
@@ -94,17 +105,26 @@ def test_pytorch_eager(measured: Callable[..., Any], one_thread: None, onednn: b
 def test_exported(
     measured: Callable[..., Any], exported: Callable[[str, str], Path], network: str, precision: str
 ) -> None:
-    puppet = Puppet(exported(network, precision), skeleton())
+    dancer = held(exported(network, precision), skeleton())
     benchmark = measured(f"{TITLES.get(network, network)}, {precision}", GROUP)
-    rounds = 40 if "lstm" in network else 400
-    poses = benchmark.pedantic(puppet.dance, (*inputs(len(NAMES)), 10, 9), rounds=rounds, warmup_rounds=5)
-    assert not puppet.is_broken and poses.shape == (8, len(NAMES), 4)
+    benchmark.pedantic(dancer.dance, rounds=40 if "lstm" in network else 400, warmup_rounds=5)
+    assert not dancer.puppets[0].is_broken
 
 
 def test_the_default_as_it_ships(measured: Callable[..., Any]) -> None:
     show = default_show_path()
-    puppet = Puppet(show / "puppet.onnx", read_bvh(show / "skeleton.bvh").skeleton)
-    benchmark = measured(f"default as it ships, {puppet.precision}", GROUP)
-    arguments = (*inputs(len(puppet.joints)), 10, 9)
-    benchmark.pedantic(puppet.dance, arguments, rounds=400, warmup_rounds=5)
-    assert not puppet.is_broken
+    dancer = held(show / "puppet.onnx", read_bvh(show / "skeleton.bvh").skeleton)
+    measured(f"default as it ships, {dancer.precision}", GROUP).pedantic(
+        dancer.dance, rounds=400, warmup_rounds=5
+    )
+    assert not dancer.puppets[0].is_broken
+
+
+@pytest.mark.parametrize("puppets", [1, 2, 4])
+def test_several_in_one_run(measured: Callable[..., Any], puppets: int) -> None:
+    """All puppets in one run of the network, each with a hand."""
+    show = default_show_path()
+    dancers = held(show / "puppet.onnx", read_bvh(show / "skeleton.bvh").skeleton, puppets)
+    benchmark = measured(f"{puppets} of them", "puppets as they ship, in one run", reference=puppets == 1)
+    benchmark.pedantic(dancers.dance, rounds=400, warmup_rounds=5)
+    assert not any(one.is_broken for one in dancers.puppets)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -46,14 +47,24 @@ def key(tmp_path: Path) -> SensorKey:
     return create_keys(tmp_path / "sensors.keys", [SENSOR])[SENSOR]
 
 
-@pytest.fixture
-def parts(tmp_path: Path, key: SensorKey, show: Path, receiver: socket.socket) -> Iterator[StageParts]:
+@pytest.fixture(params=[1, 2, 4])
+def parts(
+    request: pytest.FixtureRequest, tmp_path: Path, key: SensorKey, show: Path, receiver: socket.socket
+) -> Iterator[StageParts]:
+    """Of a show with one, two or four puppets, each of them led by the sensor."""
     out = OscConfig(port=receiver.getsockname()[1], dialect="ai-toolbox")
     box = BoxConfig(
         sensors=SensorsConfig(udp=UdpConfig(port=0), keys=tmp_path / "sensors.keys"),
         outputs=OutputsConfig(osc=[out]),
     )
-    made = assemble(load_show(show), box)
+    several = shutil.copytree(show, tmp_path / "several")
+    puppets = ["", "puppets:", "  - name: first"]
+    for number in range(1, request.param):
+        hand = f"{{sensor: {SENSOR}, joint: lShldr}}"
+        puppets.append(f"  - {{name: puppet {number}, x: {number}, hands: [{hand}]}}")
+    with (several / "show.yaml").open("a", encoding="utf-8") as file:
+        file.write("\n".join(puppets))
+    made = assemble(load_show(several), box)
     yield made
     made.close()
 
@@ -66,6 +77,8 @@ def test_the_whole_tick(measured: Callable[..., Any], parts: StageParts, key: Se
     paired = parts.link.counts["accepted"]
     wearing = SensorFit(parts, SensorMemory(None, print), print)
     tick = Tick(parts, wearing, Iterations(10, 9, 10), latest_start_s=TICK_S)
+    for other in parts.puppets[1:]:
+        other.iterations = Iterations(10, 9, 10)
     slot, ran = Slot(), 0
 
     def next_slot() -> tuple[tuple[Slot], dict[str, object]]:
@@ -77,8 +90,10 @@ def test_the_whole_tick(measured: Callable[..., Any], parts: StageParts, key: Se
         sensor.advance(slot.deadline)
         return (slot,), {}
 
-    label = f"datagram to sendto, {parts.network.architecture} {parts.network.precision}"
-    benchmark = measured(label, "the whole tick, back to back")
+    count = len(parts.puppets)
+    what = f"{parts.network.architecture} {parts.network.precision}, {count} to dance"
+    group = "the whole tick, datagram to sendto, back to back"
+    benchmark = measured(what, group, reference=count == 1)
     benchmark.pedantic(tick.run, setup=next_slot, rounds=400)
     sensor.close()
     assert parts.link.counts["accepted"] - paired == ran
