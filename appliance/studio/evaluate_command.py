@@ -23,6 +23,7 @@ from appliance.studio.evaluation.evaluation import Evaluation, evaluate, fitting
 from appliance.studio.evaluation.measurement import Iterations, Measurement
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.pairs import apart_from, pair_up
+from appliance.studio.evaluation.recorded import Recorded
 from appliance.studio.studio_error import StudioError
 
 
@@ -39,6 +40,8 @@ class EvaluateOptions:
     joints: Sequence[str] = ()
     iterations: Sequence[str] = ()
     picture: Path | None = None
+    other_dancer: Path | None = None
+    compared: bool = True
 
 
 def run(options: EvaluateOptions) -> None:
@@ -59,8 +62,10 @@ def run(options: EvaluateOptions) -> None:
     answer = {}
     if options.reference is not None:
         told = options.reading.over(trained.options)
-        measurements = _measurements(console, coder, takes, hands, options.reference, told)
-        answer = _answer(console, measurements, joints, iterations)
+        known = _known(options.reference, told, (*takes, *hands))
+        measurements = _measurements(console, coder, takes, hands, known)
+        recorded = _recorded(options, coder, known) if options.compared else None
+        answer = _answer(console, measurements, joints, iterations, recorded)
         if options.picture is not None:
             usual = puppetry.usual_iterations(iterations)
             draw_answer(options.picture, measurements[0], joints[0], usual)
@@ -82,9 +87,10 @@ def _checked(options: EvaluateOptions) -> list[Iterations]:
             "--hands and --reference belong together: the answer to a hand is measured against what the "
             "dancer did in the recordings that the network learned from. Give both, or neither."
         )
-    if not options.hands and (options.joints or options.iterations or options.picture):
+    asked = options.joints or options.iterations or options.picture or options.other_dancer
+    if not options.hands and asked:
         raise StudioError(
-            "--joint, --iterations and --picture say how a hand is tried: give --hands as well."
+            "--joint, --iterations, --picture and --other-dancer are about a hand: give --hands as well."
         )
     return [_iterations(words) for words in options.iterations] or list(puppetry.ITERATIONS)
 
@@ -94,21 +100,31 @@ def _measurements(
     coder: Coder,
     takes: Sequence[Take],
     hands: Sequence[Take],
-    folder: Path,
-    reading: ReadingOptions,
+    known: Sequence[Take],
 ) -> list[Measurement]:
     """Every phrase with a hand of another take, and the training takes as reference."""
     pairs = pair_up(takes, hands)
-    known = apart_from(load_folder(folder, reading), (*takes, *hands))
+    reference = reference_of(known, coder.joints)
+    for pair in pairs:
+        console.print(f"- {pair.phrase_name} with the hands of {pair.hand_name}.", highlight=False)
+    return [Measurement(coder, pair, reference) for pair in pairs]
+
+
+def _known(folder: Path, reading: ReadingOptions, given: Sequence[Take]) -> Sequence[Take]:
+    """The training takes without those given. Raises StudioError if none is left."""
+    known = apart_from(load_folder(folder, reading), given)
     if not known:
         raise StudioError(
             f"{folder} has no recording beside the phrases and the hands. "
             "Give the folder of the training takes."
         )
-    reference = reference_of(known, coder.joints)
-    for pair in pairs:
-        console.print(f"- {pair.phrase_name} with the hands of {pair.hand_name}.", highlight=False)
-    return [Measurement(coder, pair, reference) for pair in pairs]
+    return known
+
+
+def _recorded(options: EvaluateOptions, coder: Coder, known: Sequence[Take]) -> Recorded:
+    """What the held dance is compared with."""
+    other = () if options.other_dancer is None else load_folder(options.other_dancer, options.reading).takes
+    return Recorded(known, coder.joints, other)
 
 
 def _answer(
@@ -116,9 +132,10 @@ def _answer(
     measurements: Sequence[Measurement],
     joints: Sequence[str],
     iterations: Sequence[Iterations],
+    recorded: Recorded | None,
 ) -> dict[str, Any]:
     """What the body does where a hand holds a joint, as JSON."""
-    count = puppetry.dances(len(measurements), len(joints), iterations)
+    count = puppetry.dances(len(measurements), len(joints), iterations, compared=recorded is not None)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("dancing", total=count)
         return puppetry.measure(
@@ -126,6 +143,7 @@ def _answer(
             joints,
             iterations,
             advance=lambda words: bar.update(task, advance=1, description=words),
+            recorded=recorded,
         )
 
 

@@ -82,7 +82,8 @@ def critic_rows(poses: Array, chance: np.random.Generator, moving: bool = False)
     seen = poses[starts[:, None] + POSES]
     half = np.radians(NOISE_DEGREES) / 2 * chance.standard_normal((*seen.shape[:-1], 3))
     shaken = quaternion.normalize(np.concatenate([np.ones((*seen.shape[:-1], 1)), half], axis=-1))
-    rows = quaternion.to_6d(quaternion.multiply(seen, shaken)).reshape(len(starts), -1)
+    six = quaternion.to_6d(quaternion.multiply(seen, shaken))
+    rows = six.reshape(len(starts), len(POSES) * 6 * poses.shape[1])
     if moving and len(starts):
         speed, jerkiness = _pace(poses, starts)
         rows = np.concatenate(

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from appliance.dancer.grounding import Floor, Grounding, GroundingError, survey
+from appliance.dancer.forward_kinematics import soles_of
+from appliance.dancer.grounding import Floor, Grounding, GroundingError, sole_positions, survey
 from appliance.dancer.trunk import Trunk
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
@@ -97,6 +98,18 @@ class BodyFigures:
             return float("nan")
         lifts = self._floor.lifts[: len(poses)]
         return measure_standing(self._skeleton, poses, roots, self._floor, lifts).slide_cm_s / 100
+
+    def soles(self, poses: Array, roots: Array) -> tuple[list[Array], list[Array]]:
+        """Of each foot its points (T, S, 3), metres, and their heights (T, S) above where they stand.
+
+        None without named feet. poses (T, J, 4) with roots (T, 3).
+        """
+        if self._floor is None:
+            return [], []
+        points = sole_positions(self._skeleton, poses, roots)
+        above = points[..., 1] - self._floor.rest_heights
+        ends = np.cumsum([len(foot) for foot in soles_of(self._skeleton)])[:-1]
+        return np.split(points, ends, axis=1), np.split(above, ends, axis=1)
 
     def grounded(self, poses: Array, held: str | None = None, locked: bool = True) -> tuple[Array, Array]:
         """Poses (T, J, 4) and roots (T, 3) in metres as on stage: feet locked, arms out of the trunk.

@@ -72,6 +72,17 @@ class Figures:
     foot_skate: float
 
 
+@dataclass(frozen=True)
+class Danced:
+    """A dance (T, M, 4), the hand (T, 4) on a joint; as they leave the box: poses (T, J, 4), roots (T, 3)."""
+
+    joint: str
+    shown: Poses
+    hand: Array
+    standing: Array
+    roots: Array
+
+
 class Measurement:
     """One pair: the phrase's own figures, computed once, and those of every dance on it."""
 
@@ -96,18 +107,47 @@ class Measurement:
 
     def with_hand(self, joint: str, iterations: Iterations, hand: Puppeteer, ticks: int = TICKS) -> Figures:
         """The figures of the dance with a hand on a joint."""
+        return self.figures(self.danced(joint, iterations, hand, ticks), iterations[0])
+
+    def danced(self, joint: str, iterations: Iterations, hand: Puppeteer, ticks: int = TICKS) -> Danced:
+        """The dance with a hand on a joint."""
         shown, hand_turns = self.rehearsal.held(*iterations, hand, slice(0, ticks))
-        danced = without_heading(shown)
-        free = self.rehearsal.free(iterations[0])[: len(danced)]
+        return self.stood(joint, shown, hand_turns)
+
+    def stood(self, joint: str, shown: Poses, hand: Array) -> Danced:
+        """A dance (T, M, 4) with a hand (T, 4) on a joint, as it leaves the box."""
+        return Danced(joint, shown, hand, *self.body.grounded(self.rehearsal.whole(shown), joint))
+
+    def as_recorded(self, joint: str, ticks: int) -> Danced:
+        """The phrase itself, with its own joint as the hand; its legs are left as they are."""
+        shown = self.rehearsal.phrase[:ticks]
+        standing, roots = self.body.grounded(self.rehearsal.whole(shown), locked=False)
+        return Danced(joint, shown, shown[:, self.joints.index(joint)], standing, roots)
+
+    def hand_take(self, ticks: int) -> Array:
+        """(T, M, 4): what the hand's take really did at the ticks of the dance, headings removed."""
+        places = [self.pair.hand.skeleton.index(name) for name in self.joints]
+        return without_heading(self.pair.hand.poses[WINDOW - 1 :, places][:ticks])
+
+    def level(self, dance: Danced) -> tuple[Array, Array]:
+        """A dance (T, M, 4) and its hand (T, 4), headings removed."""
+        hand = dance.hand
+        if self._is_root(dance.joint):
+            hand = without_heading(hand[:, None])[:, 0]
+        return without_heading(dance.shown), hand
+
+    def figures(self, dance: Danced, coding_iterations: int) -> Figures:
+        """The figures of a dance, against the same coding iterations without a hand."""
+        joint = dance.joint
+        danced, hand_turns = self.level(dance)
+        free = self.rehearsal.free(coding_iterations)[: len(danced)]
         phrase, rows = self.phrase[: len(danced)], slice(0, len(danced), STEP)
         held, others = self.joints.index(joint), self._others(joint)
-        if self._is_root(joint):
-            hand_turns = without_heading(hand_turns[:, None])[:, 0]
         far = self.reference.nearest(danced[rows])
         own_far = self.phrase_far[: len(far)]
         fit = self.reference.nearest(danced[rows], others, held, hand_turns[rows])
         return Figures(
-            answer=self.answer(joint, shown, free),
+            answer=self.answer(joint, dance.shown, free),
             fit=_mean(fit),
             fit_own=_mean(self._fit_of_phrase(joint, others)[: len(far)]),
             fit_bare=self._fit_of_pasted(joint, others, hand_turns[rows]),
@@ -118,7 +158,7 @@ class Measurement:
             plausibility_degrees=float(far.mean()),
             found=float(np.isfinite(fit).mean()),
             strained=self.reference.strained(danced[rows], others),
-            **self._of_body(shown, joint),
+            **self._figures_of_body(dance.shown, dance.standing, dance.roots),
         )
 
     def answer(self, joint: str, danced: Poses, free: Poses) -> float:
@@ -154,9 +194,9 @@ class Measurement:
             **self._figures_of_body(self.rehearsal.phrase, whole, roots),
         }
 
-    def _of_body(self, danced: Poses, held: str | None = None) -> dict[str, float]:
-        """The largest step, arms in the trunk and feet that slide, as they leave the box; held: by a hand."""
-        poses, roots = self.body.grounded(self.rehearsal.whole(danced), held)
+    def _of_body(self, danced: Poses) -> dict[str, float]:
+        """The largest step, arms in the trunk and feet that slide, as they leave the box."""
+        poses, roots = self.body.grounded(self.rehearsal.whole(danced))
         return self._figures_of_body(danced, poses, roots)
 
     def _figures_of_body(self, danced: Poses, poses: Array, roots: Array) -> dict[str, float]:

@@ -30,10 +30,15 @@ Relation = NDArray[np.bool_]
 Clips = NDArray[np.float64]
 
 
+def clip_begins(count: int, fps: float) -> range:
+    """Where clips of CLIP_S begin in `count` poses, one each EVERY_S."""
+    return range(0, count - round(CLIP_S * fps) + 1, round(EVERY_S * fps))
+
+
 def clips_of(positions: Array, fps: float) -> list[Array]:
-    """Stretches of CLIP_S, one each EVERY_S, of positions (T, J, 3)."""
-    length, every = round(CLIP_S * fps), round(EVERY_S * fps)
-    return [positions[begin : begin + length] for begin in range(0, len(positions) - length + 1, every)]
+    """Those clips of positions (T, J, 3)."""
+    length = round(CLIP_S * fps)
+    return [positions[begin : begin + length] for begin in clip_begins(len(positions), fps)]
 
 
 def kinetic_features(skeleton: Skeleton, clips: Sequence[Array], fps: float) -> Clips:

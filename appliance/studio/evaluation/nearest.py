@@ -76,6 +76,16 @@ class Reference:
                 near[rows] &= np.abs(level[rows, joint] @ known).max(axis=1) >= cosine
         return float(1.0 - near.mean())
 
+    def holding_nearest(self, held: int, hand: Array) -> Floats:
+        """(T, M, 4): at each tick the recorded pose whose joint `held` is nearest to the hand's (T, 4)."""
+        turns = hand.astype(np.float32)
+        found = [
+            np.abs(turns[first : first + ROWS] @ self.poses[:, held].T).argmax(axis=1)
+            for first in range(0, len(turns), ROWS)
+        ]
+        chosen: Floats = self.poses[np.concatenate(found)]
+        return chosen
+
     def _holding(self, held: int, hand: Array) -> NDArray[np.bool_]:
         """(T, N): whether a pose of the reference holds the joint as the hand does at each tick."""
         cosines = np.abs(hand.astype(np.float32) @ self.poses[:, held].T)

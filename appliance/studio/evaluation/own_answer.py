@@ -20,6 +20,7 @@ from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.onset import CODED_WINDOWS
 from appliance.studio.evaluation.pairs import own_takes
 from appliance.studio.evaluation.puppetry_report import judged
+from appliance.studio.evaluation.recorded import Recorded
 from appliance.studio.studio_error import StudioError
 
 PARTS = ("left upper arm", "left forearm", "head")
@@ -58,7 +59,10 @@ def own_answer(
     size = fitting_size(coder, len(takes.pairs), len(joints))
     pairs = [_beginning(pair, size.ticks) for pair in takes.pairs[: size.pairs]]
     measurements = [Measurement(coder, pair, reference) for pair in pairs]
-    found = puppetry.measure(measurements, joints[: size.joints], ITERATIONS, FREE, turning=False)
+    recorded = Recorded(takes.reference, coder.joints)
+    found = puppetry.measure(
+        measurements, joints[: size.joints], ITERATIONS, FREE, turning=False, recorded=recorded
+    )
     draw_answer(picture, measurements[0], joints[0], puppetry.IN_PLAY)
     return {**found, "measured_on": takes.words, **judged(found, learned(dataset, steps), one_pass_error)}
 

@@ -17,7 +17,9 @@ from dataclasses import asdict
 from typing import Any
 
 from appliance.dancer.puppeteers import TurningAxis
+from appliance.studio.evaluation.comparison import Comparison
 from appliance.studio.evaluation.measurement import Iterations, Measurement
+from appliance.studio.evaluation.recorded import Recorded
 
 ITERATIONS: tuple[Iterations, ...] = ((1, 1), (2, 1), (10, 9), (10, 10), (30, 29))
 IN_PLAY: Iterations = (10, 9)  # at which the onset and turning hands are measured
@@ -34,22 +36,34 @@ def measure(
     free: Sequence[int] = FREE,
     advance: Callable[[str], None] = lambda _: None,
     turning: bool = True,
+    recorded: Recorded | None = None,
 ) -> dict[str, Any]:
     """Keys JOINT.K_J, JOINT.turning, free.K, phrase with figures below them, JOINT.onset_ticks, .step_answer.
 
-    Means over the pairs; turning hands on the first pair only. advance(description) is called before each
-    dance, `dances` times in all.
+    recorded: also JOINT.baselines with the figures of comparison.py; at the iterations in play those of the
+    network are among JOINT.K_J's too. Means over the pairs; turning hands on the first pair only.
+    advance(description) is called before each dance, `dances` times in all.
     """
     in_play = usual_iterations(iterations)
+    comparison = None if recorded is None else Comparison(measurements, recorded)
     found: dict[str, Any] = {}
     for joint in joints:
         figures: dict[str, Any] = {}
         for coding, interaction in iterations:
-            rows = []
+            rows, danced = [], []
             for one in measurements:
                 advance(f"hand on {joint}, {coding}/{interaction}")
-                rows.append(asdict(one.with_hand(joint, (coding, interaction), one.hand(joint))))
+                danced.append(one.danced(joint, (coding, interaction), one.hand(joint)))
+                rows.append(asdict(one.figures(danced[-1], coding)))
             figures[f"{coding}_{interaction}"] = _means(rows)
+            if comparison is not None and (coding, interaction) == in_play:
+                advance(f"hand on {joint}, beside phrase, pasted arm and motion matching")
+                figures["baselines"] = comparison.of_joint(joint, danced)
+                figures[f"{coding}_{interaction}"] |= {
+                    name: value
+                    for name, value in figures["baselines"]["network"].items()
+                    if name not in rows[0]
+                }
         advance(f"steps of a hand on {joint}")
         steps = [one.steps(joint, in_play) for one in measurements]
         known = [step.onset_ticks for step in steps if step.onset_ticks is not None]
@@ -67,17 +81,25 @@ def measure(
     for coding in free:
         advance(f"without a hand, {coding}")
         found["free"][str(coding)] = _means([one.free(coding) for one in measurements])
+        if comparison is not None and coding in (in_play[0], max(free)):
+            found["free"][str(coding)] |= comparison.of_free(coding)
     found["phrase"] = _means([one.of_phrase() for one in measurements])
     reference = measurements[0].reference
     found["reference"] = {"poses": len(reference), "largest_step": round(reference.largest_step, 3)}
+    if comparison is not None:
+        found["reference"] |= comparison.reference
     return found
 
 
 def dances(
-    pairs: int, joints: int, iterations: Sequence[Iterations] = ITERATIONS, free: Sequence[int] = FREE
+    pairs: int,
+    joints: int,
+    iterations: Sequence[Iterations] = ITERATIONS,
+    free: Sequence[int] = FREE,
+    compared: bool = False,
 ) -> int:
-    """How often `measure` calls advance."""
-    return joints * (pairs * len(iterations) + 1 + len(TURNING)) + len(free)
+    """How often `measure` calls advance; compared: with recordings."""
+    return joints * (pairs * len(iterations) + 1 + len(TURNING) + compared) + len(free)
 
 
 def usual_iterations(iterations: Sequence[Iterations]) -> Iterations:

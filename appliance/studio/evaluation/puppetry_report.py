@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from appliance.pose.roles import UPPER_ARMS, held_joints
+from appliance.studio.evaluation.comparison_report import comparison_sentences, comparison_table
 from appliance.studio.evaluation.dancer_verdict import (
     ANSWERS,
     ANSWERS_A_LITTLE,
@@ -67,7 +68,10 @@ def print_answer(console: Console, found: dict[str, Any]) -> None:
         console.print(words, highlight=False)
         return
     console.print(table(found))
-    lines = [*sentences(found), *asides(found)]
+    compared = comparison_table(found, joints_of(found))
+    if compared is not None:
+        console.print(compared)
+    lines = [*sentences(found), *asides(found), *comparison_sentences(found)]
     if "verdict" in found:
         lines += [f"Measured {found['measured_on']}.", f"{found['verdict']} {found['advice']}".strip()]
     for line in lines:

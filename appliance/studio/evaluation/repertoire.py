@@ -26,14 +26,14 @@ class Repertoire:
     """The recorded stretches (T, M, 4) of a dancer: poses for coverage, half seconds for memorisation."""
 
     def __init__(self, stretches: Sequence[Array]) -> None:
-        level = [without_heading(part).astype(np.float32) for part in stretches]
+        level = [without_heading(part).astype(np.float32) for part in stretches if len(part)]
         poses = np.concatenate(level)
         chosen = np.unique(np.linspace(0, len(poses) - 1, SAMPLE).astype(int))
         self._poses = _columns(poses[chosen])
         self._radius = _radius(self._poses)
         halves, moments, begin = [], [], 0
         for part in level:
-            starts = np.arange(0, max(0, len(part) - int(WINDOW_TICKS[-1])), EVERY)
+            starts = _starts(part, EVERY)
             halves.append(_half_seconds(part, starts))
             moments.append(begin + starts // APART_TICKS)
             begin += len(part) // APART_TICKS + 3  # stretches are never neighbours
@@ -55,37 +55,49 @@ class Repertoire:
         columns = _columns(without_heading(danced))
         return float((_squared(self._poses, columns) <= _radius(columns)[None]).any(axis=1).mean())
 
-    def nearest_moments(self, danced: Array, every: int) -> tuple[float, float]:
-        """How far half seconds of a dance (T, M, 4) are from the nearest recorded ones.
+    def nearest_moments(self, dances: Sequence[Array], every: int, held: int) -> tuple[float, float]:
+        """How far half seconds of dances (T, M, 4) are from the nearest recorded ones, joint `held` left out.
 
         One each `every` ticks is looked at. The mean distance in degrees of a joint; and how much nearer that
-        is than the nearest one of another moment, 2 s away: 1 if not at all, 0 if it is that
-        recording. NaN for less than half a second.
+        is than the nearest one of another moment, 2 s away: 1 if not at all, 0 if it is that recording. NaN
+        for less than half a second.
         """
-        starts = np.arange(0, max(0, len(danced) - int(WINDOW_TICKS[-1])), every)
-        if not len(starts) or len(self._begins) < 3:
+        level = [without_heading(danced).astype(np.float32) for danced in dances]
+        asked = np.concatenate([_half_seconds(part, _starts(part, every)) for part in level])
+        if not len(asked) or len(self._begins) < 3:
             return float("nan"), float("nan")
-        asked = _half_seconds(without_heading(danced).astype(np.float32), starts)
+        asked, known = (_without(halves, held) for halves in (asked, self._halves))
         first, second = [], []
         for begin in range(0, len(asked), ROWS):
-            apart = np.minimum.reduceat(
-                _squared(asked[begin : begin + ROWS], self._halves), self._begins, axis=1
-            )
+            apart = np.minimum.reduceat(_squared(asked[begin : begin + ROWS], known), self._begins, axis=1)
             best = apart.argmin(axis=1)
             first.append(apart.min(axis=1))
             beside = np.abs(self._moments[None] - self._moments[best][:, None]) <= 1
             second.append(np.where(beside, np.inf, apart).min(axis=1))
         near, other = np.sqrt(np.concatenate(first)), np.sqrt(np.concatenate(second))
-        joints = danced.shape[1] * len(WINDOW_TICKS)
-        degrees = np.degrees(2 * np.arcsin(np.minimum(near / np.sqrt(8 * joints), 1)))
-        known = np.isfinite(other)
-        return float(degrees.mean()), float((near[known] / np.maximum(other[known], 1e-6)).mean())
+        degrees = np.degrees(2 * np.arcsin(np.minimum(near / np.sqrt(8 / 9 * known.shape[1]), 1)))
+        seen = np.isfinite(other)
+        share = near[seen] / np.maximum(other[seen], 1e-6)
+        return float(degrees.mean()), float(share.mean()) if len(share) else float("nan")
+
+
+def _starts(poses: Array, every: int) -> NDArray[np.intp]:
+    """First ticks of the half seconds of poses (T, M, 4)."""
+    return np.arange(0, max(0, len(poses) - int(WINDOW_TICKS[-1])), every)
+
+
+def _without(halves: Floats, joint: int) -> Floats:
+    """Half seconds (N, D) without one joint."""
+    by_joint = halves.reshape(len(halves), len(WINDOW_TICKS), -1, 9)
+    rest: Floats = np.delete(by_joint, joint, axis=2).reshape(len(halves), -1)
+    return rest
 
 
 def _half_seconds(poses: Array, starts: NDArray[np.intp]) -> Floats:
     """(N, D) of poses (T, M, 4), headings removed."""
     columns = _columns(poses)
-    halves: Floats = columns[starts[:, None] + WINDOW_TICKS].reshape(len(starts), -1)
+    seen = columns[starts[:, None] + WINDOW_TICKS]
+    halves: Floats = seen.reshape(len(starts), len(WINDOW_TICKS) * columns.shape[1])
     return halves
 
 
