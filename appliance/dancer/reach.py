@@ -22,7 +22,7 @@ class Reach(NamedTuple):
 
     Outside of it the network has learned nothing. Measured with a fixed place from which a salsa dancer goes
     away, with a prototype of such a network at 10/9: bounded by the length of the bones alone, the wrist was
-    19 cm off what the network was told, and went up to 16 m/s; within 2.5 deviations 3 cm and 3.7 m/s.
+    19 cm off what the network was told, and went up to 16 m/s; within 3 deviations 2 cm and 2.3 m/s.
     """
 
     middle: FloatArray

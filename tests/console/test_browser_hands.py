@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, expect
 from playwright.sync_api import Page as Tab
@@ -22,28 +23,29 @@ from tests.system.processes import children_running, wait_until
 
 pytestmark = pytest.mark.realtime
 
-HELD = "rThigh"
+HELD, PLACED = "rThigh", "Chest"
 NEAR_PX = 20.0  # a bone keeps its length, and the body sways; untouched, the ring is 45 px away
 Studio = tuple[Box, Page, FrameReader]
 
 
 @pytest.fixture(scope="module")
 def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
-    """A box whose show has a hand for the page."""
+    """A box whose show has two hands for the page, one of them by position."""
     folder = tmp_path_factory.mktemp("studio")
-    show = write_show(folder / "show", hands=[WORN, {"osc": True, "joint": HELD}])
+    hands = [WORN, {"osc": True, "joint": HELD}, {"osc": True, "joint": PLACED, "by": "position"}]
+    show = write_show(folder / "show", hands=hands)
     with box_with_page(show, folder, has_sensors=False) as (box, page):
         reader = FrameReader(box.runtime)
         yield box, page, reader
         reader.close()
 
 
-def held(studio: Studio) -> float:
-    """How firmly the joint is held now."""
+def held(studio: Studio, joint: str = HELD) -> float:
+    """How firmly a joint is held now."""
     reader = studio[2]
     frame, facts = reader.newest(time.monotonic()), reader.facts
     assert frame is not None and facts is not None
-    return float(frame.holds[facts.skeleton.index(HELD)])
+    return float(frame.holds[facts.skeleton.index(joint)])
 
 
 def opened(context: BrowserContext, studio: Studio) -> Tab:
@@ -53,10 +55,11 @@ def opened(context: BrowserContext, studio: Studio) -> Tab:
     return tab
 
 
-def ring(tab: Tab) -> tuple[float, float]:
-    """Where the ring is, in pixels of the window."""
-    (name, x, y), *others = json.loads(tab.get_attribute("#figure", "data-rings") or "[]")
-    assert (name, others) == (HELD, []), "the worn sensor's joint has no ring"
+def ring(tab: Tab, joint: str = HELD) -> tuple[float, float]:
+    """Where a joint's ring is, in pixels of the window."""
+    rings = {name: at for name, *at in json.loads(tab.get_attribute("#figure", "data-rings") or "[]")}
+    assert rings.keys() == {HELD, PLACED}, "the worn sensor's joint has no ring"
+    x, y = rings[joint]
     box = tab.locator("#figure").bounding_box()
     assert box is not None
     return box["x"] + x, box["y"] + y
@@ -114,6 +117,33 @@ def test_a_ring_that_is_dragged_is_a_hand(context: BrowserContext, studio: Studi
     finger.up()
     wait_until(lambda: held(studio) == 0.0, "lifted, and still held")
     expect(tab.locator("#said.refused")).to_have_count(0)
+
+
+def test_a_square_ring_takes_its_joint_to_a_place(browser: Browser, studio: Studio) -> None:
+    context = browser.new_context(**LAPTOP)
+    tab = opened(context, studio)
+    expect(tab.locator("#figure-place")).to_be_visible()
+    sent: list[str] = []
+    tab.on("websocket", lambda socket: socket.on("framesent", lambda said: sent.append(str(said))))
+    finger, (x, y) = Finger(tab), ring(tab, PLACED)
+    frame = studio[2].newest(time.monotonic())
+    assert frame is not None and studio[2].facts is not None
+    stood = frame.positions[studio[2].facts.skeleton.index(PLACED)]
+    finger.down(x, y)
+    wait_until(lambda: held(studio, PLACED) == 1.0, "the joint is not held")
+    finger.move(x, y - 60)
+    time.sleep(0.3)
+
+    def places() -> list[list[float]]:
+        return [one["at"] for one in map(json.loads, list(sent)) if one["joint"] == PLACED and "at" in one]
+
+    first, *_, last = places()
+    assert first == pytest.approx(stood.tolist(), abs=0.08), "it is taken where it is"
+    assert last[1] - first[1] > 0.05
+    assert np.hypot(last[0] - first[0], last[2] - first[2]) < 0.5 * (last[1] - first[1])
+    finger.up()
+    wait_until(lambda: held(studio, PLACED) == 0.0, "lifted, and still held")
+    context.close()
 
 
 def test_a_phone_that_falls_asleep_gives_the_joint_back(browser: Browser, studio: Studio) -> None:
