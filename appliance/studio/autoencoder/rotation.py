@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
@@ -56,44 +58,64 @@ def angle_between(a: Tensor, b: Tensor) -> Tensor:
     return 4 * torch.asin((chord / 2).clamp(max=1.0))
 
 
+class Bones(NamedTuple):
+    """How M moving joints hang on each other: parents, -1 for a root; turns (M, 4) and reaches (M, 3) in
+    metres: what the still joints between a joint and its parent turn it by, and where that leaves it.
+    """
+
+    parents: list[int]
+    turns: Tensor
+    reaches: Tensor
+
+    @property
+    def levels(self) -> list[list[int]]:
+        """The joints by the number of moving joints above them."""
+        depth: list[int] = []
+        for parent in self.parents:
+            depth.append(0 if parent < 0 else depth[parent] + 1)
+        return [[j for j, d in enumerate(depth) if d == level] for level in range(max(depth) + 1)]
+
+
+def moving_bones(skeleton: Skeleton, moving: tuple[int, ...], still_pose: Tensor) -> Bones:
+    """The moving joints of a skeleton; still_pose (J, 4): how its other joints always are."""
+    parents, turns, reaches = [], [], []
+    for joint in moving:
+        turn, reach = torch.tensor([1.0, 0.0, 0.0, 0.0]), torch.zeros(3)
+        child = joint
+        while True:  # climb over still joints to the next moving one
+            reach = reach + torch.tensor(skeleton.offsets[child], dtype=torch.float32)
+            parent = skeleton.parents[child]
+            if parent < 0 or parent in moving:
+                break
+            still = still_pose[parent].float()
+            reach, turn = rotate(still, reach), multiply(still, turn)
+            child = parent
+        parents.append(moving.index(parent) if parent >= 0 else -1)
+        turns.append(turn)
+        reaches.append(reach)
+    return Bones(parents, torch.stack(turns), torch.stack(reaches))
+
+
 class MovingSkeleton(torch.nn.Module):
     """Forward kinematics of the moving joints alone; the still joints between them are folded into the bones.
 
     The root joint stays at the origin: the figure is compared, not its path through the room.
     """
 
-    def __init__(self, skeleton: Skeleton, moving: tuple[int, ...], still_pose: Tensor) -> None:
+    def __init__(self, bones: Bones) -> None:
         super().__init__()
-        parents, turns, reaches = [], [], []
-        for joint in moving:
-            turn, reach = torch.tensor([1.0, 0.0, 0.0, 0.0]), torch.zeros(3)
-            child = joint
-            while True:  # climb over still joints to the next moving one
-                reach = reach + torch.tensor(skeleton.offsets[child], dtype=torch.float32)
-                parent = skeleton.parents[child]
-                if parent < 0 or parent in moving:
-                    break
-                still = still_pose[parent].float()
-                reach, turn = rotate(still, reach), multiply(still, turn)
-                child = parent
-            parents.append(moving.index(parent) if parent >= 0 else -1)
-            turns.append(turn)
-            reaches.append(reach)
-        depth: list[int] = []
-        for parent in parents:
-            depth.append(0 if parent < 0 else depth[parent] + 1)
         # Joints of the same depth are turned together: a third of the operations of joint by joint.
-        self.levels = [[j for j, d in enumerate(depth) if d == level] for level in range(max(depth) + 1)]
+        self.levels = bones.levels
         self.above = [
-            [self.levels[level - 1].index(parents[j]) for j in joints]
+            [self.levels[level - 1].index(bones.parents[j]) for j in joints]
             for level, joints in enumerate(self.levels[1:], start=1)
         ]
         order = [joint for level in self.levels for joint in level]
         self.places = [order.index(joint) for joint in range(len(order))]
         self.turns: Tensor
         self.reaches: Tensor
-        self.register_buffer("turns", torch.stack(turns))
-        self.register_buffer("reaches", torch.stack(reaches))
+        self.register_buffer("turns", bones.turns)
+        self.register_buffer("reaches", bones.reaches)
 
     def forward(self, pose: Tensor) -> Tensor:
         """(..., M, 4) -> positions (..., M, 3) in metres, relative to the root joint."""

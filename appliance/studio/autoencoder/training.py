@@ -28,6 +28,7 @@ from appliance.studio.training_loop import ALONE, TrainingLoop
 
 FEW_TAKES = 4
 ADVERSARIAL_BETAS = (0.5, 0.99)  # of Adam, where two networks learn against each other
+HAND_PACE = 4.0  # of the hand encoder's learning rate: it follows answers, not the critic alone
 SAMPLED_SEQUENCES = 500  # to measure how the dancer moves
 SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
 
@@ -61,7 +62,7 @@ class Settings:
     critic_every: int = 2  # steps; the prior moves slowly
     sequences: int = 20  # dances that the motion critic sees in a step; 0: there is no critic
     passes: int = 10  # of them at most, the last one without hands
-    free_sequences: float = 0.3  # of them without a hand: these wander, coded again and again
+    free_sequences: float = 0.2  # of them without a hand: these wander, coded again and again
     alive_from: float = 0.25  # of the training, when the network begins to follow the motion critic
     motion_learning_rate: float = 4e-4
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
@@ -143,8 +144,12 @@ class Training(TrainingLoop[Report]):
             windows(dataset.held_out, dataset.moving, window=settings.window, hop=settings.hop)
         ).to(self.device)
         betas = ADVERSARIAL_BETAS if isinstance(network, Coupled) else (0.9, 0.999)
+        hands = list(network.hands.parameters()) if isinstance(network, Coupled) else []
+        of_hands = {id(parameter) for parameter in hands}
+        others = [each for each in self.autoencoder.parameters() if id(each) not in of_hands]
+        groups = [{"params": others, "pace": 1.0}, {"params": hands, "pace": HAND_PACE}]
         self.optimizer = torch.optim.Adam(
-            self.autoencoder.parameters(), lr=settings.learning_rate, betas=betas, fused=True
+            [group for group in groups if group["params"]], lr=settings.learning_rate, betas=betas, fused=True
         )
         self.critic_optimizer = torch.optim.Adam(
             self.critic.parameters(), lr=settings.critic_learning_rate, betas=(0.5, 0.999), fused=True
@@ -389,7 +394,7 @@ class Training(TrainingLoop[Report]):
         warm = min(1.0, (self.step + 1) / 200)
         cosine = self._cosine()
         for group in self.optimizer.param_groups:
-            group["lr"] = self.settings.learning_rate * warm * max(cosine, 0.005)
+            group["lr"] = group["pace"] * self.settings.learning_rate * warm * max(cosine, 0.005)
         for group in self.critic_optimizer.param_groups:
             group["lr"] = self.settings.critic_learning_rate * max(cosine, 0.1)
         for group in self.motion_optimizer.param_groups:
