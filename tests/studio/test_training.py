@@ -95,7 +95,7 @@ def test_training_reduces_the_error(dancer: Dataset, tmp_path: Path, network: st
 
 def test_only_a_prior_of_some_weight_moves_the_encoder(dancer: Dataset) -> None:
     nothing = LossWeights(rotation=0.0, pace=0.0, unit_norm=0.0, position=0.0, prior=0.0)
-    nothing = replace(nothing, hands=0.0, alive=0.0, off_hand=0.0)
+    nothing = replace(nothing, pull=0.0, alive=0.0, off_hand=0.0)
     for prior, moves in ((0.0, False), (0.01, True)):
         training = Training(dancer, replace(TINY, weights=replace(nothing, prior=prior)))
         before = {k: v.clone() for k, v in training.autoencoder.network.encoder.state_dict().items()}
