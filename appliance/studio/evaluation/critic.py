@@ -23,6 +23,7 @@ NOISE_DEGREES = 2.0
 PACE_NOISE = 0.25  # on the logarithm of speed and acceleration
 GAP = 50  # ticks between what it learns and what it is asked, where both are of one take
 SIZES, STEPS, BATCH, RATE, DECAY, DROPPED, BLUR = (64, 32), 400, 256, 2e-3, 0.05, 0.3, 0.1
+PASSES, FEWEST_STEPS = 30, 40  # so often it sees each row; few rows need few steps, 3,500 all
 LEAST_ROWS = 20
 
 Floats = NDArray[np.float32]
@@ -134,7 +135,7 @@ def _learned(real: Floats, made: Floats, chance: np.random.Generator) -> Callabl
         ]
     first, second = [np.zeros_like(layer) for layer in layers], [np.zeros_like(layer) for layer in layers]
     blur = BLUR * chance.standard_normal((4 * BATCH, rows.shape[1]), dtype=np.float32)
-    for step in range(1, STEPS + 1):
+    for step in range(1, min(STEPS, max(FEWEST_STEPS, PASSES * len(rows) // BATCH)) + 1):
         chosen, shift = chance.integers(len(rows), size=BATCH), chance.integers(3 * BATCH)
         seen = rows[chosen] + blur[shift : shift + BATCH]
         kept = (chance.random((BATCH, SIZES[0])) >= DROPPED).astype(np.float32) / np.float32(1 - DROPPED)
