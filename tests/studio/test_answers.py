@@ -110,26 +110,18 @@ def hands_of(lesson: Lesson) -> Hands:
 
 
 def test_a_window_without_a_hand_should_come_out_as_it_went_in(recorded: Tensor) -> None:
-    lesson = without_hands(lessons(recorded, disturbed=0.0))
+    lesson = without_hands(lessons(recorded))
     assert lesson.hands is None
     torch.testing.assert_close(lesson.answer, lesson.windows, atol=1e-3, rtol=0)
 
 
 def test_mirror_images_are_copied_and_are_no_answers(recorded: Tensor) -> None:
     danced = recorded[recorded[:, 0, ARM, 3] > 0]  # the others bend the arm to the other side
-    answers = lessons(recorded, danced, wild=0.0, disturbed=0.0)
+    answers = lessons(recorded, danced, wild=0.0)
     assert without_hands(answers).answer[:, :, ARM, 3].min() < -0.3
     lesson = with_hands(answers)
     for windows in (lesson.windows, lesson.answer, hands_of(lesson).goal):
         assert windows[:, :, ARM, 3].min() > -0.01
-
-
-def test_a_disturbed_window_is_led_back(recorded: Tensor) -> None:
-    lesson = without_hands(lessons(recorded, disturbed=1.0))
-    fresh = lesson.windows[:100]
-    # The leg of an undisturbed window follows the arm: that is what should come out.
-    assert degrees(lesson.answer[:100, :, LEG], lesson.answer[:100, :, ARM]).max() < 0.1
-    assert degrees(fresh[:, :, LEG], fresh[:, :, ARM]).max() > 20
 
 
 def test_a_light_hand_asks_for_a_part_of_the_answer(recorded: Tensor) -> None:

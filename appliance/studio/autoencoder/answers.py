@@ -2,7 +2,7 @@
 
 One to three joints are held as they are at another moment, sometimes frozen, sometimes as no dancer ever held
 them. An answer is something that the dancer did: mirror images, which the network learns to copy, are not
-searched. Windows without a hand should come out unchanged; some are disturbed and led back.
+searched. Windows without a hand should come out unchanged.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from appliance.studio.autoencoder.lessons import Hands, Lesson
 from appliance.studio.autoencoder.repertoire import Nearness, Repertoire
 
 _HANDS = (0.75, 0.17, 0.08)  # shares of dances with one, two, three hands
-_DISTURBED_JOINTS = 0.15
 _WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: about a turn a second
 
 
@@ -33,7 +32,6 @@ class AnswerSettings:
     frozen: float = 0.3  # hands that stand still
     wild: float = 0.1  # hands at orientations that no dancer had
     with_hands: float = 0.4  # of a batch; the others are without hands
-    disturbed: float = 0.1  # of the windows without hands: some joints are those of another window
     nearness: Nearness = field(default_factory=Nearness)
 
 
@@ -58,7 +56,8 @@ class Answers:
     def draw(self, batch: int) -> list[Lesson]:
         """Dances with hands, and windows without."""
         count = max(round(self._settings.with_hands * batch), 1)
-        return [self._dances(count), self._without_hands(max(batch - count, 2))]
+        windows = self._moments(max(batch - count, 2))
+        return [self._dances(count), Lesson(windows, windows)]
 
     def state(self) -> dict[str, Any]:
         return {"next": self._next, **{name: getattr(self, f"_{name}") for name in _TENSORS}}
@@ -74,10 +73,6 @@ class Answers:
         rows = self._order[self._next : self._next + count].to(self._held.device)
         self._next += count
         return Lesson(self._start[rows], self._answer[rows], Hands(self._goal[rows], self._held[rows]))
-
-    def _without_hands(self, count: int) -> Lesson:
-        windows = self._moments(count)
-        return Lesson(self._disturbed(windows), windows)
 
     def _refill(self) -> None:
         """New dances and the answers to their hands."""
@@ -100,15 +95,6 @@ class Answers:
     def _moments(self, count: int) -> Tensor:
         """(count, T, M, 4): recorded windows."""
         return self._recorded[torch.randint(len(self._recorded), (count,), device=self._recorded.device)]
-
-    def _disturbed(self, windows: Tensor) -> Tensor:
-        """The windows; in some, a few joints are moved towards those of another window."""
-        count, joints, device = len(windows), windows.shape[2], windows.device
-        share = torch.rand(count, 1, 1, 1, device=device)
-        taken = torch.rand(count, 1, joints, 1, device=device) < _DISTURBED_JOINTS
-        chosen = torch.rand(count, 1, 1, 1, device=device) < self._settings.disturbed
-        towards = (share * taken * chosen).expand_as(windows[..., :1])
-        return slerp_towards(windows, self._moments(count), towards)
 
 
 _TENSORS = ("start", "answer", "goal", "held", "order")

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.coupled import Coupled, share_of_pass
-from appliance.studio.autoencoder.held_joints import HeldJoints
+from appliance.studio.autoencoder.held_joints import HeldJoints, HeldPlaces
 from appliance.studio.autoencoder.networks import Network, Shape
 
 NEAR = 1.0 - 1e-6  # length of a goal: keeps its cosine with a pose below 1, so that no weight vanishes
@@ -64,13 +64,15 @@ class Autoencoder(nn.Module):
         hold: HeldJoints[Tensor] | None = None,
         liveliness: float = 1.0,
         noise: Tensor | None = None,
+        placed: HeldPlaces[Tensor] | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Iterative autoencoding: (B, T, M, 4) -> the same, and the last latents (B, Z).
 
         The first interaction_iterations passes bring the held joints towards their targets: a coupled network
         moves the latent, for any other SLERP overwrites the window before it is coded. If all passes are
         interactive, the result is overwritten too, so that the held orientation shows; otherwise the last
-        pass is the dancer's own. liveliness, 0 to 1, and noise (B, Z) or (Z,): of a coupled network.
+        pass is the dancer's own. liveliness, 0 to 1, noise (B, Z) or (Z,), and joints that are placed: of a
+        coupled network.
         """
         facing = self.facing(windows)
         x = start = self.without_heading(windows, facing)
@@ -87,12 +89,17 @@ class Autoencoder(nn.Module):
             lively = x.new_full((len(x),), liveliness)
             drawn = latents if noise is None else noise.expand_as(latents)
             pull = coupled.pull(self.encode(start), start, meant, (held > 0).float(), lively, drawn)
+        if placed is not None:
+            places = placed.places.expand(len(x), -1, -1)
+            place_weights = placed.weights.expand(len(x), -1)
         for k in range(coding_iterations):
             if k < led and coupled is None:
                 x = slerp_towards(x, goal, held[:, None, :, None])
             latents = self.encode(x)
             if k < led and coupled is not None:
                 latents = latents + share_of_pass(k) * pull
+                if placed is not None:
+                    latents = latents + coupled.step_to_places(x, places, place_weights)
             x = self.decode(latents)
         if interaction_iterations >= coding_iterations:
             x = slerp_towards(x, goal, held[:, None, :, None])

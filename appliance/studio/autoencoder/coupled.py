@@ -7,6 +7,10 @@ hand wants them, less that mean with the joints where the phrase has them. What 
 the residual, stays. So the answer keeps the dance's spread and energy whatever the hand asks for, and a hand
 that holds a joint where the phrase has it changes nothing. A network that learns the answer itself by
 distance gives the mean of all good ones instead, and the mean stands still (docs/results.md).
+
+A hand may also want a joint at a place. The place encoder gives the mean latent while joints are at given
+places, and each interaction adds a difference again: where the joint comes to lie depends on the whole chain
+above it, so what is missing is looked at anew (once for all passes left a hand 10 cm off; anew, 2 cm).
 """
 
 from __future__ import annotations
@@ -15,9 +19,13 @@ import torch
 from torch import Tensor, nn
 
 from appliance.studio.autoencoder.networks import Mlp, Shape, TimeBasis
+from appliance.studio.autoencoder.rotation import Bones, MovingSkeleton
 
 STEP = 0.5  # share of the remaining way that one interaction takes: half of it at 2/1, 99.8 % at 10/9
 HAND_WIDTH = 320
+PLACE_WIDTH = 192
+LONGEST_STEP = 0.5  # metres that one interaction asks of a joint at most
+SMALLEST_SPREAD = 0.02  # metres; of the places of a joint that hardly moves
 CALM = 0.6  # share of the residual that liveliness 0 keeps: as calm as the answers of release 0.1
 NOISE = 0.25  # of a latent's standard deviation, at liveliness 1
 
@@ -64,12 +72,66 @@ class HandEncoder(nn.Module):
         return mean
 
 
+class PlaceEncoder(nn.Module):
+    """Mean latent while joints are at given places; it knows the bones, and so where a window's joints are.
+
+    Places: (B, M, 3) in metres from the root joint, axes of the heading-free window, mean of its poses.
+    """
+
+    def __init__(self, shape: Shape, width: int = PLACE_WIDTH) -> None:
+        super().__init__()
+        joints = shape.joints
+        self.first = nn.Linear(4 * joints, width)
+        self.second = nn.Linear(width, width)
+        self.last = nn.Linear(width, shape.latent)
+        self.parents: Tensor
+        self.turns: Tensor
+        self.reaches: Tensor
+        self.middle: Tensor
+        self.spread: Tensor
+        self.register_buffer("parents", torch.full((joints,), -1))
+        self.register_buffer("turns", torch.tensor([1.0, 0.0, 0.0, 0.0]).repeat(joints, 1))
+        self.register_buffer("reaches", torch.zeros(joints, 3))
+        self.register_buffer("middle", torch.zeros(joints, 3))
+        self.register_buffer("spread", torch.ones(joints, 1))
+
+    @property
+    def bones(self) -> Bones:
+        """The moving joints' bones; until `set_bones` they have no length, and every place is the root's."""
+        return Bones(self.parents.tolist(), self.turns, self.reaches)
+
+    @torch.no_grad()
+    def set_bones(self, bones: Bones) -> None:
+        self.parents.copy_(torch.tensor(bones.parents))
+        self.turns.copy_(bones.turns)
+        self.reaches.copy_(bones.reaches)
+
+    @torch.no_grad()
+    def measure(self, places: Tensor) -> None:
+        """Scale the input by the dancer's own places (B, M, 3)."""
+        self.middle.copy_(places.mean(0))
+        self.spread.copy_(places.std(0).mean(-1, keepdim=True).clamp_min(SMALLEST_SPREAD))
+
+    def where(self, windows: Tensor) -> Tensor:
+        """Places (B, M, 3) of windows (B, T, M, 4)."""
+        positions: Tensor = MovingSkeleton(self.bones)(windows)
+        return positions.mean(1)
+
+    def forward(self, places: Tensor, held: Tensor) -> Tensor:
+        """(B, Z) for the joints of places (B, M, 3) that are held (B, M), 0 or 1."""
+        seen = (places - self.middle) / self.spread * held[..., None]
+        x = nn.functional.elu(self.first(torch.cat([seen.flatten(1), held], dim=-1)))
+        mean: Tensor = self.last(x + nn.functional.elu(self.second(x)))
+        return mean
+
+
 class Coupled(Mlp):
-    """The mlp with a hand encoder."""
+    """The mlp with a hand encoder and a place encoder."""
 
     def __init__(self, shape: Shape) -> None:
         super().__init__(shape)
         self.hands = HandEncoder(shape)
+        self.places = PlaceEncoder(shape)
 
     @torch.no_grad()
     def standardise(self, mean: Tensor, deviation: Tensor) -> None:
@@ -78,9 +140,9 @@ class Coupled(Mlp):
         first = self.hands.first
         first.bias.add_(first.weight[:, :size] @ mean)
         first.weight[:, :size] *= deviation
-        last = self.hands.last
-        last.weight /= deviation[:, None]
-        last.bias.sub_(mean).div_(deviation)
+        for last in (self.hands.last, self.places.last):
+            last.weight /= deviation[:, None]
+            last.bias.sub_(mean).div_(deviation)
 
     def pull(
         self, latent: Tensor, start: Tensor, goal: Tensor, held: Tensor, liveliness: Tensor, noise: Tensor
@@ -95,6 +157,19 @@ class Coupled(Mlp):
         residual = (1 - CALM) * (lively - 1) * (latent - here)
         pull: Tensor = held.amax(dim=1, keepdim=True) * (there - here + residual + NOISE * lively * noise)
         return pull
+
+    def step_to_places(self, windows: Tensor, places: Tensor, weights: Tensor) -> Tensor:
+        """(B, Z): what one interaction adds to the latents of heading-free windows (B, T, M, 4).
+
+        weights (B, M), 0 to 1: the share of the way to places (B, M, 3) that this one takes; at most
+        LONGEST_STEP of the way counts, so that a place out of reach strains the body less.
+        """
+        here, held = self.places.where(windows), (weights > 0).float()
+        way = places - here
+        length = way.norm(dim=-1, keepdim=True)
+        there = here + weights[..., None] * LONGEST_STEP / length.clamp_min(LONGEST_STEP) * way
+        step: Tensor = self.places(there, held) - self.places(here, held)
+        return step
 
 
 def share_of_pass(number: int) -> float:

@@ -1,4 +1,4 @@
-"""Which joints are held, where, and how firmly: what the interactive passes of the iteration overwrite."""
+"""Which joints are held, where, and how firmly: what the interactive passes of the iteration bring about."""
 
 from __future__ import annotations
 
@@ -17,4 +17,15 @@ class HeldJoints(NamedTuple, Generic[Values]):
 
     mask: Values
     targets: Values
+    weights: Values
+
+
+class HeldPlaces(NamedTuple, Generic[Values]):
+    """Joints that are held at places, by hands that ask for no orientation.
+
+    places (B, M, 3): metres from the root joint, without the heading of the window's middle pose (+Z ahead);
+    weights (B, M), 0 to 1: how firmly, 0 of a joint that is not held. For all windows alike: (M, 3), (M,).
+    """
+
+    places: Values
     weights: Values

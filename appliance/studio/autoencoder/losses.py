@@ -27,7 +27,8 @@ class LossWeights:
     speed: float = 0.0  # how much each joint moves within windows, as a mean over the batch
     divergence: float = 0.001  # of a variational network's latents from the prior
     pull: float = 1.0  # of a hand's pull on the latent, mean square
-    alive: float = 0.04  # of what the motion critic says
+    place: float = 1.0  # of the place encoder's guess at the latent, mean square
+    alive: float = 0.05  # of what the motion critic says
     off_hand: float = 0.06  # of how far held joints are from their hands
 
 

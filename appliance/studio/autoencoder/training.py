@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from appliance.studio.autoencoder import losses, motion_critic, rotation
-from appliance.studio.autoencoder.answers import Answers, AnswerSettings
+from appliance.studio.autoencoder.answers import Answers, AnswerSettings, held_weights
 from appliance.studio.autoencoder.architectures import DEFAULT, build
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
 from appliance.studio.autoencoder.coupled import Coupled, share_of_pass
@@ -28,7 +28,9 @@ from appliance.studio.training_loop import ALONE, TrainingLoop
 
 FEW_TAKES = 4
 ADVERSARIAL_BETAS = (0.5, 0.99)  # of Adam, where two networks learn against each other
-HAND_PACE = 4.0  # of the hand encoder's learning rate: it follows answers, not the critic alone
+SAMPLED_PLACES = 4096  # windows, to measure where the dancer's joints are
+PLACED = 64  # windows of a step from which the place encoder learns
+HAND_PACE = 2.0  # of the hand encoder's learning rate: it follows answers, not the critic alone
 SAMPLED_SEQUENCES = 500  # to measure how the dancer moves
 SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
 
@@ -62,7 +64,7 @@ class Settings:
     critic_every: int = 2  # steps; the prior moves slowly
     sequences: int = 20  # dances that the motion critic sees in a step; 0: there is no critic
     passes: int = 10  # of them at most, the last one without hands
-    free_sequences: float = 0.2  # of them without a hand: these wander, coded again and again
+    free_sequences: float = 0.25  # of them without a hand: half of these wander, coded again and again
     alive_from: float = 0.25  # of the training, when the network begins to follow the motion critic
     motion_learning_rate: float = 4e-4
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
@@ -133,18 +135,24 @@ class Training(TrainingLoop[Report]):
         network.start_at(rest.float().flatten().to(self.device))
         if start is not None:
             self.autoencoder.load_state_dict(start.state_dict())
-        self.averaged = copy.deepcopy(self.autoencoder).requires_grad_(False).eval()
-        self.critic = PriorCritic(shape.latent).to(self.device)
-        self.body = rotation.MovingSkeleton(dataset.skeleton, dataset.moving, torch.tensor(still)).to(
-            self.device
-        )
+        bones = rotation.moving_bones(dataset.skeleton, dataset.moving, torch.tensor(still))
+        self.body = rotation.MovingSkeleton(bones).to(self.device)
         mirror = settings.mirror and dataset.mirrors
         self.train_windows = self._training_windows(mirror)
+        if isinstance(network, Coupled):
+            network.places.set_bones(bones)
+            if start is None:
+                network.places.measure(self._places(self._some_windows(SAMPLED_PLACES)))
+        self._can_be_placed = torch.tensor([float(parent >= 0) for parent in bones.parents]).to(self.device)
+        self.averaged = copy.deepcopy(self.autoencoder).requires_grad_(False).eval()
+        self.critic = PriorCritic(shape.latent).to(self.device)
         self.held_windows = torch.tensor(
             windows(dataset.held_out, dataset.moving, window=settings.window, hop=settings.hop)
         ).to(self.device)
         betas = ADVERSARIAL_BETAS if isinstance(network, Coupled) else (0.9, 0.999)
-        hands = list(network.hands.parameters()) if isinstance(network, Coupled) else []
+        hands: list[torch.nn.Parameter] = []
+        if isinstance(network, Coupled):
+            hands = [*network.hands.parameters(), *network.places.parameters()]
         of_hands = {id(parameter) for parameter in hands}
         others = [each for each in self.autoencoder.parameters() if id(each) not in of_hands]
         groups = [{"params": others, "pace": 1.0}, {"params": hands, "pace": HAND_PACE}]
@@ -233,8 +241,34 @@ class Training(TrainingLoop[Report]):
             seen = coded + self.settings.latent_noise * self.processes.noise(coded)
         with self.mixed:
             raw = self.autoencoder.decode_raw(seen).float()
+        if isinstance(self.autoencoder.network, Coupled):
+            parts["place"] = self._place_loss(windows[:PLACED], coded[:PLACED])
         parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body, self.settings.weights))
         return coded, parts
+
+    def _place_loss(self, windows: Tensor, coded: Tensor) -> Tensor:
+        """How far latents (B, Z) are from what the places of one to three joints of windows say of them; only
+        the place encoder learns from it.
+        """
+        network = self.autoencoder.network
+        assert isinstance(network, Coupled)
+        chances = self._can_be_placed.clamp_min(1e-6)  # a small body has fewer joints than hands
+        held = held_weights(len(windows), chances, 0.0) * self._can_be_placed
+        with self.mixed:
+            guess = network.places(self._places(windows), held).float()
+        loss: Tensor = (guess - coded.detach()).square().mean()
+        return loss
+
+    @torch.no_grad()
+    def _places(self, windows: Tensor) -> Tensor:
+        """Mean places (B, M, 3) of the joints of heading-free windows (B, T, M, 4)."""
+        positions: Tensor = self.body(windows)
+        return positions.mean(1)
+
+    def _some_windows(self, sample: int) -> Tensor:
+        """Training windows, evenly from all takes."""
+        rows = torch.linspace(0, len(self.train_windows) - 1, min(sample, len(self.train_windows))).long()
+        return self.train_windows[rows]
 
     def _pull(self, lesson: Lesson, hands: Hands) -> tuple[Tensor, dict[str, Tensor]]:
         """Latents (B, Z) of a batch, and how far the hands' pulls are from where the answers lie."""
@@ -271,15 +305,15 @@ class Training(TrainingLoop[Report]):
         count = max(2, settings.sequences // self.processes.count)
         dances, hands, real = sequences.draw(count), sequences.draw(count), sequences.draw(2 * count)
         free = round(count * settings.free_sequences)
-        wandering = sequences.wandering(free)
-        dances.windows[:free] = wandering.windows
+        wandering = sequences.wandering(free // 2)
+        dances.windows[: free // 2] = wandering.windows
         held = motion_critic.draw_hands(count, self._chances, free)
         held_real = motion_critic.draw_hands(2 * count, self._chances, 2 * free)
         passes = motion_critic.draw_passes(settings.passes)
         goal = hands.as_hands_of(dances.windows)
         whole = self._danced(dances.windows.flatten(0, 1), goal.flatten(0, 1), held, passes)
         danced = whole.view_as(dances.windows)
-        wandering.go_on(danced[:free], passes)
+        wandering.go_on(danced[: free // 2], passes)
         motion = motion_critic.blended(danced)
         target = motion_critic.middle_target(goal)
         seen = self.motion_critic.requires_grad_(False)
@@ -334,8 +368,7 @@ class Training(TrainingLoop[Report]):
     @torch.no_grad()
     def latent_moments(self, sample: int = 8192) -> tuple[Tensor, Tensor]:
         """Mean and standard deviation (Z,) of the averaged network's latents of the training windows."""
-        rows = torch.linspace(0, len(self.train_windows) - 1, min(sample, len(self.train_windows))).long()
-        latents = self.averaged.encode(self.train_windows[rows])
+        latents = self.averaged.encode(self._some_windows(sample))
         return latents.mean(0), latents.std(0).clamp_min(1e-3)
 
     def state(self) -> dict[str, Any]:
