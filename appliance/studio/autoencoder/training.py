@@ -261,9 +261,10 @@ class Training(TrainingLoop[Report]):
 
     @torch.no_grad()
     def _places(self, windows: Tensor) -> Tensor:
-        """Mean places (B, M, 3) of the joints of heading-free windows (B, T, M, 4)."""
-        positions: Tensor = self.body(windows)
-        return positions.mean(1)
+        """Places (B, M, 3) of the joints of heading-free windows (B, T, M, 4)."""
+        network = self.autoencoder.network
+        assert isinstance(network, Coupled)
+        return network.places.seen(self.body(windows))
 
     def _some_windows(self, sample: int) -> Tensor:
         """Training windows, evenly from all takes."""

@@ -75,9 +75,8 @@ class _Legs(torch.nn.Module):
         tips = [joints + ends.index(point - joints) if point >= joints else point for point in points]
         chain = tuple(sorted({0, *self.turned, *tips}))
         identity = np.tile(quaternion.IDENTITY, (len(ends), 1))
-        self.body = rotation.MovingSkeleton(
-            longer, chain, torch.tensor(np.concatenate([still_pose, identity]))
-        )
+        still = torch.tensor(np.concatenate([still_pose, identity]))
+        self.body = rotation.MovingSkeleton(rotation.moving_bones(longer, chain, still))
         self.rows = [chain.index(joint) for joint in self.turned]
         self.tips = [chain.index(tip) for tip in tips]
         self.size = len(chain)
