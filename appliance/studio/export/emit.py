@@ -16,8 +16,18 @@ from onnx import TensorProto
 from torch import nn
 
 from appliance.studio.autoencoder import networks
-from appliance.studio.autoencoder.coupled import CALM, NOISE, STEP, Coupled, HandEncoder
+from appliance.studio.autoencoder.coupled import (
+    CALM,
+    LONGEST_STEP,
+    NOISE,
+    STEP,
+    Coupled,
+    HandEncoder,
+    PlaceEncoder,
+    matrix_of_products,
+)
 from appliance.studio.autoencoder.networks import Network, Shape
+from appliance.studio.autoencoder.rotation import Bones
 from appliance.studio.export.graph import Graph, Layers, lstm_weights
 
 EXACT = Layers(int8=False)
@@ -62,12 +72,17 @@ def pulls(
     drawn = graph.op("Mul", graph.op("Mul", lively, graph.constant("noise_share", NOISE)), "noise")
     pull = graph.op("Sum", graph.op("Sub", there, here), residual, drawn)
     pull = graph.op("Mul", graph.op("ReduceMax", held, axis_last, keepdims=1), pull)
-    zero, one = graph.constant("zero_int", 0, np.int64), graph.constant("one_int", 1, np.int64)
-    most = graph.op("ReduceMax", "coding_iterations", keepdims=0)
-    passes = graph.op("Cast", graph.op("Range", zero, most, one), to=TensorProto.FLOAT)
-    left = graph.op("Pow", graph.constant("left_by_a_pass", 1 - STEP), passes)
+    numbers = graph.op("Cast", passes(graph), to=TensorProto.FLOAT)
+    left = graph.op("Pow", graph.constant("left_by_a_pass", 1 - STEP), numbers)
     shares = graph.unsqueezed(graph.op("Mul", left, graph.constant("step", STEP)), 1)
     return graph.op("Mul", graph.unsqueezed(graph.op("Mul", gates, shares), 2), pull)
+
+
+def passes(graph: Graph) -> str:
+    """(K,): the numbers of the passes of the row that has most."""
+    zero, one = graph.constant("zero_int", 0, np.int64), graph.constant("one_int", 1, np.int64)
+    most = graph.op("ReduceMax", "coding_iterations", keepdims=0)
+    return graph.op("Range", zero, most, one)
 
 
 def _hands(graph: Graph, hands: HandEncoder, shape: Shape, latent: str, windows: str, held: str) -> str:
@@ -84,6 +99,79 @@ def _hands(graph: Graph, hands: HandEncoder, shape: Shape, latent: str, windows:
     x = EXACT.elu(graph, EXACT.linear(graph, seen, hands.first, "hands.first"))
     more = EXACT.elu(graph, EXACT.linear(graph, x, hands.second, "hands.second"))
     return EXACT.linear(graph, graph.op("Add", x, more), hands.last, "hands.last")
+
+
+def step_to_places(graph: Graph, places: PlaceEncoder, shape: Shape, window: str, gate: str) -> str:
+    """(P, Z): Coupled.step_to_places where gate (P) is 1, node for node. In float: its differences are small
+    beside the places.
+    """
+    axis_last = graph.constant("axis_last", [-1], np.int64)
+    longest = graph.constant("longest_step", LONGEST_STEP)
+    share = graph.op("Mul", "place_weights", graph.op("Mul", graph.unsqueezed(gate, 1), longest))
+    share = graph.op("Unsqueeze", share, axis_last)
+    placed = graph.op("Greater", "place_weights", graph.constant("zero", 0.0))
+    placed = graph.op("Cast", placed, to=TensorProto.FLOAT)
+    held = graph.op("Concat", placed, placed, axis=0)
+    here = _where(graph, places, shape, window)
+    way = graph.op("Sub", "places", here)
+    length = graph.op("ReduceL2", way, axis_last, keepdims=1)
+    share = graph.op("Div", share, graph.op("Max", length, longest))
+    both = graph.op("Concat", graph.op("Add", here, graph.op("Mul", share, way)), here, axis=0)
+    apart = graph.op("Sub", both, graph.constant("places.middle", places.middle.numpy()))
+    scaled = graph.op("Div", apart, graph.constant("places.spread", places.spread.numpy()))
+    scaled = graph.op("Mul", scaled, graph.op("Unsqueeze", held, axis_last))
+    seen = graph.op("Concat", _reshaped(graph, scaled, -1, shape.joints * 3), held, axis=1)
+    x = EXACT.elu(graph, EXACT.linear(graph, seen, places.first, "places.first"))
+    more = EXACT.elu(graph, EXACT.linear(graph, x, places.second, "places.second"))
+    means = EXACT.linear(graph, graph.op("Add", x, more), places.last, "places.last")
+    there, now = graph.name("there"), graph.name("now")
+    graph.ops("Split", [means], [there, now], axis=0, num_outputs=2)
+    any_placed = graph.op("ReduceMax", placed, axis_last, keepdims=1)
+    return graph.op("Mul", graph.op("Sub", there, now), any_placed)
+
+
+def _where(graph: Graph, places: PlaceEncoder, shape: Shape, window: str) -> str:
+    """(P, M, 3): PlaceEncoder.where of windows (P, T, M, 4), with 4 x 4 matrices, joint by joint's depth."""
+    bones = places.bones
+    joint_first = graph.op("Transpose", window, perm=[2, 0, 1, 3])
+    column = graph.op("Unsqueeze", joint_first, graph.constant("axis_last", [-1], np.int64))
+    row = graph.op("Unsqueeze", joint_first, graph.constant("axis_before_last", [-2], np.int64))
+    products = _reshaped(graph, graph.op("Mul", column, row), shape.joints, -1, 16)
+    local = graph.op("MatMul", products, graph.constant("places.bones", _bone_matrices(bones)))
+    local = _reshaped(graph, local, shape.joints, -1, 4, 4)
+    order: list[int] = []
+    worlds: list[str] = []
+    for depth, joints in enumerate(bones.levels):
+        at = graph.constant(f"joints_at_depth{depth}", joints, np.int64)
+        world = graph.op("Gather", local, at, axis=0)
+        if worlds:
+            above = [bones.levels[depth - 1].index(bones.parents[joint]) for joint in joints]
+            parents = graph.constant(f"above_depth{depth}", above, np.int64)
+            world = graph.op("MatMul", graph.op("Gather", worlds[-1], parents, axis=0), world)
+        worlds.append(world)
+        order += joints
+    every = _reshaped(graph, graph.op("Concat", *worlds, axis=0), shape.joints, -1, shape.window, 16)
+    seen = graph.op("MatMul", graph.constant("shown", places.shown.numpy()), every)
+    position = graph.op("Gather", seen, graph.constant("last_column", [3, 7, 11], np.int64), axis=2)
+    in_order = graph.constant("depth_order", [order.index(j) for j in range(shape.joints)], np.int64)
+    return graph.op("Transpose", graph.op("Gather", position, in_order, axis=0), perm=[1, 0, 2])
+
+
+def _bone_matrices(bones: Bones) -> np.ndarray:
+    """(M, 16, 16): from the products of a joint's unit quaternion to the matrix, row by row, that takes its
+    axes to its parent's.
+    """
+    rotation = matrix_of_products().numpy().astype(np.float64).reshape(16, 3, 3)
+    turns = np.einsum("jp,jq->jpq", bones.turns.numpy(), bones.turns.numpy()).reshape(-1, 16)
+    one = np.zeros(16)
+    one[[0, 5, 10, 15]] = 1.0  # the squares of a unit quaternion
+    matrices = np.zeros((len(bones.parents), 16, 4, 4))
+    for joint, parent in enumerate(bones.parents):
+        turn = np.einsum("p,prc->rc", turns[joint], rotation) if parent >= 0 else np.eye(3)
+        matrices[joint, :, :3, :3] = np.einsum("rk,pkc->prc", turn, rotation)
+        matrices[joint, :, :3, 3] = np.outer(one, bones.reaches[joint].numpy()) if parent >= 0 else 0.0
+        matrices[joint, :, 3, 3] = one
+    return matrices.reshape(-1, 16, 16)
 
 
 def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent: str, bias: str = "") -> str:

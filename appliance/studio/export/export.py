@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +22,15 @@ def export(
 ) -> onnx.ModelProto:
     """Write the puppets' network file: the windows of P puppets in one run, each with its own iterations.
 
-    Inputs: show.network.network_inputs, P of each; coding_iterations are at least 1. Liveliness and noise
-    are a coupled network's; places and place_weights change nothing here. Outputs: poses (P, T, M, 4) unit
-    quaternions, latent (P, Z) of the last pass. What it computes is Autoencoder.iterate, node for node.
+    Inputs: show.network.network_inputs, P of each; coding_iterations are at least 1. Liveliness, noise,
+    places and place_weights are a coupled network's. Outputs: poses (P, T, M, 4) unit quaternions, latent
+    (P, Z) of the last pass. What it computes is Autoencoder.iterate, node for node.
     Precision: float32, or dynamic
     int8 with u8 weights per channel. Joint names and sizes travel in the file's metadata.
 
     All rows go through as many passes as the one that has most; each is taken as its own last pass left it.
+    A coupled network's pass is there twice, with the same constants: while no row has a place weight above 0,
+    none looks where the joints are.
     In int8 the rows' activations share a range, so that a row depends a little on the others
     (docs/results.md); the same rows give the same bits.
     """
@@ -42,29 +45,22 @@ def export(
     held = _held(main, weight, shape.joints)
     gates = _gates(main)
 
-    body = Graph("pass_", main.constants)
     layers = Layers(int8)
     network = autoencoder.network
     if isinstance(network, Coupled):
         zero = main.constant("zero", 0.0)
         is_held = main.op("Cast", main.op("Greater", weight, zero), to=TensorProto.FLOAT)
         meant = _slerp(main, x, goal, _gated(main, _held(main, _whole(main, weight), shape.joints), "plus"))
-        each_pass = {"pull": emit.pulls(main, layers, network, shape, x, meant, is_held, gates)}
-        coded = emit.encode(body, layers, network, shape, "x", body.name("coded"))
-        latent = body.op("Add", coded, "pull", out="latent_out")
+        pull = emit.pulls(main, layers, network, shape, x, meant, is_held, gates)
+        every = _coupled_passes(main, layers, autoencoder, x, pull, gates)
     else:
+
+        def overwritten(body: Graph) -> str:
+            seen = _slerp(body, "x", goal, "shares")
+            return emit.encode(body, layers, network, shape, seen, "latent_out")
+
         each_pass = {"shares": _gated(main, held, main.unsqueezed(gates, 2, 3, 4))}
-        seen = _slerp(body, "x", goal, "shares")
-        latent = emit.encode(body, layers, network, shape, seen, "latent_out")
-    raw = emit.decode(body, layers, network, shape, latent)
-    body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
-    window = [None, shape.window, shape.joints, 4]
-    inputs = [info("x", window), *(info(name, None) for name in each_pass)]
-    outputs = [info("x_out", window), info(raw, window), info("latent_out", [None, shape.latent])]
-    one_pass = helper.make_graph(body.nodes, "one_coding_iteration", inputs, outputs)
-    every = [main.name("every_raw"), main.name("every_latent")]
-    ends = main.name("x")
-    main.ops("Scan", [x, *each_pass.values()], [ends, *every], body=one_pass, num_scan_inputs=len(each_pass))
+        _, *every = _passes(main, layers, autoencoder, x, each_pass, overwritten)
     coded = main.op("LpNormalization", _last(main, every[0]), axis=-1, p=2)
     _last(main, every[1], out="latent")
     mirror = main.op("Not", main.op("Less", "interaction_iterations", "coding_iterations"))
@@ -82,6 +78,8 @@ def export(
         "precision": precision,
         "rest": json.dumps(np.round(autoencoder.rest.cpu().numpy().astype(float), 7).tolist()),
     }
+    if isinstance(network, Coupled):
+        facts["bones"] = _bones(network)
     for key, value in facts.items():
         entry = model.metadata_props.add()
         entry.key, entry.value = f"bunraku.{key}", value
@@ -103,6 +101,95 @@ def _model(main: Graph, autoencoder: Autoencoder) -> onnx.ModelProto:
     graph = helper.make_graph(main.nodes, "bunraku_puppets", inputs, outputs, main.initializers())
     opsets = [helper.make_opsetid("", OPSET), helper.make_opsetid(MICROSOFT, 1)]
     return helper.make_model(graph, opset_imports=opsets, ir_version=8, producer_name="bunraku")
+
+
+def _passes(
+    graph: Graph,
+    layers: Layers,
+    autoencoder: Autoencoder,
+    x: str,
+    each_pass: dict[str, str],
+    code: Callable[[Graph], str],
+) -> list[str]:
+    """Passes from windows x: the last windows, and raw windows (K, P, T, M, 4) and latents (K, P, Z) of all.
+
+    each_pass: (K, ..) by the name under which a pass finds its own; code: its nodes from window 'x' to the
+    latent 'latent_out'.
+    """
+    shape, body = autoencoder.shape, Graph(graph.name("pass_"), graph.constants)
+    raw = emit.decode(body, layers, autoencoder.network, shape, code(body))
+    body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
+    window = [None, shape.window, shape.joints, 4]
+    inputs = [info("x", window), *(info(name, None) for name in each_pass)]
+    outputs = [info("x_out", window), info(raw, window), info("latent_out", [None, shape.latent])]
+    one_pass = helper.make_graph(body.nodes, "one_coding_iteration", inputs, outputs)
+    results = [graph.name("x"), graph.name("every_raw"), graph.name("every_latent")]
+    graph.ops("Scan", [x, *each_pass.values()], results, body=one_pass, num_scan_inputs=len(each_pass))
+    return results
+
+
+def _coupled_passes(
+    main: Graph, layers: Layers, autoencoder: Autoencoder, x: str, pull: str, gates: str
+) -> list[str]:
+    """The passes of a coupled network; pull (K, P, Z), gates (K, P). The first ones look where joints are.
+
+    Only these are in an If: onnxruntime prepacks no weights of a Scan in an If, which runs a third slower;
+    a pass that has an If inside costs every show that.
+    """
+    network, shape = autoencoder.network, autoencoder.shape
+    assert isinstance(network, Coupled)
+
+    def pulled(body: Graph) -> str:
+        coded = emit.encode(body, layers, network, shape, "x", body.name("coded"))
+        return body.op("Add", coded, "pull", out="latent_out")
+
+    def stepped(body: Graph) -> str:
+        coded = emit.encode(body, layers, network, shape, "x", body.name("coded"))
+        step = emit.step_to_places(body, network.places, shape, "x", "gate")
+        return body.op("Sum", coded, "pull", step, out="latent_out")
+
+    start, end = main.constant("at0", [0], np.int64), main.constant("at_end", [1 << 31], np.int64)
+    count = _passes_with_places(main)
+    led, free = Graph("led_", main.constants), Graph("free_", main.constants)
+    first = {
+        "pull": led.op("Slice", pull, start, count, start),
+        "gate": led.op("Slice", gates, start, count, start),
+    }
+    some = _passes(led, layers, autoencoder, x, first, stepped)
+    none = [
+        free.op("Identity", x),
+        free.op("Slice", free.unsqueezed(x, 0), start, start, start),
+        free.op("Slice", pull, start, start, start),
+    ]
+    window = [None, shape.window, shape.joints, 4]
+    sizes = [window, [None, *window], [None, None, shape.latent]]
+    with_places, without_places = (
+        helper.make_graph(graph.nodes, name, [], [info(*each) for each in zip(names, sizes, strict=True)])
+        for graph, name, names in ((led, "with_places", some), (free, "without_places", none))
+    )
+    between, *before = (main.name(kind) for kind in ("x", "every_raw", "every_latent"))
+    is_some = main.op("Greater", count, start)
+    main.ops("If", [is_some], [between, *before], then_branch=with_places, else_branch=without_places)
+    # A Scan needs a pass: after passes that are all led there is one more, which no row takes for its last.
+    last = main.op("Sub", main.op("ReduceMax", "coding_iterations"), main.constant("once", [1], np.int64))
+    rest = {"pull": main.op("Slice", pull, main.op("Min", count, last), end, start)}
+    _, *after = _passes(main, layers, autoencoder, between, rest, pulled)
+    return [main.op("Concat", *each, axis=0) for each in zip(before, after, strict=True)]
+
+
+def _passes_with_places(graph: Graph) -> str:
+    """(1,): in how many passes a row has an interaction with a joint at a place."""
+    axis_last = graph.constant("axis_last", [-1], np.int64)
+    most = graph.op("ReduceMax", "place_weights", axis_last, keepdims=0)
+    placed = graph.op("Greater", most, graph.constant("zero", 0.0))
+    times = graph.op("Where", placed, "interaction_iterations", graph.constant("zero_int", 0, np.int64))
+    return graph.op("Min", graph.op("ReduceMax", times), graph.op("ReduceMax", "coding_iterations"))
+
+
+def _bones(network: Coupled) -> str:
+    """Parents, turns and reaches of the moving joints as JSON."""
+    parents, *others = network.places.bones
+    return json.dumps([parents, *(np.round(each.numpy().astype(float), 7).tolist() for each in others)])
 
 
 def _last(graph: Graph, every: str, out: str | None = None) -> str:
@@ -172,9 +259,7 @@ def _whole(graph: Graph, weight: str) -> str:
 
 def _gates(graph: Graph) -> str:
     """(K, P): 1 in the interactive passes of each row, 0 once they are over."""
-    zero, one = graph.constant("zero_int", 0, np.int64), graph.constant("one_int", 1, np.int64)
-    most = graph.op("ReduceMax", "coding_iterations", keepdims=0)
-    passes = graph.unsqueezed(graph.op("Range", zero, most, one), 1)
+    passes = graph.unsqueezed(emit.passes(graph), 1)
     return graph.op("Cast", graph.op("Less", passes, "interaction_iterations"), to=TensorProto.FLOAT)
 
 

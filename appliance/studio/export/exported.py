@@ -21,6 +21,7 @@ from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.coupled import Coupled
 from appliance.studio.autoencoder.networks import Mlp, Residual
+from appliance.studio.autoencoder.rotation import Bones
 from appliance.studio.evaluation.coders import TorchCoder
 from appliance.studio.studio_error import StudioError
 
@@ -62,9 +63,14 @@ def _rebuilt(
     for side, stack in (("encoder", network.encoder.stack), ("decoder", network.decoder.stack)):
         _read_stack(stack, side, constants)
     if isinstance(network, Coupled):
-        for name, layer in network.hands.named_children():
-            if isinstance(layer, nn.Linear):
-                _read_layer(layer, f"hands.{name}", constants)
+        for side in ("hands", "places"):
+            for name, layer in getattr(network, side).named_children():
+                if isinstance(layer, nn.Linear):
+                    _read_layer(layer, f"{side}.{name}", constants)
+        parents, *others = json.loads(facts["bones"])
+        network.places.set_bones(Bones(parents, *map(torch.tensor, others)))
+        _read(network.places.middle, constants["places.middle"])
+        _read(network.places.spread, constants["places.spread"])
     return Autoencoder(network, shape, rest).requires_grad_(False).eval()
 
 
