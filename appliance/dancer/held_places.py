@@ -11,6 +11,7 @@ import numpy as np
 from appliance.dancer.puppeteers import Puppeteer
 from appliance.dancer.reach import Reach
 from appliance.dancer.slerp import FloatArray
+from appliance.dancer.two_bones import add, scale, subtract
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
@@ -123,23 +124,23 @@ class HeldPlace(Puppeteer):
         if not elapsed:
             return
         limits = self._limits
-        way = _minus(self._bounded(self._aim), self._place)
+        way = subtract(self._bounded(self._aim), self._place)
         far = math.hypot(*way)
-        wanted = _times(way, min(1.0 / max(limits.follow_s, elapsed), limits.m_s / far)) if far > 0.0 else way
-        change = _minus(wanted, self._speed)
+        wanted = scale(way, min(1.0 / max(limits.follow_s, elapsed), limits.m_s / far)) if far > 0.0 else way
+        change = subtract(wanted, self._speed)
         most = limits.m_s2 * elapsed
         length = math.hypot(*change)
         if length > most:
-            change = _times(change, most / length)
-        self._speed = _plus(self._speed, change)
-        self._place = _plus(self._place, _times(self._speed, elapsed))
+            change = scale(change, most / length)
+        self._speed = add(self._speed, change)
+        self._place = add(self._place, scale(self._speed, elapsed))
 
     def _bounded(self, place: Point) -> Point:
         """Above the floor, and within reach of the root."""
         x, y, z = place
-        way = _minus((x, max(0.0, y), z), self._root)
+        way = subtract((x, max(0.0, y), z), self._root)
         far = math.hypot(*way)
-        return _plus(self._root, _times(way, min(1.0, self.reach / far))) if far > 0.0 else self._root
+        return add(self._root, scale(way, min(1.0, self.reach / far))) if far > 0.0 else self._root
 
 
 class FixedPlace(HeldPlace):
@@ -201,15 +202,3 @@ def checked_place(place: Sequence[float]) -> Point:
 def _three(values: Sequence[float]) -> Point:
     x, y, z = values
     return float(x), float(y), float(z)
-
-
-def _plus(a: Point, b: Point) -> Point:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def _minus(a: Point, b: Point) -> Point:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _times(a: Point, share: float) -> Point:
-    return a[0] * share, a[1] * share, a[2] * share
