@@ -14,11 +14,13 @@ from onnx import numpy_helper
 
 from appliance.pose import quaternion
 from appliance.show.network import resting_feed
-from appliance.studio.autoencoder.held_joints import HeldJoints
+from appliance.studio.autoencoder.coupled import Coupled
+from appliance.studio.autoencoder.held_joints import HeldJoints, HeldPlaces
 from appliance.studio.autoencoder.models import PUPPETS
 from appliance.studio.evaluation.coders import OnnxCoder
 from appliance.studio.export.export import export
-from tests.studio.test_autoencoder import some_windows
+from appliance.studio.export.exported import read_exported
+from tests.studio.test_autoencoder import bones_of_tiny, some_windows
 from tests.studio.tiny import moving, skeleton, untrained
 
 NAMES = [skeleton().names[j] for j in moving()]
@@ -103,6 +105,43 @@ def test_a_row_is_what_it_would_be_alone(exported: dict[str, Path]) -> None:
         alone, latent = run(exported["fp32"], rows(coder, [row]))
         np.testing.assert_allclose(together[row], alone[0], atol=5e-5)
         np.testing.assert_allclose(latents[row], latent[0], atol=5e-5)
+
+
+def placed(feed: dict[str, np.ndarray], row: int) -> dict[str, np.ndarray]:
+    """The same, and a hand holds two joints of one row at places."""
+    chance = np.random.default_rng(5)
+    places, weights = np.zeros_like(feed["places"]), np.zeros_like(feed["place_weights"])
+    places[row] = chance.normal(size=places[row].shape)
+    weights[row, [4, 7]] = 1.0, 0.6
+    return {**feed, "places": places, "place_weights": weights}
+
+
+def test_joints_at_places_are_pytorchs_and_other_rows_dance_on(tmp_path: Path) -> None:
+    autoencoder, path = untrained("coupled"), tmp_path / "coupled.onnx"
+    assert isinstance(autoencoder.network, Coupled)
+    autoencoder.network.places.set_bones(bones_of_tiny())
+    export(autoencoder, NAMES, path, int8=False, architecture="coupled")
+    free = rows(OnnxCoder(path))
+    without, _ = run(path, free)
+    moved = run(path, {**free, "places": free["places"] + 1.0})
+    np.testing.assert_array_equal(moved[0], without)
+    read = read_exported(path).autoencoder
+    for row in (0, 1):
+        feed = placed(free, row)
+        poses, latents = run(path, feed)
+        others = [other for other in range(4) if other != row]
+        np.testing.assert_allclose(poses[others], without[others], atol=1e-5)
+        own = HeldJoints(*(torch.from_numpy(feed[name][row]) for name in ("mask", "targets", "weights")))
+        places = HeldPlaces(*(torch.from_numpy(feed[name][row]) for name in ("places", "place_weights")))
+        times = (TIMES[0][row], TIMES[1][row])
+        for network in (autoencoder, read):
+            with torch.no_grad():
+                window = torch.from_numpy(feed["window"][row, None])
+                made, coded = network.iterate(window, *times, own, placed=places)
+            same = quaternion.aligned(poses[row], made[0].numpy())
+            np.testing.assert_allclose(same, made[0].numpy(), atol=1e-4)
+            np.testing.assert_allclose(latents[row], coded[0].numpy(), atol=1e-3)
+        assert np.abs(latents[row] - run(path, free)[1][row]).max() > 1e-3
 
 
 def test_int8_rows_share_a_range_and_are_the_same_each_time(exported: dict[str, Path]) -> None:

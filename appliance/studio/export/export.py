@@ -133,8 +133,8 @@ def _coupled_passes(
 ) -> list[str]:
     """The passes of a coupled network; pull (K, P, Z), gates (K, P). The first ones look where joints are.
 
-    Only these are in an If: onnxruntime prepacks no weights of a Scan in an If, which runs a third slower;
-    a pass that has an If inside costs every show that.
+    These are a Loop, which may have no pass; onnxruntime prepacks its weights. In an If it would not, and all
+    passes in there would run a third slower.
     """
     network, shape = autoencoder.network, autoencoder.shape
     assert isinstance(network, Coupled)
@@ -145,31 +145,23 @@ def _coupled_passes(
 
     def stepped(body: Graph) -> str:
         coded = emit.encode(body, layers, network, shape, "x", body.name("coded"))
-        step = emit.step_to_places(body, network.places, shape, "x", "gate")
-        return body.op("Sum", coded, "pull", step, out="latent_out")
+        own_pull, gate = (body.op("Gather", each, "number", axis=0) for each in (pull, gates))
+        step = emit.step_to_places(body, network.places, shape, "x", gate)
+        return body.op("Sum", coded, own_pull, step, out="latent_out")
 
-    start, end = main.constant("at0", [0], np.int64), main.constant("at_end", [1 << 31], np.int64)
+    end, start = (main.constant(*each, np.int64) for each in (("at_end", [1 << 31]), ("at0", [0])))
     count = _passes_with_places(main)
-    led, free = Graph("led_", main.constants), Graph("free_", main.constants)
-    first = {
-        "pull": led.op("Slice", pull, start, count, start),
-        "gate": led.op("Slice", gates, start, count, start),
-    }
-    some = _passes(led, layers, autoencoder, x, first, stepped)
-    none = [
-        free.op("Identity", x),
-        free.op("Slice", free.unsqueezed(x, 0), start, start, start),
-        free.op("Slice", pull, start, start, start),
-    ]
+    body = Graph(main.name("led_pass_"), main.constants)
+    raw = emit.decode(body, layers, network, shape, stepped(body))
+    body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
+    body.op("Identity", "go_on", out="goes_on")
     window = [None, shape.window, shape.joints, 4]
-    sizes = [window, [None, *window], [None, None, shape.latent]]
-    with_places, without_places = (
-        helper.make_graph(graph.nodes, name, [], [info(*each) for each in zip(names, sizes, strict=True)])
-        for graph, name, names in ((led, "with_places", some), (free, "without_places", none))
-    )
+    inputs = [info("number", [], TensorProto.INT64), info("go_on", [], TensorProto.BOOL), info("x", window)]
+    outputs = [info("goes_on", [], TensorProto.BOOL), info("x_out", window)]
+    outputs += [info(raw, window), info("latent_out", [None, shape.latent])]
+    led = helper.make_graph(body.nodes, "one_led_iteration", inputs, outputs)
     between, *before = (main.name(kind) for kind in ("x", "every_raw", "every_latent"))
-    is_some = main.op("Greater", count, start)
-    main.ops("If", [is_some], [between, *before], then_branch=with_places, else_branch=without_places)
+    main.ops("Loop", [count, "", x], [between, *before], body=led)
     # A Scan needs a pass: after passes that are all led there is one more, which no row takes for its last.
     last = main.op("Sub", main.op("ReduceMax", "coding_iterations"), main.constant("once", [1], np.int64))
     rest = {"pull": main.op("Slice", pull, main.op("Min", count, last), end, start)}
