@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +13,7 @@ import yaml
 from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
 from appliance.sensor.keys import create_keys
+from hw_sim.bundled_shows import show_folder
 from hw_sim.emulated_sensor import REBOOT_S
 from hw_sim.figures import FREE_SETTLING_S, SETTLING_S, Evidence, figures_of, table, verdict
 from hw_sim.peers import ProbeError, Setting, scratch_folder
@@ -131,7 +131,7 @@ def light_course(seconds: float) -> Course:
 
 def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool) -> Setting:
     """Reads of show and box file only what the measurement needs; the box itself checks the rest."""
-    show = show or _default_show()
+    show = show_folder(show)
     config = _plain_yaml(show / "show.yaml")
     hands = [hand for hand in config.get("hands") or [] if isinstance(hand, dict) and hand.get("sensor")]
     if not hands:
@@ -158,11 +158,3 @@ def _plain_yaml(path: Path) -> dict[str, Any]:
     if not isinstance(values, dict):
         raise ProbeError(f"{path}: does not consist of keys. `bunraku check` says more.")
     return values
-
-
-def _default_show() -> Path:
-    """The bundle inside the box's package; found without importing any of it."""
-    package = find_spec("appliance")
-    if package is None or not package.submodule_search_locations:
-        raise ProbeError("The box's package `appliance` is not installed.")
-    return Path(package.submodule_search_locations[0]) / "show" / "default_show"

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from appliance.cli.network_proof import proved, require_danceable
-from appliance.cli.options import BoxFile
+from appliance.cli.options import SHOW_OR_NAME, BoxFile
 from appliance.dancer.material.maker import open_network
 from appliance.dancer.material.motion_network import MotionNetworkError
 from appliance.pose.file_trouble import sentence
@@ -20,6 +20,7 @@ from appliance.show.bundle import (
     bundle_bytes,
     bundle_files,
     default_show_path,
+    named_show,
     write_checksums,
 )
 from appliance.show.check import not_as_packed, verify_bundle
@@ -36,13 +37,16 @@ _PATIENCE_S = 60.0  # a user can wait longer than a box at power-on
 
 
 def check(
-    show: Annotated[
-        Path | None, typer.Argument(help="Show bundle. Default: the show that comes with the box.")
-    ] = None,
+    show: Annotated[Path | None, typer.Argument(callback=named_show, help=SHOW_OR_NAME)] = None,
     box: BoxFile = None,
+    named: Annotated[
+        Path | None, typer.Option("--show", callback=named_show, help="Show, as `play` takes it.")
+    ] = None,
 ) -> None:
     """Check a show and a box file, and measure whether the iterations fit this machine."""
-    check_show(show, box)
+    if show is not None and named is not None:
+        raise typer.BadParameter("name one show, with --show or without")
+    check_show(show or named, box)
 
 
 def check_show(directory: Path | None, box_file: Path | None, patience_s: float = _PATIENCE_S) -> None:

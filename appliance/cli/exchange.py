@@ -12,6 +12,7 @@ import typer
 from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.pose.recording import Recording
 from appliance.pose.stage_frame import Guess
+from appliance.show.bundle import named_show
 
 
 class Unit(StrEnum):
@@ -57,7 +58,10 @@ def convert(
 @reading_options
 def retarget(
     phrase: Annotated[Path, typer.Argument(help="A recording: .bvh, .glb, .npz or .csv.")],
-    to: Annotated[Path, typer.Option(help="The other skeleton: a recording of it, or a show folder.")],
+    to: Annotated[
+        Path,
+        typer.Option(callback=named_show, help="The other skeleton: a recording of it, or a show folder."),
+    ],
     out: Annotated[Path, typer.Option(help="The file; its ending says the format.")],
     *,
     reading: ReadingOptions,

@@ -10,6 +10,7 @@ import typer
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder, command_group, is_for_subcommand
 from appliance.release.choice import box_of
 from appliance.show.asked_for import require_wires
+from appliance.show.bundle import named_show
 
 lights = command_group("Light the rig by the dance; walk through it, look at it, convert fixture profiles.")
 
@@ -18,7 +19,8 @@ lights = command_group("Light the rig by the dance; walk through it, look at it,
 def light(
     context: typer.Context,
     show: Annotated[
-        Path | None, typer.Option(help="Show bundle. Default: the one that the stage dances.")
+        Path | None,
+        typer.Option(callback=named_show, help="Show bundle. Default: the one that the stage dances."),
     ] = None,
     box: BoxFile = None,
     chosen: ChosenFile = None,

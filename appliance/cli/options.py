@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
-ShowFolder = Annotated[
-    Path | None, typer.Option("--show", help="Show bundle. Default: the show that comes with the box.")
-]
+from appliance.show.bundle import bundled_shows, named_show
+
+_NAMES = ", ".join(bundled_shows())
+SHOW_OR_NAME = f"Show bundle, or the name of one that comes with the box: {_NAMES}. Default: default."
+ShowFolder = Annotated[Path | None, typer.Option("--show", callback=named_show, help=SHOW_OR_NAME)]
 BoxFile = Annotated[
     Path | None, typer.Option("--box", help="box.yaml of the venue. Default: everything on this machine.")
 ]

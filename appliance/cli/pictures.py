@@ -18,6 +18,7 @@ from appliance.pose.recording import Recording
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
 from appliance.recorder.record import holds_of
+from appliance.show.bundle import named_show
 from appliance.show.look import looks_by_name
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError
@@ -62,7 +63,9 @@ def filmstrip(
     look: Annotated[
         str | None, typer.Option(help="Render in this look, as the projector shows it: plaster, lines ...")
     ] = None,
-    show: Annotated[Path | None, typer.Option(help="Show bundle that the look belongs to.")] = None,
+    show: Annotated[
+        Path | None, typer.Option(callback=named_show, help="Show bundle that the look belongs to.")
+    ] = None,
     *,
     reading: ReadingOptions,
 ) -> None:

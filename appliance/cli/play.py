@@ -17,7 +17,7 @@ from appliance.box.stop_signals import stop_signals
 from appliance.cli.readings import readings_line
 from appliance.sensor.memory import forget_memory
 from appliance.show.box import BoxConfig, load_box
-from appliance.show.bundle import default_show_path
+from appliance.show.bundle import default_show_path, named_show
 from appliance.show.control import ControlConfig
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import unwired
@@ -58,7 +58,7 @@ def play_show(
     """
     if chosen is not None:
         directory, box_file = _pair_to_dance(chosen, directory, box_file)
-    show, box = load_show(directory or default_show_path()), load_box(box_file)
+    show, box = load_show(named_show(directory) or default_show_path()), load_box(box_file)
     words = ""
     if directory is not None and chosen is None:  # a network that never ends would block every signal
         from appliance.cli.network_proof import prove_network

@@ -11,7 +11,7 @@ import typer
 from appliance.recorder.environment import differing_files, differing_software, environment
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import Run, read_journal
-from appliance.show.bundle import default_show_path
+from appliance.show.bundle import bundled_shows, default_show_path, named_show
 from appliance.show.show import load_show
 from appliance.show_control.packet import readable
 from appliance.stage.comparison import METRES_PER_DEGREE, Comparison
@@ -28,7 +28,8 @@ def replay(
         Path, typer.Argument(help="Folder of a journal, a segment in it, or an exported file.")
     ],
     show: Annotated[
-        Path | None, typer.Option(help="Show bundle. Default: the one that was danced then.")
+        Path | None,
+        typer.Option(callback=named_show, help="Show bundle. Default: the one that was danced then."),
     ] = None,
     from_s: Annotated[float, typer.Option("--from", min=0.0, help="Second of a run to begin at.")] = 0.0,
     tolerance: Annotated[
@@ -98,15 +99,16 @@ def _told(name: str, comparison: Comparison, again: Replay, others: list[str], t
 
 
 def _show_of(run: Run, given: Path | None) -> Path:
-    """The bundle that was danced: as given, where it was, or the one that comes with the box."""
+    """The bundle that was danced: as given, where it was, or one that comes with the box."""
     recorded = run.header["show_directory"]
     if given is not None:
         return given
     if recorded is not None and Path(recorded).is_dir():
         return Path(recorded)
-    bundled = default_show_path()
-    if recorded is None or not differing_files(run.header["show_files"], bundled):
-        return bundled
+    files = run.header["show_files"]
+    bundled = [show for show in bundled_shows().values() if not differing_files(files, show)]
+    if bundled or recorded is None:
+        return next(iter(bundled), default_show_path())
     raise JournalError(
         f"The show '{run.header['show']}' is not where it was ({recorded}). Name its bundle: --show DIR."
     )

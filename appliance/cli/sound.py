@@ -10,6 +10,7 @@ import typer
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
 from appliance.show.asked_for import require_sound
+from appliance.show.bundle import default_show_path, named_show
 from appliance.stage.stage_error import StageError
 
 
@@ -19,7 +20,9 @@ def sound(
     ] = None,
     box: BoxFile = None,
     file: Annotated[Path | None, typer.Option(help="Render a recording into this WAV instead.")] = None,
-    show: Annotated[Path | None, typer.Option(help="Show bundle whose strings the file gets.")] = None,
+    show: Annotated[
+        Path | None, typer.Option(callback=named_show, help="Show bundle whose strings the file gets.")
+    ] = None,
     chosen: ChosenFile = None,
 ) -> None:
     """Play the strings of the show that the stage dances, through the sound card."""
@@ -34,7 +37,6 @@ def sound(
         raise StageError("A file needs both: bunraku sound dance.journal --file out.wav")
     from appliance.cli.pictures import load_dance
     from appliance.show.box import load_box
-    from appliance.show.bundle import default_show_path
     from appliance.show.show import load_show
     from appliance.show.sound import SoundConfig, StringsConfig
     from appliance.sound.render_file import render_file

@@ -1,4 +1,4 @@
-"""A show bundle as a folder of files: where the one that comes with the box lies, and its checksums."""
+"""A show bundle as a folder of files: where those that come with the box lie, and checksums."""
 
 from __future__ import annotations
 
@@ -10,20 +10,51 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from appliance.pose.foreign_file import content, opened, require_inside
-from appliance.show.config_error import Problem
+from appliance.show.config_error import Problem, nearest
 
 CHECKSUMS = "SHA256SUMS"
 WORKSHOP = ("checkpoint.pt", "training.json", "pictures")  # left there by a training: no part of the show
 LARGEST_FILE = 400_000_000  # bytes; a network has some 3 MB, a phrase some 5
 MOST_FILES = 4000
 LARGEST_CHECKSUMS = 1 << 20
+_DEFAULT, _BUNDLED = "default", "_show"
 _LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
 COPY_AGAIN = "Copy the whole bundle again."
 
 
+def bundled_shows() -> dict[str, Path]:
+    """The bundles that come with the box, by name, in the folders `NAME_show` next to this file.
+
+    The default is the first.
+    """
+    shows = {
+        path.name.removesuffix(_BUNDLED): path for path in default_show_path().parent.glob(f"*{_BUNDLED}")
+    }
+    return {name: shows[name] for name in sorted(shows, key=lambda name: (name != _DEFAULT, name))}
+
+
 def default_show_path() -> Path:
-    """The bundle that comes with the box."""
-    return Path(__file__).resolve().parent / "default_show"
+    """The bundle that is danced where no other is named."""
+    return Path(__file__).resolve().parent / f"{_DEFAULT}{_BUNDLED}"
+
+
+def named_show(show: Path | None) -> Path | None:
+    """The folder of a bundled show that is given by its name; any other path as it is.
+
+    A show in a folder of this name takes precedence.
+    """
+    if show is None or (show / "show.yaml").is_file():
+        return show
+    return bundled_shows().get(str(show), show)
+
+
+def no_such_show(directory: Path) -> Problem:
+    """A show folder that does not exist, and the bundled show that was probably meant."""
+    names = list(bundled_shows())
+    near = nearest(directory, names) if len(directory.parts) == 1 else None
+    known = f"Shows that come with the box: {', '.join(names)}."
+    cure = f"Did you mean '{near}', which comes with the box?" if near else f"Check its path. {known}"
+    return Problem(directory, 0, "There is no such show folder.", cure)
 
 
 def bundle_files(directory: Path) -> list[str]:

@@ -14,7 +14,14 @@ from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import content, plain_json, require_inside
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.show.bundle import CHECKSUMS, COPY_AGAIN, bundle_bytes, checksum_problems, unlisted_files
+from appliance.show.bundle import (
+    CHECKSUMS,
+    COPY_AGAIN,
+    bundle_bytes,
+    checksum_problems,
+    no_such_show,
+    unlisted_files,
+)
 from appliance.show.config_error import ConfigError, Problem
 from appliance.show.network import WINDOW, inspect_network
 from appliance.show.show import Show, load_show
@@ -55,7 +62,7 @@ def verify_bundle(directory: Path | str) -> list[Finding]:
     """All that is wrong with a bundle, errors first; empty for a sound one. Never raises for a bad one."""
     directory = Path(directory)
     if not directory.is_dir():
-        return [Finding(directory, 0, "There is no such show folder.", "Check the path of the show.")]
+        return [_error(no_such_show(directory))]
     findings = [*_files(directory), *_show(directory)]
     return sorted(findings, key=lambda finding: finding.level)
 

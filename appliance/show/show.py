@@ -12,7 +12,7 @@ from appliance.pose.body_facts import with_stance
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import require_inside
 from appliance.pose.skeleton import Skeleton
-from appliance.show.bundle import COPY_AGAIN
+from appliance.show.bundle import COPY_AGAIN, no_such_show
 from appliance.show.card import MOST_CARDS, CardConfig, cards_by_name, each_card_once
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.cues import CueConfig, cue_problems
@@ -265,9 +265,7 @@ def load_show(directory: Path | str) -> Show:
     """
     directory = Path(directory)
     if not directory.is_dir():
-        raise ConfigError(
-            [Problem(directory, 0, "There is no such show folder.", "Check the path of the show.")]
-        )
+        raise ConfigError([no_such_show(directory)])
     file = read_yaml(directory / "show.yaml", directory)
     skeleton, problems = _skeleton(directory / "skeleton.bvh")
     context = {"directory": directory, "joints": skeleton.names if skeleton else None}

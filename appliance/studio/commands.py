@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from appliance.pose.reading_options import ReadingOptions, reading_options
+from appliance.show.bundle import named_show
 from appliance.studio import (
     experiment_command,
     granular_command,
@@ -127,7 +128,11 @@ def train(
     ] = None,
     start: Annotated[
         Path | None,
-        typer.Option("--from", help="Show or checkpoint.pt whose network the training begins with."),
+        typer.Option(
+            "--from",
+            callback=named_show,
+            help="Show or checkpoint.pt whose network the training begins with.",
+        ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the training in --out.")] = False,
     threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
@@ -196,7 +201,9 @@ def train(
 @app.command()
 @reading_options
 def evaluate(
-    network: Annotated[Path, typer.Argument(help="Show folder, puppet.onnx or checkpoint.pt.")],
+    network: Annotated[
+        Path, typer.Argument(callback=named_show, help="Show folder, puppet.onnx or checkpoint.pt.")
+    ],
     recordings: Annotated[list[Path], typer.Argument(help="BVH recordings with the same joint names.")],
     json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
     hands: Annotated[

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from appliance.pose.reading_options import ReadingOptions, reading_options
+from appliance.show.bundle import default_show_path, named_show
 from appliance.studio.clear_errors import clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -21,7 +22,9 @@ def experiment(
     ] = Path("out/experiment"),
     show: Annotated[
         Path | None,
-        typer.Option(help="Show whose network dances. Default: the show that comes with the box."),
+        typer.Option(
+            callback=named_show, help="Show whose network dances. Default: the show that comes with the box."
+        ),
     ] = None,
     recordings: Annotated[
         Path | None,
@@ -61,7 +64,6 @@ def experiment(
     a sensor and held still. Out come a page that opens without a network, filmstrips, BVH, experiments.json.
     """
     with clear_errors("experiment"):
-        from appliance.show.bundle import default_show_path
         from appliance.studio.experiments.experiment import ExperimentOptions, run
 
         run(

@@ -11,8 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
+from hw_sim.bundled_shows import show_folder
 from hw_sim.peers import ProbeError
-from hw_sim.soak.box import default_show
 from hw_sim.soak.figures import figures_of, limits_of, table
 from hw_sim.soak.run import Soak, soak
 
@@ -47,7 +47,7 @@ def main(
     out.mkdir(parents=True, exist_ok=True)
     try:
         seen = soak(
-            *((show or default_show()).resolve(), (out / "box").resolve(), 60.0 * minutes, seed, load),
+            *(show_folder(show).resolve(), (out / "box").resolve(), 60.0 * minutes, seed, load),
             lambda: bool(stops),
             progress.each_second,
         )

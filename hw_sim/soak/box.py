@@ -6,7 +6,6 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -109,13 +108,6 @@ def sensors_of(show: Path) -> list[str]:
     if not names:
         raise ValueError(f"{show}: no sensor holds a joint in this show. Give one with sensors.")
     return names
-
-
-def default_show() -> Path:
-    """The bundle inside the box's package; found without importing any of it."""
-    package = find_spec("appliance")
-    assert package is not None and package.submodule_search_locations
-    return Path(package.submodule_search_locations[0]) / "show" / "default_show"
 
 
 def _with_lamps(show: Path, copy: Path) -> Path:
