@@ -11,6 +11,8 @@ import torch
 
 from appliance.studio.autoencoder import losses
 from appliance.studio.autoencoder.answers import AnswerSettings
+from appliance.studio.autoencoder.held_joints import HeldPlaces
+from appliance.studio.autoencoder.lessons import Lesson
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder
@@ -142,6 +144,33 @@ def test_a_checkpoint_gives_the_averaged_network(dancer: Dataset, tmp_path: Path
     latents = autoencoder.encode(training.train_windows)
     assert latents.mean(0).abs().max() < 0.05 and (latents.std(0) - 1).abs().max() < 0.05
     assert tuple(joints) == dancer.moving_names and state["step"] == 5
+
+
+def test_only_the_place_encoder_learns_from_places_and_joints_come_nearer_pass_by_pass(
+    dancer: Dataset,
+) -> None:
+    training = Training(dancer, TINY)
+    autoencoder, network = training.autoencoder, training.autoencoder.network
+    windows = training.train_windows
+    training._place_loss(windows[:8], autoencoder.encode(windows[:8])).backward()
+    for name, parameter in network.named_parameters():
+        assert (parameter.grad is not None) == name.startswith("places."), name
+    for _ in range(200):  # windows must come back from the latent before a latent can move them
+        rows = torch.randint(len(windows), (64,))
+        _, parts = training._code(Lesson(windows[rows], windows[rows]))
+        training.optimizer.zero_grad()
+        (parts["rotation"] + parts["position"] + parts["place"]).backward()
+        training.optimizer.step()
+    joint = dancer.moving_names.index("rForeArm")
+    weights = torch.zeros(len(dancer.moving))
+    weights[joint] = 1.0
+    goal = network.places.where(windows).roll(len(windows) // 3, 0)
+    off = []
+    with torch.no_grad():
+        for passes in (0, 1, 3, 6):
+            made = autoencoder.iterate(windows, passes + 1, passes, placed=HeldPlaces(goal, weights))[0]
+            off.append(float((network.places.where(made) - goal)[:, joint].norm(dim=-1).mean()))
+    assert off[1] < off[0] and off[2] < off[1] and off[3] < 0.7 * off[0], off
 
 
 def test_every_joint_is_held_in_some_lesson_also_one_without_a_bone_below_it(dancer: Dataset) -> None:
