@@ -4,7 +4,11 @@ from __future__ import annotations
 
 EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     "": ("bunraku play --emulate --seconds 30", "bunraku check my_show"),
-    "play": ("bunraku play --emulate --seconds 30", "bunraku play --show my_show --box box.yaml"),
+    "play": (
+        "bunraku play --emulate --seconds 30",
+        "bunraku play --show martial --emulate",
+        "bunraku play --show my_show --box box.yaml",
+    ),
     "project": (
         "bunraku project --window",
         "bunraku project --offscreen 1280x720 --frames out --seconds 5",
@@ -23,7 +27,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     "console pin": ("bunraku console pin", "bunraku console pin --new"),
     "console devices": ("bunraku console devices",),
     "console revoke": ("bunraku console revoke 3",),
-    "check": ("bunraku check my_show", "bunraku check my_show --box box.yaml"),
+    "check": ("bunraku check martial", "bunraku check my_show", "bunraku check my_show --box box.yaml"),
     "doctor": ("bunraku doctor",),
     "generate": ("bunraku generate --box box.yaml",),
     "kept": ("bunraku kept", "bunraku kept anna --out anna.bvh"),
