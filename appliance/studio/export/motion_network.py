@@ -131,7 +131,7 @@ def checked_model(
 
 
 def _many(name: str, count: str, sizes: list[int]) -> onnx.ValueInfoProto:
-    return info(name, [count, *sizes])  # type: ignore[list-item]  # a dimension left open has a name
+    return info(name, [count, *sizes])  # a dimension left open has a name
 
 
 def sizes_of(graph: Graph, *sizes: int) -> str:
