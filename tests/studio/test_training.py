@@ -120,7 +120,7 @@ def test_the_prior_draws_the_latent_to_a_standard_gaussian(dancer: Dataset) -> N
 
     before = off()
     slow = torch.optim.Adam(encoder.parameters(), lr=1e-3)
-    for _ in range(300):
+    for _ in range(450):
         rows = torch.randint(len(training.train_windows), (64,))
         latents = training.autoencoder.encode(training.train_windows[rows])
         paid = losses.critic_loss(critic, latents, torch.randn_like(latents))

@@ -224,13 +224,6 @@ def middle_target(targets: Tensor) -> Tensor:
     return targets[:, older + blended_poses(targets.shape[2]) // 2, 0]
 
 
-class MotionLosses(NamedTuple):
-    """What the critic says of a batch of made dances, and how far held joints are from the hand (radians)."""
-
-    alive: Tensor
-    off_hand: Tensor
-
-
 def draw_passes(most: int) -> int:
     """2, the most, or any number in between."""
     kind = float(torch.rand(()))
@@ -246,17 +239,19 @@ def draw_hands(count: int, chances: Tensor, free: int) -> Tensor:
     return held
 
 
-def made_losses(
-    critic: MotionCritic, motion: Tensor, target: Tensor, held: Tensor
-) -> tuple[MotionLosses, Tensor]:
-    """Losses of made motion (B, P, M, 4), and its features for the critic's own step."""
-    levelled, goal = level(motion, target)
-    features = critic.features(levelled, goal, held)
-    alive = functional.softplus(-critic(features)).mean()
-    apart = (levelled[:, levelled.shape[1] // 2] * goal).sum(-1).abs()
+def alive_loss(critic: MotionCritic, features: Tensor) -> Tensor:
+    """The network's loss: how well the critic tells features (B, F) of its motion from the dancer."""
+    critic.requires_grad_(False)
+    loss = functional.softplus(-critic(features)).mean()
+    critic.requires_grad_(True)
+    return loss
+
+
+def off_hand_loss(motion: Tensor, target: Tensor, held: Tensor) -> Tensor:
+    """Radians from joints held by (B, M) to targets (B, M, 4) in the middle of level motion (B, P, M, 4)."""
+    apart = (motion[:, motion.shape[1] // 2] * target).sum(-1).abs()
     chord = (2 * (1 - apart).clamp_min(1e-6)).sqrt()
-    off_hand = 2 * (chord * held).sum() / held.sum().clamp_min(1.0)
-    return MotionLosses(alive, off_hand), features
+    return 2 * (chord * held).sum() / held.sum().clamp_min(1.0)
 
 
 def critic_loss(critic: MotionCritic, real: Tensor, made: Tensor, with_penalty: bool) -> Tensor:

@@ -315,11 +315,8 @@ class Training(TrainingLoop[Report]):
         whole = self._danced(dances.windows.flatten(0, 1), goal.flatten(0, 1), held, passes)
         danced = whole.view_as(dances.windows)
         wandering.go_on(danced[: free // 2], passes)
-        motion = motion_critic.blended(danced)
-        target = motion_critic.middle_target(goal)
-        seen = self.motion_critic.requires_grad_(False)
-        made, features = motion_critic.made_losses(seen, motion, target, held)
-        seen.requires_grad_(True)
+        motion, target = motion_critic.level(motion_critic.blended(danced), motion_critic.middle_target(goal))
+        features = self.motion_critic.features(motion, target, held)
         own = motion_critic.level(
             motion_critic.blended(real.windows), motion_critic.middle_target(real.targets)
         )
@@ -327,9 +324,11 @@ class Training(TrainingLoop[Report]):
         with_penalty = self.step % motion_critic.PENALTY_EVERY == 0
         judged = motion_critic.critic_loss(self.motion_critic, true, features, with_penalty)
         self._descend(judged, self.motion_optimizer)
+        alive = motion_critic.alive_loss(self.motion_critic, features)
+        off_hand = motion_critic.off_hand_loss(motion, target, held)
         grown = min(max(self.fraction - settings.alive_from, 0.0) / 0.05, 1.0) if settings.alive_from else 1.0
-        loss = grown * weights.alive * made.alive + weights.off_hand * made.off_hand
-        return loss, {"alive": made.alive, "off_hand": made.off_hand, "motion_critic": judged}
+        loss = grown * weights.alive * alive + weights.off_hand * off_hand
+        return loss, {"alive": alive, "off_hand": off_hand, "motion_critic": judged}
 
     def _danced(self, windows: Tensor, goal: Tensor, held: Tensor, passes: int) -> Tensor:
         """Windows (B * W, T, M, 4), goal alike, with headings, danced as on stage; held (B, M)."""
