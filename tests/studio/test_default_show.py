@@ -44,9 +44,6 @@ def decoder_of(path: Path) -> onnxruntime.InferenceSession:
         if name != latent and name in made_by and made_by[name] not in needed:
             needed.append(made_by[name])
             open_names += made_by[name].input
-    for node in needed:
-        # What this pass is told, as its bias: without a hand that is the layer's own
-        node.input[:] = ["decoder.last.bias" if name == "decoder_told" else name for name in node.input]
     nodes = [node for node in one_pass.node if node in needed]
     size = next(int(entry.value) for entry in model.metadata_props if entry.key == "bunraku.latent")
     inputs = [helper.make_tensor_value_info(latent, TensorProto.FLOAT, ["P", size])]

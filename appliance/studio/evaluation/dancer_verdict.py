@@ -19,7 +19,7 @@ ROUGHNESS = 1.5
 PLAUSIBLE = 1.1  # the phrase has 1; release 0.1.0, the arm more or less pasted on, 1.1 to 1.25
 TOLD = 0.9  # a critic's area under the curve: nine times in ten it tells the dance from the dancer
 OFF_HAND = 15.0  # degrees
-FEW_STEPS = 2000  # the default show's dancer made 17,377
+FEW_STEPS = 2000  # the default show's dancer made some tens of thousands, in several trainings
 ENOUGH_MINUTES = 8.0  # the default show's dancer answers with what it learned in 11
 MOST_NAMED = 2  # things that are wrong, in one sentence
 
@@ -150,7 +150,7 @@ def _advice(cause: str, seen: Seen, learned: Learned) -> str:
     rough = seen.error is None or seen.error > ROUGH or still
     if learned.steps is not None and learned.steps < FEW_STEPS and rough and cause != "good":
         return (
-            f"Train longer (--minutes): it made {learned.steps:,} steps, the default show's dancer 17,377. "
+            f"Train longer (--minutes): it made {learned.steps:,} steps, the default show's dancer tens of thousands. "
             "Nothing else can be judged before."
         )
     few = learned.minutes < ENOUGH_MINUTES
