@@ -150,8 +150,8 @@ def _advice(cause: str, seen: Seen, learned: Learned) -> str:
     rough = seen.error is None or seen.error > ROUGH or still
     if learned.steps is not None and learned.steps < FEW_STEPS and rough and cause != "good":
         return (
-            f"Train longer (--minutes): it made {learned.steps:,} steps, the default show's dancer tens of thousands. "
-            "Nothing else can be judged before."
+            f"Train longer (--minutes): it made {learned.steps:,} steps, the default show's dancer tens of "
+            "thousands. Nothing else can be judged before."
         )
     few = learned.minutes < ENOUGH_MINUTES
     learned_from = f"it learned from {learned.minutes:.1f} minutes of dance"
