@@ -64,8 +64,8 @@ def test_the_gate_looks_at_the_answer_to_hands_too(tmp_path: Path) -> None:
 
     path, autoencoder = tmp_path / "fp32.onnx", untrained("coupled")
     with torch.no_grad():
-        autoencoder.network.encoder.told.weight *= 30
-        autoencoder.network.decoder.stack[-1].weight *= 5
+        autoencoder.network.hands.last.weight *= 300
+        autoencoder.network.decoder.stack[-1].weight *= 100
     export(autoencoder, NAMES, path, int8=False, architecture="coupled")
     verdict = gate.judge(OnnxCoder(path), Deaf(path), some_windows(8).numpy())
     assert verdict.mean["10"] == 0.0
