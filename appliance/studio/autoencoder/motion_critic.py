@@ -26,11 +26,8 @@ from appliance.studio.data.dataset import Dataset
 
 WINDOWS, HOP = 12, 2  # of a sequence: one every second tick
 PENALTY_EVERY, PENALTY = 4, 0.06
-_NOISE = (
-    0.06,
-    0.3,
-    0.5,
-)  # standard deviations of poses, speeds, accelerations: no numerical fingerprint counts
+# Standard deviations for poses, speeds, accelerations: no numerical fingerprint counts.
+_NOISE = (0.06, 0.3, 0.5)
 _MOST = 8.0
 _FEWEST_SHARE, _MOST_SHARE = 0.2, 0.35  # of the batches: with 2 passes, with the most
 _WANDERING = ("pool", "age", "end")
