@@ -44,7 +44,7 @@ def test_every_tick_the_readings_and_the_figure_are_read_back(night: Night, tmp_
     np.testing.assert_array_equal(run.ticks["pose"][-1], night.tick.frame.pose)
     np.testing.assert_array_equal(run.ticks["reading_here"][:, 0], [1] * 70 + [0] * 30)
     np.testing.assert_array_equal(run.ticks["reading_orientation"][69, 0], TURNED)
-    assert run.header["hands"] == [WORN | {"kind": "sensor"}]
+    assert run.header["hands"] == [WORN | {"kind": "sensor", "by": "orientation"}]
     assert run.skeleton.same_joints(FIGURE) and run.skeleton.ends == FIGURE.ends
     np.testing.assert_allclose(run.skeleton.offsets, FIGURE.offsets)
 

@@ -50,8 +50,12 @@ def test_trackers_reach_the_stage_through_the_control_port(
     folder: Path, control: ControlInThread, asker: Asker, address: str
 ) -> None:
     with StageDouble(folder, SHOW) as stage:
-        asker.ask("/ping")
-        asker.tell(address, "wrist", *POSE)
-        wait_until(lambda: len(stage.orders) == 2, "no place came")
+
+        def arrives() -> bool:
+            """A tracker sends on and on: what comes before show control has seen the stage is passed over."""
+            asker.tell(address, "wrist", *POSE)
+            return len(stage.orders) >= 2
+
+        wait_until(arrives, "no place came")
         assert stage.orders[0].values == pytest.approx((-0.5, 1.25, -0.25, SILENT_S))
-        assert [order.text for order in stage.orders] == ["lShldr", "lForeArm"]
+        assert [order.text for order in stage.orders[:2]] == ["lShldr", "lForeArm"]
