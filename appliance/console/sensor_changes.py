@@ -92,24 +92,25 @@ class SensorChanges:
 def _command(wanted: dict[str, Any], box: Sequence[str]) -> tuple[list[str], str]:
     """The command line and the password. Raises KeyError, ValueError."""
     act = wanted["act"]
+    options = [*box, "--anyway"] if wanted.get("anyway") is True else box
     if act == "rename":
-        return ["sensors", "rename", *box, "--", _text(wanted["name"]), _text(wanted["new"])], ""
+        return ["sensors", "rename", *options, "--", _text(wanted["name"]), _text(wanted["new"])], ""
     if act == "revoke":
-        return ["sensors", "revoke", *box, "--", _text(wanted["name"])], ""
+        return ["sensors", "revoke", *options, "--", _text(wanted["name"])], ""
     if act == "replace":
-        return ["sensors", "replace", *box, "--", _text(wanted["name"]), _text(wanted["spare"])], ""
+        return ["sensors", "replace", *options, "--", _text(wanted["name"]), _text(wanted["spare"])], ""
     if act != "pair":
         raise ValueError("no such act")
-    options = [f"--name={_text(wanted['name'])}"]
+    named = [f"--name={_text(wanted['name'])}"]
     if port := wanted.get("port"):
         if not _text(port).startswith("/dev/") or ".." in port:
             raise ValueError("no serial port")
-        options.append(f"--port={port}")
+        named.append(f"--port={port}")
     if not (network := wanted.get("network")):
-        return ["provision", *options, *box], ""
+        return ["provision", *named, *box], ""
     password = wanted.get("password", "")
-    options += [f"--network={_text(network)}", "--password-file=-"]
-    return ["provision", *options, *box], _text(password) if password else ""
+    named += [f"--network={_text(network)}", "--password-file=-"]
+    return ["provision", *named, *box], _text(password) if password else ""
 
 
 def _text(given: object) -> str:

@@ -12,8 +12,11 @@ import yaml
 
 from appliance.cli.sensors import box_keys
 from appliance.cli.sensors.control_client import Answer, ControlClient, NoBoxError, Roll
+from appliance.release import choice
+from appliance.release.choice import Choice, Pair
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.show_control.orders import Order
+from tests.bundles import write_show
 from tests.cli.running_box import LEFT, LOST, SPARE, RunningBox
 from tests.command import Command
 from tests.show_control.doubles import until
@@ -65,7 +68,7 @@ def test_changes_of_the_key_file_reach_the_box(box: RunningBox, tmp_path: Path, 
     assert "The running box took it." in out
     out, _ = bunraku("sensors", "rename", "spare-1", "spare-2", "--box", box.box_file)
     assert "spare-1 is now spare-2" in out
-    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file)
+    out, _ = bunraku("sensors", "revoke", "head", "--anyway", "--box", box.box_file)
     assert "head is revoked" in out
     after = load_keys(tmp_path / "sensors.keys")
     assert {name: key.key for name, key in after.items()} == {
@@ -78,8 +81,8 @@ def test_changes_of_the_key_file_reach_the_box(box: RunningBox, tmp_path: Path, 
 
 def test_a_change_that_the_box_refuses_sets_the_exit_status(box: RunningBox, bunraku: Command) -> None:
     box.done = False
-    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file, status=1)
-    assert "head is revoked" in out
+    out, _ = bunraku("sensors", "revoke", "spare-1", "--box", box.box_file, status=1)
+    assert "spare-1 is revoked" in out
     assert "did not take it. reload it is." in out
 
 
@@ -110,7 +113,7 @@ def test_restarting_show_control_is_asked_again(
 
     monkeypatch.setattr(ControlClient, "roll", silent_first)
     monkeypatch.setattr(box_keys, "time", Clock())
-    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file)
+    out, _ = bunraku("sensors", "revoke", "spare-1", "--box", box.box_file)
     assert "The running box took it." in out
     assert [order.name for order in box.orders] == ["reload"]
 
@@ -125,8 +128,8 @@ def test_a_stage_that_dances_without_show_control_has_not_taken_it(
     clock = Clock()
     monkeypatch.setattr(ControlClient, "roll", no_box)
     monkeypatch.setattr(box_keys, "time", clock)
-    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file, status=1)
-    assert "head is revoked" in out
+    out, _ = bunraku("sensors", "revoke", "spare-1", "--box", box.box_file, status=1)
+    assert "spare-1 is revoked" in out
     assert "A box dances here, but its show control did not answer." in out
     assert clock.now > 102.0
     assert box.orders == []
@@ -142,6 +145,7 @@ def test_without_a_stage_nothing_waits_for_show_control(
     settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}
     box_file.write_text(yaml.safe_dump({**settings, "control": {"port": 1}}))
     out, _ = bunraku("sensors", "revoke", "head", "--box", box_file)
+    assert "No box runs here that could say whether its show wears head." in out
     assert "No box answers on 127.0.0.1:1. The change counts when it starts." in out
     assert clock.now == 100.0
 
@@ -215,8 +219,8 @@ def test_without_a_box_a_change_counts_later(tmp_path: Path, bunraku: Command) -
     ("words", "complaint"),
     [
         (["revoke", "haed"], "Did you mean 'head'?"),
-        (["rename", "head", "left-wrist"], "already"),
-        (["rename", "head", "two words"], "without spaces"),
+        (["rename", "spare-1", "left-wrist"], "already"),
+        (["rename", "spare-1", "two words"], "without spaces"),
         (["replace", "head", "spare-9"], "no sensor 'spare-9'"),
         (["replace", "head"], "Name a spare"),
         (["replace", "head", "spare-1", "--port", "/dev/ttyACM0"], "Name a spare"),
@@ -234,6 +238,45 @@ def test_a_refusal_is_one_clear_line(
     assert box.orders == []
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["replace", "left-wrist", "head"],
+        ["replace", "spare-1", "head"],  # the names the wrong way round
+        ["revoke", "head"],
+        ["rename", "head", "spare-2"],
+    ],
+)
+def test_a_sensor_of_the_show_is_taken_from_it_only_when_told_so(
+    box: RunningBox, tmp_path: Path, bunraku: Command, words: list[str]
+) -> None:
+    before = (tmp_path / "sensors.keys").read_bytes()
+    _, err = bunraku("sensors", *words, "--box", box.box_file, status=2)
+    assert "head is a sensor of this show (lost)" in err
+    assert "Nothing was changed. Spares: spare-1." in err and "--anyway" in err
+    assert (tmp_path / "sensors.keys").read_bytes() == before
+    assert box.orders == []
+    bunraku("sensors", *words, "--anyway", "--box", box.box_file)
+    assert (tmp_path / "sensors.keys").read_bytes() != before
+    assert [order.name for order in box.orders] == ["reload"]
+
+
+def test_a_box_that_is_off_still_knows_the_sensors_of_its_show(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
+) -> None:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist", "spare-1"])
+    box_file = tmp_path / "box.yaml"
+    settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}
+    box_file.write_text(yaml.safe_dump({**settings, "control": {"port": 1}}))
+    show = write_show(tmp_path / "show")  # left-wrist holds a joint of it
+    Choice((Pair(show, box_file),)).write(tmp_path / choice.CHOSEN)
+    monkeypatch.setattr(choice, "RUN", tmp_path)
+    _, err = bunraku("sensors", "revoke", "left-wrist", "--box", box_file, status=2)
+    assert "left-wrist is a sensor of this show (the box does not run now)" in err
+    out, _ = bunraku("sensors", "revoke", "spare-1", "--box", box_file)
+    assert "spare-1 is revoked" in out and "No box runs here" not in out
+
+
 def test_a_missing_key_file_or_box_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
@@ -245,7 +288,7 @@ def test_a_missing_key_file_or_box_is_reported(
     _, err = bunraku("sensors", "revoke", "head", "--keys", "sensors.keys", status=2)
     assert "There is no key file sensors.keys" in err
     box_file.write_text("sensors: {keys: nowhere/sensors.keys}\ncontrol: {port: 1}\n")
-    _, err = bunraku("sensors", "revoke", "head", "--box", box_file, status=2)
+    _, err = bunraku("sensors", "revoke", "spare-1", "--box", box_file, status=2)
     assert "There is no folder" in err
     _, err = bunraku("sensors", "strobe", "head", "--box", box_file, status=2)
     assert "No box answers on 127.0.0.1:1." in err

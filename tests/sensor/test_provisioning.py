@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -23,20 +24,30 @@ def path(tmp_path: Path) -> Path:
 
 
 def provisioned(
-    fake: FakeWearable, path: Path, settings: Settings = SETTINGS, takes_over: bool = False
+    fake: FakeWearable,
+    path: Path,
+    settings: Settings = SETTINGS,
+    takes_over: bool = False,
+    worn: Sequence[str] = (),
 ) -> tuple[Provisioned, list[str]]:
     said: list[str] = []
     with WearableConsole(fake.port, patience_s=5.0) as console:
         done = provision(
-            console, path, settings, lambda what, words: said.append(f"{what} {words}"), takes_over
+            console, path, settings, lambda what, words: said.append(f"{what} {words}"), takes_over, worn
         )
     return done, said
 
 
-def refused(fake: FakeWearable, path: Path, settings: Settings = SETTINGS, takes_over: bool = False) -> str:
+def refused(
+    fake: FakeWearable,
+    path: Path,
+    settings: Settings = SETTINGS,
+    takes_over: bool = False,
+    worn: Sequence[str] = (),
+) -> str:
     before = path.read_bytes() if path.exists() else None
     with pytest.raises((ProvisioningError, ConsoleError)) as caught:
-        provisioned(fake, path, settings, takes_over)
+        provisioned(fake, path, settings, takes_over, worn)
     assert (path.read_bytes() if path.exists() else None) == before
     assert [one.name for one in path.parent.iterdir()] == ([path.name] if before is not None else [])
     words = str(caught.value)
@@ -109,6 +120,17 @@ def test_a_wearable_does_not_take_anothers_name_by_mistake(path: Path, own: str,
     assert done.was == own
     assert load_keys(path)["left-wrist"] == done.sensor
     assert done.sensor.device_id not in (keys["left-wrist"].device_id, keys["spare-1"].device_id)
+
+
+@pytest.mark.parametrize("takes_over", [False, True])
+def test_a_wearable_of_the_show_does_not_leave_its_joint_by_mistake(path: Path, takes_over: bool) -> None:
+    keys = create_keys(path, ["left-wrist", "right-ankle"] if takes_over else ["right-ankle"])
+    with FakeWearable(Memory("right-ankle", f"{keys['right-ankle'].device_id:08x}")) as fake:
+        told = refused(fake, path, takes_over=takes_over, worn=["right-ankle"])
+        assert "This wearable is right-ankle, a sensor of this show" in told
+        assert fake.saved.key == b""
+        done, _ = provisioned(fake, path, Settings("right-ankle"), worn=["right-ankle"])  # its own name
+    assert load_keys(path)["right-ankle"] == done.sensor
 
 
 def test_a_wearable_that_changes_its_name_tells_the_old_one(path: Path) -> None:

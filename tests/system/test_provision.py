@@ -113,7 +113,7 @@ def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: P
             assert spare.state == State.LINKED
             assert f"{box.listed_sensors()['left-wrist']['id']}" != sensor["id"]
             assert "left-wrist is revoked" in bunraku(
-                "sensors", "revoke", "left-wrist", "--box", str(box.box_file)
+                "sensors", "revoke", "left-wrist", "--anyway", "--box", str(box.box_file)
             )
             assert box.listed_sensors() == {}
             box.await_words("but not left-wrist of this show: the dancer moves freely there")

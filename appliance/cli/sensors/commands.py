@@ -39,6 +39,9 @@ Axes = Annotated[
     str | None, typer.Option(metavar="MAP,SIGN", help="How the IMU sits: two hexadecimal registers, 24,00.")
 ]
 Name = Annotated[str, typer.Argument(help="The sensor's name, as in the key file.")]
+Anyway = Annotated[
+    bool, typer.Option("--anyway", help="Also if the show wears the sensor, and loses it by that.")
+]
 NameOrAll = Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")]
 
 sensors = command_group("List the sensors as the running box sees them; find, replace, revoke or rename one.")
@@ -110,12 +113,14 @@ def replace(
     password_file: PasswordFile = None,
     fusion: FusionKind = None,
     axes: Axes = None,
+    anyway: Anyway = False,
     box: ThisBoxFile = None,
     keys: KeyFile = None,
 ) -> None:
     """Put a spare, or a new wearable on a cable, in place of a broken one."""
     from appliance.cli.sensors.box_keys import box_keys_of, edit_keys
     from appliance.cli.sensors.provision import provision_sensor
+    from appliance.cli.sensors.worn import refuse_worn
     from appliance.stage.stage_error import StageError
 
     box_keys = box_keys_of(box, keys)
@@ -124,37 +129,47 @@ def replace(
             f"Name a spare (bunraku sensors replace {broken} SPARE), or the --port of a new one."
         )
     if spare is not None:
+        refuse_worn(box_keys, spare, f"in the place of {broken} it leaves its own", anyway)
         words = (
             f"{broken} is now the sensor that was {spare}; the broken one is called {spare} from now on. "
             "Put it on, switch it on, stand still for a breath."
         )
         raise typer.Exit(edit_keys(box_keys, lambda change: change.swap(broken, spare), words))
     raise typer.Exit(
-        provision_sensor(box_keys, broken, port, network, password_file, fusion, axes, takes_over=True)
+        provision_sensor(
+            box_keys, broken, port, network, password_file, fusion, axes, takes_over=True, anyway=anyway
+        )
     )
 
 
 @sensors.command()
-def revoke(name: Name, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
+def revoke(name: Name, anyway: Anyway = False, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Lock out a stolen or lost sensor: its key is removed."""
     from appliance.cli.sensors.box_keys import box_keys_of, edit_keys
+    from appliance.cli.sensors.worn import refuse_worn
 
+    box_keys = box_keys_of(box, keys)
+    refuse_worn(box_keys, name, "without its key it is not let in", anyway)
     words = f"{name} is revoked: its key opens nothing any more. To use it again, provision it again."
-    raise typer.Exit(edit_keys(box_keys_of(box, keys), lambda change: change.remove(name), words))
+    raise typer.Exit(edit_keys(box_keys, lambda change: change.remove(name), words))
 
 
 @sensors.command()
 def rename(
     name: Name,
     new: Annotated[str, typer.Argument(help="Its new name.")],
+    anyway: Anyway = False,
     box: ThisBoxFile = None,
     keys: KeyFile = None,
 ) -> None:
     """Give a sensor another name."""
     from appliance.cli.sensors.box_keys import box_keys_of, edit_keys
+    from appliance.cli.sensors.worn import refuse_worn
 
+    box_keys = box_keys_of(box, keys)
+    refuse_worn(box_keys, name, f"as {new} it is none of the show's", anyway)
     words = f"{name} is now {new}. Shows name it by that."
-    raise typer.Exit(edit_keys(box_keys_of(box, keys), lambda change: change.rename(name, new), words))
+    raise typer.Exit(edit_keys(box_keys, lambda change: change.rename(name, new), words))
 
 
 @sensors.command("reload")

@@ -18,6 +18,7 @@ from appliance.cli.sensors.box_keys import (
     reload_keys,
     require_folder,
 )
+from appliance.cli.sensors.worn import worn_sensors
 from appliance.sensor.provisioning.provisioning import (
     DEFAULT_PORT,
     Provisioned,
@@ -42,8 +43,12 @@ def provision_sensor(
     fusion: str | None,
     axes: str | None,
     takes_over: bool = False,
+    anyway: bool = False,
 ) -> int:
-    """Provision the wearable on a serial port; returns the exit status. StageError: it is not provisioned."""
+    """Provision the wearable on a serial port; returns the exit status. StageError: it is not provisioned.
+
+    anyway: also one that the show wears under another name.
+    """
     console = people_console()
 
     def say(what: str, words: str) -> None:
@@ -56,11 +61,12 @@ def provision_sensor(
         if not is_asked:
             settings = replace(settings, password=_read_password(network, password_file))
         device = port or only_wearable(found_ports())
+        worn = () if anyway else worn_sensors(box_keys) or ()
         with clear_errors(box_keys.keys), WearableConsole(device) as cable:
             if is_asked:  # last of all, so that it is not typed in vain
                 settings = replace(settings, password=_ask_password(settings.network))
             with console.status(f"Asking {escape(device)}"):
-                done = provision(cable, box_keys.keys, settings, say, takes_over)
+                done = provision(cable, box_keys.keys, settings, say, takes_over, worn)
     except (ConsoleError, NoWearableError, ProvisioningError) as error:
         raise StageError(str(error)) from None
     except KeyboardInterrupt:

@@ -3,7 +3,7 @@ import { say, withPin } from "./device.js";
 import { words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
-let names = [], act = null, name = "";
+let sensors = [], act = null, name = "";
 
 // For a card: buttons that open the dialog.
 export function changeButtons(sensor) {
@@ -20,6 +20,8 @@ export function changeButtons(sensor) {
 export function initSensorChanges() {
   byId("pair").addEventListener("click", () => withPin(() => open("pair", "")));
   byId("change-cancel").addEventListener("click", () => byId("change").close());
+  byId("change-spare").addEventListener("change", askAboutWorn);
+  byId("change-anyway").addEventListener("change", allowSend);
   byId("change-form").addEventListener("submit", (event) => {
     event.preventDefault();
     send();
@@ -28,7 +30,7 @@ export function initSensorChanges() {
 
 // Emulated sensors have no keys to change.
 export function showSensorChanges(value, show) {
-  names = value.sensors.map((one) => one.name);
+  sensors = value.sensors;
   const isEmulated = Boolean(show?.rehearsal) || !value.control;
   byId("pair").hidden = isEmulated;
   byId("sensors").dataset.emulated = isEmulated;
@@ -41,17 +43,41 @@ function open(what, sensor) {
   for (const part of ["name", "spare", "port", "network", "password"]) byId(`change-${part}-part`).hidden = true;
   const parts = { rename: ["name"], replace: ["spare"], revoke: [], pair: ["name", "port", "network", "password"] }[what];
   for (const part of parts) byId(`change-${part}-part`).hidden = false;
-  byId("change-spare").replaceChildren(...names.filter((one) => one !== sensor).map((one) => new Option(one, one)));
+  byId("change-spare").replaceChildren(...spares(sensor));
   byId("change-name").value = what === "rename" ? sensor : "";
   byId("change-password").value = "";
   byId("change-steps").replaceChildren();
   byId("change-send").textContent = words(what === "pair" ? "pair_begin" : what === "revoke" ? "sensor_revoke" : what);
-  byId("change-send").disabled = what === "replace" && names.length < 2;
+  askAboutWorn();
   byId("change").show(); // not modal: PANIC stays in reach
 }
 
+// Spares first; a sensor that the show wears says so.
+function spares(sensor) {
+  const others = sensors.filter((one) => one.name !== sensor).sort((one, other) => one.is_worn - other.is_worn);
+  return others.map((one) => new Option(one.is_worn ? words("worn_spare", { name: one.name }) : one.name, one.name));
+}
+
+// The sensor that the show loses by this change; "" where it loses none.
+function lost() {
+  const leaving = { rename: name, revoke: name, replace: byId("change-spare").value }[act] ?? "";
+  return sensors.some((one) => one.name === leaving && one.is_worn) ? leaving : "";
+}
+
+function askAboutWorn() {
+  byId("change-anyway").checked = false;
+  byId("change-anyway-part").hidden = !lost();
+  byId("change-anyway-words").textContent = words("change_anyway", { name: lost() });
+  allowSend();
+}
+
+function allowSend() {
+  const hasSpare = act !== "replace" || byId("change-spare").length > 0;
+  byId("change-send").disabled = !hasSpare || (lost() !== "" && !byId("change-anyway").checked);
+}
+
 async function send() {
-  const said = { act, name };
+  const said = { act, name, anyway: byId("change-anyway").checked };
   if (act === "rename") said.new = byId("change-name").value.trim();
   if (act === "replace") said.spare = byId("change-spare").value;
   if (act === "pair") {

@@ -6,7 +6,7 @@ proved that everything arrived; the key file changes last, after it is known to 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -64,12 +64,14 @@ def provision(
     settings: Settings,
     say: Callable[[str, str], None],
     takes_over: bool = False,
+    worn: Container[str] = (),
 ) -> Provisioned:
     """Provision the wearable on `console` and enter it into the key file `path`.
 
     `say` gets each completed step: its name and a sentence. `takes_over`: the name may belong to another
-    wearable so far. Raises ProvisioningError, ConsoleError (nothing answers), KeyFileError and OSError; then
-    the key file is as it was.
+    wearable so far. `worn`: sensors of the show, which the wearable is refused to leave. Raises
+    ProvisioningError, ConsoleError (nothing answers), KeyFileError and OSError; then the key file is as it
+    was.
     """
     identity = console.identify()
     imu = f"IMU {identity.imu_id[:8]}" if identity.imu_id else "no IMU found"
@@ -79,6 +81,7 @@ def provision(
         shown = _shown(console)
         known = _known_as(shown, change)
         _require_free_name(settings.name, known, shown, change, takes_over)
+        _require_not_worn(settings.name, known, worn)
         replaced = settings.name in change.keys
         sensor = _new_key(settings.name, change, takes_over)
         change.put(sensor)
@@ -135,6 +138,15 @@ def _require_free_name(name: str, known: str, shown: str, change: KeyEditing, ta
         f"place of a broken {name}: bunraku sensors replace {name} "
         + (f"{own} (no cable needed)." if known else "--port, with the other options as now.")
     )
+
+
+def _require_not_worn(name: str, known: str, worn: Container[str]) -> None:
+    if known and known != name and known in worn:
+        raise ProvisioningError(
+            f"This wearable is {known}, a sensor of this show: as {name} it leaves its joint, and the dancer "
+            "moves freely there. Nothing was changed. Take another wearable, or revoke "
+            f"{known} first (bunraku sensors revoke {known} --anyway)."
+        )
 
 
 def _new_key(name: str, change: KeyEditing, takes_over: bool) -> SensorKey:
