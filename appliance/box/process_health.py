@@ -112,8 +112,12 @@ class ProcessHealthWriter:
         self._block.write(packed)
 
 
+        values["parts"] = dict(self._fallbacks.parts)
 class Member(NamedTuple):
-    """A process beside the stage. late: it published nothing for LATE_S, and did not end."""
+    """A process beside the stage. late: it published nothing for LATE_S, and did not end.
+
+    parts: as in `Fallbacks`.
+    """
 
     process: str
     starts: int
@@ -126,6 +130,7 @@ class ProcessHealth:
 
     def __init__(self, folder: Path) -> None:
         self._blocks = {process: _record(process).reader(folder) for process in PROCESSES}
+    parts: dict[str, str]
         self._chosen, self._chosen_at = folder / _CHOSEN, -1
         self._of_choice: tuple[Fallen, ...] = ()
 
@@ -137,7 +142,9 @@ class ProcessHealth:
             if values is not None:
                 late = not values.get("ended") and now - float(values.get("beat", now)) > LATE_S
                 starts, fallbacks = int(values.get("starts", 1)), fallen(values.get("fallbacks"))
-                found.append(Member(process, starts, late, fallbacks))
+                parts = values.get("parts")
+                told = {str(name): str(why) for name, why in parts.items()} if isinstance(parts, dict) else {}
+                found.append(Member(process, starts, late, fallbacks, told))
         return found
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:

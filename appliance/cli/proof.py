@@ -20,6 +20,7 @@ from typing import Any
 
 from appliance.box.parent_death import PARENT
 from appliance.box.stop_signals import stop_signals
+from appliance.cli.doctor.finding import for_phone
 from appliance.console.proofs import Proofs
 from appliance.console.proving import SHOW_GOES, Proving, Wanted
 from appliance.outputs.frame_reader import FrameReader
@@ -88,7 +89,8 @@ def _doctor(proving: Proving, box: Path | None) -> dict[str, Any]:
         findings = json.loads(said)
     except ValueError:
         raise _NotProvenError(f"The doctor did not end its look. {said.strip()[-600:]}") from None
-    return {"holds": all(one["verdict"] != "wrong" for one in findings), "findings": findings}
+    told = [{part: for_phone(words) for part, words in one.items()} for one in findings]
+    return {"holds": all(one["verdict"] != "wrong" for one in findings), "findings": told}
 
 
 def _run(

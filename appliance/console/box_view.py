@@ -132,5 +132,6 @@ def _roster(answers: Sequence[Answer]) -> list[RosterLine]:
 
 
 def _fallback(values: Sequence[Any]) -> dict[str, Any]:
-    name, process, times, active, words = values
-    return {"name": name, "process": process, "times": times, "active": bool(active), "words": words}
+    name, process, times, active, words, about = (*values, "")[:6]  # none from an earlier release
+    told = {"name": name, "process": process, "times": times, "active": bool(active)}
+    return told | {"words": words, "about": about}

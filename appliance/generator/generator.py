@@ -13,6 +13,7 @@ from typing import Any
 
 from appliance.box.fallback import Fallbacks
 from appliance.box.made_motion import FOLDER, KeptNamesWriter, MadeMotion, MadeMotionWriter
+from appliance.box.mounts import disk_of
 from appliance.box.show_state import ShowState, ShowStateReader
 from appliance.dancer.grounding import GroundingError
 from appliance.dancer.loop import Loop
@@ -86,6 +87,7 @@ class Generator:
         )
         self._pointing = Pointing(show.skeleton, hand) if hand else None
         self._pointed: list[float] = []
+        self._state, self._disk = box.state_folder, ""
         self._kept_names = KeptNamesWriter(folder)
         self._told_names: list[str] | None = None
         puppets = range(max(1, len(config.puppets)))
@@ -97,6 +99,9 @@ class Generator:
         if (names := sorted(self.kept.recipes)) != self._told_names:
             self._told_names = names
             self._kept_names.write(names)
+        if self.kept.complaint and self._state is not None and not self._disk:
+            self._disk = disk_of(self._state)
+            self._fallbacks.concern(NOT_KEPT.name, filter(None, [self._disk]))
         self._fallbacks.set(NOT_KEPT.name, self.kept.complaint)
         state = state_reader.read()
         self._pointed = [] if self._pointing is None else self._pointing.point(self._stage.newest(now))
@@ -183,6 +188,7 @@ class Generator:
             ahead.writer.write(MadeMotion(text, file.name, wish.name, at_once, recipe.get("from_s")))
         except _WRONG as error:
             ahead.complaint = f"{wish.name}: {error} The last phrase plays on."
+            self._fallbacks.concern(NOT_MADE.name, [wish.name])
         else:
             ahead.complaint, ahead.recipe = "", text
             give_back_memory()

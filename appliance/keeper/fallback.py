@@ -8,20 +8,28 @@ JOURNAL_STOPPED = Fallback(
     "journal-stopped",
     "The journal does not grow: the disk is full, read-only or gone. The audience sees nothing of it; the "
     "newest minute stays in memory, and the disk is tried each 10 s. Free some room, or check the disk.",
+    "The journal does not grow: {about} is full, read-only or gone. The audience sees nothing of it; the "
+    "newest minute stays in memory, and it is tried each 10 s. Free some room there, or check the disk.",
 )
 PLACE_NOT_KEPT = Fallback(
     "place-not-kept",
     "The place of the dance is not kept on the disk. The audience sees nothing of it, but after a power cut "
     "the dance begins where it was kept last. Free some room, or check the disk.",
+    "The place of the dance is not kept on {about}. The audience sees nothing of it, but after a power cut "
+    "the dance begins where it was kept last. Free some room there, or check the disk.",
 )
 SENSORS_NOT_KEPT = Fallback(
     "sensors-not-kept",
     "Neutral poses and calibrations are not kept on the disk. The audience sees nothing of it, but after a "
     "power cut sensors need a moment of stillness. Free some room, or check the disk.",
+    "Neutral poses and calibrations are not kept on {about}. The audience sees nothing of it, but after a "
+    "power cut sensors need a moment of stillness. Free some room there, or check the disk.",
 )
 CHOICE_NOT_KEPT = Fallback(
     "choice-not-kept",
     "That a show has danced, or has not, cannot be kept. The audience sees nothing of it; the show is tried "
     "again after the next power-on. Free some room, or check the disk.",
+    "That a show has danced, or has not, cannot be kept on {about}. The audience sees nothing of it; the "
+    "show is tried again after the next power-on. Free some room there, or check the disk.",
 )
 OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT, CHOICE_NOT_KEPT)

@@ -33,7 +33,7 @@ class MirroredJournal:
     ) -> None:
         """runtime: the folder where the box's processes meet; folder: where on the disk the segments go."""
         self.recovered = f"{folder}: the journal grows again."
-        self._memory_file, self._folder, self._wall_clock = runtime / FILE, folder, wall_clock
+        self._memory_file, self.folder, self._wall_clock = runtime / FILE, folder, wall_clock
         self._segments = Segments(folder, round(minutes * 60.0 / TICK_S))
         self._memory: RunMemory | None = None
         self._environment = environment()
@@ -51,7 +51,7 @@ class MirroredJournal:
             self._memory = RunMemory.at(self._memory_file)
             if self._memory is not None:
                 self._memory.entries, self._memory.keyframe = last_kept(
-                    self._folder, self._memory.facts["run"]
+                    self.folder, self._memory.facts["run"]
                 )
                 self._append_pieces(self._memory)
         except OSError:
@@ -63,7 +63,7 @@ class MirroredJournal:
         if not isinstance(error, OSError):
             return str(error)
         return (
-            f"{self._folder}: the journal stops growing ({error.strerror}). The dance goes on, and what was "
+            f"{self.folder}: the journal stops growing ({error.strerror}). The dance goes on, and what was "
             f"recorded before stays. The disk is tried again each {RETRY_S:g} s. Free the disk, or check "
             "that it is there and can be written to."
         )

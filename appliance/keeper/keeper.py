@@ -11,6 +11,7 @@ from contextlib import closing
 from pathlib import Path
 
 from appliance.box.fallback import Fallbacks
+from appliance.box.mounts import disk_of
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, RuntimeFolderError
 from appliance.keeper.fallback import OF_THE_KEEPER
@@ -32,12 +33,15 @@ class KeeperHealth:
     """What the keeper reports to the box's other processes."""
 
     def __init__(self, runtime: Path) -> None:
-        self._fallbacks = Fallbacks(OF_THE_KEEPER)
+        self._fallbacks, self._named = Fallbacks(OF_THE_KEEPER), set[str]()
         self._health = ProcessHealthWriter(runtime, "keeper", self._fallbacks)
 
     def report(self, mirrors: Iterable[Mirror | MirrorProcess], now: float) -> None:
         """Call it often; monotonic seconds."""
         for mirror in mirrors:
+            if mirror.complaint and mirror.fallback.name not in self._named:
+                self._named.add(mirror.fallback.name)
+                self._fallbacks.concern(mirror.fallback.name, filter(None, [disk_of(mirror.folder)]))
             self._fallbacks.set(mirror.fallback.name, mirror.complaint)
         self._health.publish_health(now)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
 from appliance.box.fallback import Fallback
@@ -18,12 +19,16 @@ class Mirrored(Protocol):
     """What is carried to the disk: the journal, the checkpoint, the sensors' memory, that a show has danced.
 
     name: what people call it; fallback: in force while the disk does not take it; recovered: the sentence
-    when it does again. Nothing may be open before the first `copy`: the process that copies is forked.
+    when it does again; folder: on the disk. Nothing may be open before the first `copy`: the process that
+    copies is forked.
     """
 
     name: str
     fallback: Fallback
     recovered: str
+
+    @property
+    def folder(self) -> Path: ...
 
     def copy(self, now: float) -> None:
         """Bring the disk up to date, monotonic seconds. Waits for the disk.
@@ -48,6 +53,11 @@ class Mirror:
         self._mirrored, self._say = mirrored, say
         self._due = 0.0
         self.fallback, self.complaint, self.failed = mirrored.fallback, "", 0
+
+    @property
+    def folder(self) -> Path:
+        """Where on the disk it goes."""
+        return self._mirrored.folder
 
     def turn(self, now: float) -> None:
         """Copy if it is time; monotonic seconds. Waits as long as the disk does. Never raises."""

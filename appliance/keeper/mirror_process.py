@@ -52,6 +52,11 @@ class MirrorProcess:
         self._is_killed = self._is_ending = False
 
     @property
+    def folder(self) -> Path:
+        """Where on the disk it goes."""
+        return self._mirrored.folder
+
+    @property
     def complaint(self) -> str:
         return self._trouble or self._mirrors_complaint
 

@@ -34,7 +34,7 @@ class MirroredRecord:
         """
         self.name, self.fallback = name, fallback
         self.recovered = f"{state}: {name[0].lower()}{name[1:]} is kept there again."
-        self._block, self._state, self._file, self._meaning = block, state, file, meaning
+        self._block, self.folder, self._file, self._meaning = block, state, file, meaning
         self._words = words
         self._on_disk: object = None
         self._folder: tuple[int, int] | None = None
@@ -45,8 +45,8 @@ class MirroredRecord:
         meaning = None if payload is None else self._meaning(payload)
         if payload is None or meaning is None:
             return
-        self._state.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = self._state.stat()
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = self.folder.stat()
         if (found.st_dev, found.st_ino) != self._folder:
             self._on_disk = self._read_disk()
         self._folder = None

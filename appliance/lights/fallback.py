@@ -8,6 +8,8 @@ DMX_AWAY = Fallback(
     "dmx-away",
     "A wire to the lights is away. They hold or fade as the node or the adapter is set, and dance again as "
     "soon as it is back: it is reopened by itself. Plug it in, or switch the node on.",
+    "The lights' wire {about} is away: its lights hold or fade as the node or the adapter is set, and dance "
+    "again as soon as it is back: it is reopened by itself. Plug it in, or switch the node on.",
 )
 STAGE_UNSEEN = Fallback(
     "lights-safe",

@@ -6,7 +6,7 @@ import errno
 import ipaddress
 import socket
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 1.0
@@ -32,13 +32,18 @@ def in_words(error: OSError) -> str:
 
 @dataclass(frozen=True)
 class DatagramPath:
-    """Where datagrams go, and out of which network interface (its own address; None: the kernel's choice)."""
+    """Where datagrams go, and out of which network interface (its own address; None: the kernel's choice).
+
+    source_port: where they come from, unless another program has it or they stay on this machine; senders of
+    one user share it.
+    """
 
     host: str
     port: int
     interface: str | None = None
     broadcast: bool = False
     hops: int = 1  # of multicast, IP_MULTICAST_TTL
+    source_port: int | None = None
 
     def open(self) -> socket.socket:
         """A connected socket: only on those does Linux report refused datagrams. Raises OSError."""
@@ -52,13 +57,28 @@ class DatagramPath:
                 if self.interface:
                     own = socket.inet_aton(self.interface)
                     opened.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, own)
-            if self.interface:
+            if not (self.source_port and self._is_bound(opened, self.source_port)) and self.interface:
                 opened.bind((self.interface, 0))
             opened.connect((self.host, self.port))
         except OSError:
             opened.close()
             raise
         return opened
+
+    def _is_bound(self, opened: socket.socket, port: int) -> bool:
+        """Bind it to the source port; False where that is taken, or would receive what it sends."""
+        own = replace(self, source_port=None).own_address()
+        if own == self.host or ipaddress.IPv4Address(self.host).is_loopback:
+            return False
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        try:
+            opened.bind((own, port))
+        except OSError as error:
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                raise
+            return False
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 0)  # nobody reads what nodes answer there
+        return True
 
     def own_address(self) -> str:
         """This machine's address on that path; sends nothing. Raises OSError."""
@@ -80,6 +100,7 @@ class DatagramSender:
         self.dropped = 0  # datagrams that were not
         self.last_error = ""  # why the last one was dropped; stays when all is well again
         self.is_open = False  # whether the newest datagram left
+        self.is_gone = False  # whether some of the last second did not; the stage's watch sets it
         self._path = path
         self._socket: socket.socket | None = None
         self._pause_s = FIRST_PAUSE_S

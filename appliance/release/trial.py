@@ -87,6 +87,12 @@ class MirroredProof:
         if self._proven != proven and self._is_noted(choice.first.id):
             self._proven = proven
 
+    @property
+    def folder(self) -> Path:
+        """On the disk, as the choice names it."""
+        choice = Choice.read(self._chosen)
+        return choice.data if choice is not None else self._chosen.parent
+
     def explain(self, error: Exception) -> str:
         """The complaint."""
         return (

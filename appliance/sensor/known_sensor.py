@@ -24,6 +24,7 @@ class KnownSensor:
         self.pairing = pairing
         self.reception = Reception()
         self.accepted_arrival: float | None = None
+        self.refused = 0  # readings without an orientation
         self.arrivals: list[float] = []  # of the accepted readings of one drain
         self.strobe_until = -inf
         self._clock = DeviceClock()
@@ -49,6 +50,7 @@ class KnownSensor:
         w, x, y, z = packet.orientation
         norm = sqrt(w * w + x * x + y * y + z * z)
         if abs(norm - 1.0) > NORM_TOLERANCE:
+            self.refused += 1
             return None, "norm"
         a, b, c, d = self._orientation
         if w * a + x * b + y * c + z * d < 0:

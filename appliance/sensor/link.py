@@ -20,6 +20,7 @@ from appliance.sensor.transports.serial import SerialIntake
 from appliance.sensor.transports.transport import Intake, Route
 from appliance.sensor.transports.udp import UdpIntake
 
+FOREIGN = frozenset(("length", "magic", "version", "kind", "device", "tag", "old_session", "old_hello"))
 RESERVE_EACH_S = 1.0
 HEARTBEATS_APART = 8  # sensors get their heartbeats at different eighths of a second, in key file order
 REASONS = (
@@ -70,6 +71,7 @@ class SensorLink:
         self._by_device: dict[int, KnownSensor] = {}
         self._by_name: dict[str, KnownSensor] = {}
         self._counts = dict.fromkeys(REASONS, 0)
+        self._stranger: Route | None = None  # that sent the newest packet that is none of our sensors'
         self._newest: dict[str, SensorReading] = {}
         self._reserve_at = -inf
         self.set_keys(keys)
@@ -83,7 +85,11 @@ class SensorLink:
         counts = self._counts
         for intake in self.intakes:
             for packet, arrival, origin in intake.receive_packets(now):
-                counts[self._judge(packet, arrival, (intake, origin))] += 1
+                route = (intake, origin)
+                fate = self._judge(packet, arrival, route)
+                counts[fate] += 1
+                if fate in FOREIGN:
+                    self._stranger = route
         return tuple(newest.values())
 
     def send_due(self, now: float) -> None:
@@ -109,6 +115,19 @@ class SensorLink:
     def states(self, now: float) -> list[SensorState]:
         """The state of each sensor of the key file, in its order."""
         return [sensor.state(now) for sensor in self._by_name.values()]
+
+    def lets_in(self, sensor: str) -> bool:
+        """Whether a sensor of this name has a key."""
+        return sensor in self._by_name
+
+    def refused(self) -> dict[str, int]:
+        """Readings without an orientation, of each sensor that sent some."""
+        return {name: one.refused for name, one in self._by_name.items() if one.refused}
+
+    @property
+    def stranger(self) -> str:
+        """Where the newest packet came from that is none of our sensors'; "" before the first one."""
+        return "" if self._stranger is None else self._stranger[0].describe(self._stranger[1])
 
     def strobe(self, sensor: str, now: float, seconds: float = 10.0) -> None:
         """Flash this sensor's light so that a person finds it. Unknown names are ignored."""

@@ -131,7 +131,8 @@ def _hands(status: Status, observer: StageObserver, now: float) -> Iterator[Mess
 
 def _fallbacks(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
     for process, one in observer.fallbacks(now):
-        yield "/fallbacks/fallback", one.name, process, one.times, int(one.active), one.words[:_LONGEST_WORDS]
+        words, about = one.words[:_LONGEST_WORDS], one.about[:_LONGEST_WORDS]
+        yield "/fallbacks/fallback", one.name, process, one.times, int(one.active), words, about
 
 
 def _made(status: Status, observer: StageObserver) -> Iterator[Message]:

@@ -38,6 +38,11 @@ class Card:
         self._blocks, self._seen = 0, (0, 0.0)  # seen: the count of blocks, and when
         self.trouble, self.dropouts, self.is_missing, self.refused = "", 0, False, ""
 
+    @property
+    def name(self) -> str:
+        """As the box file has it; "" for the system's own choice."""
+        return "" if self._config.device is None else str(self._config.device)
+
     def look(self, now: float) -> None:
         """Open the card where it is not; call it often. Monotonic seconds."""
         if self._stream is not None:

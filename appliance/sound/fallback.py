@@ -8,6 +8,8 @@ CARD_AWAY = Fallback(
     "sound-card-away",
     "The sound card is away: the strings are silent, and sound again as soon as it is back. Plug it in, or "
     "give another `sound: {device: ...}` in the box file.",
+    "The sound card {about} is away: the strings are silent, and sound again as soon as it is back. Plug it "
+    "in, or give another `sound: {{device: ...}}` in the box file.",
 )
 NO_CARD = Fallback(
     "no-sound-card",

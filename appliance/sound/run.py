@@ -118,6 +118,7 @@ class Sound:
     def report(self, card: Card, now: float) -> None:
         """Once a second: what has changed about the card."""
         self._fallbacks.follow(DROPOUTS.name, card.dropouts, now)
+        self._fallbacks.concern(CARD_AWAY.name, filter(None, [card.name]))
         self._fallbacks.set(CARD_AWAY.name, "" if card.is_missing else card.trouble)
         self._fallbacks.set(NO_CARD.name, card.is_missing)
         if card.refused:

@@ -8,28 +8,41 @@ SENSOR_SILENT = Fallback(
     "sensor-silent",
     "A sensor was silent for 0.1 s: its joint holds, then moves freely over a second, and is taken again "
     "over half a second when readings return. Check its battery, then the network.",
+    "No readings from {about} for 0.1 s: the joint holds, then moves freely over a second, and is taken "
+    "again over half a second when readings return. Check the battery of {about}, then the network.",
 )
 READING_REFUSED = Fallback(
     "reading-refused",
     "Readings without an orientation were dropped. The audience sees nothing of it. Our firmware sends none: "
     "if it goes on, flash that wearable with the firmware of this version.",
+    "Readings of {about} without an orientation were dropped. The audience sees nothing of it. Our firmware "
+    "sends none: if it goes on, flash {about} with the firmware of this version.",
 )
 PACKET_REFUSED = Fallback(
     "packet-refused",
     "Datagrams that are none of our sensors' were dropped. The audience sees nothing of it. If it goes on, "
     "another device is in the sensors' network.",
+    "Datagrams from {about}, which are none of our sensors', were dropped. The audience sees nothing of it. "
+    "If it goes on, see which device has that address in the sensors' network.",
 )
 CABLE_AWAY = Fallback(
     "cable-away",
     "A sensor's cable is unplugged: its joint moves freely. It is taken again when it is plugged in.",
+    "The sensor's cable {about} is unplugged: its joint moves freely. It is taken again when it is plugged "
+    "in.",
 )
 ADDRESS_ABSENT = Fallback(
     "address-absent",
     "This machine lacks the address at which it listens to sensors: joints move freely until it comes. "
     "Look at the network's cable or access point, then at sensors: udp: in the box file.",
+    "This machine lacks the address {about}, at which it listens to sensors: joints move freely until it "
+    "comes. Look at the network's cable or access point, then at sensors: udp: in the box file.",
 )
 NOT_LET_IN = Fallback(
-    "sensor-not-let-in", "A sensor of the show has no key here: its joint moves freely. Provision it."
+    "sensor-not-let-in",
+    "A sensor of the show has no key here: its joint moves freely. Provision it.",
+    "No key here for {about} of the show: the joint moves freely. Provision it (bunraku provision --name), "
+    "or give a spare its name.",
 )
 TICK_LATE = Fallback(
     "tick-late",
@@ -64,6 +77,8 @@ NOT_REALTIME = Fallback(
     "not-realtime",
     "The stage has no real-time rights: other programs can hold it up. bunraku doctor tells how.",
 )
+    "Receiver {about} does not get the dance; the others do, and it is tried again each second. Start it, or "
+    "check its address.",
 NOT_SHARED = Fallback(
     "frames-not-shared",
     "Frames cannot be shared: neither lights nor projector see the dance. Free memory in the runtime folder.",
@@ -102,6 +117,9 @@ OF_THE_STAGE = (
     *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),
     *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED),
     *(
+    "What the puppet was to start from did not come in time ({about}): the last phrase plays on, and the "
+    "source takes over again when it is back. Of a live dancer check the program that sends it, and the "
+    "network; of vary, granular, path and improvise the generator: journalctl -u bunraku-generator.",
         RECEIVER_GONE,
         NOT_REALTIME,
         NOT_SHARED,

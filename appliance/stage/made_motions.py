@@ -25,8 +25,9 @@ class MadeMotions:
     """Follows what the generator makes for one puppet, at the price of a small read a tick, while a source of
     it is wanted.
 
-    source: what the puppet starts from by the show; "" for none that is made. is_late: the dance goes on with
-    what is there, because nothing newer came in time.
+    wanted: the source or kept motion that was called last; source: what the puppet starts from by the show;
+    "" for none that is made. is_late: the dance goes on with what is there, because nothing newer came in
+    time.
     """
 
     def __init__(
@@ -34,7 +35,7 @@ class MadeMotions:
     ) -> None:
         self._reader, self._folder, self._joints = MadeMotionReader(folder, puppet), folder / FOLDER, joints
         self._motion, self._puppet, self.source = motion, puppet, source
-        self._wanted, self._since = "", 0.0
+        self.wanted, self._since = "", 0.0
         self._place = (0, 0.0)  # number of the loop, second in it
         self._tried: MadeMotion | None = None
         self._seen: MadeMotion | None = None
@@ -43,8 +44,8 @@ class MadeMotions:
 
     def order(self, wanted: str, fade_s: float, now: float) -> Order | None:
         """The order to dance what was made, once it is time; wanted: a source or a kept motion, or ""."""
-        if wanted != self._wanted:
-            self._wanted, self._since, self.is_late = wanted, now, False
+        if wanted != self.wanted:
+            self.wanted, self._since, self.is_late = wanted, now, False
         if not wanted:
             return None
         dances, newest = self._motion.made, self._reader.read()

@@ -11,8 +11,6 @@ from appliance.sensor.transports.udp import PortError
 from appliance.show.box import BoxConfig, out_of_reach
 from appliance.stage.stage_error import StageError
 
-_MOVES_FREELY = "No sensor is let in, and the dancer moves freely."
-
 
 def open_sensors(
     box: BoxConfig, sensors: Sequence[str], profiles: Mapping[bytes, bytes]
@@ -55,21 +53,22 @@ def _keys(path: Path | None, sensors: Sequence[str]) -> tuple[dict[str, SensorKe
     """Keys of the box's sensors, and why those of the show that have none are not let in."""
     if not sensors:
         return {}, ()
+    moves_freely = f"Not let in: {', '.join(sensors)}; the dancer moves freely there."
     if path is None:
         return {}, (
-            "No key file: no sensor is let in, and the dancer moves freely. "
+            f"No key file. {moves_freely} "
             "Set sensors.keys in the box file (bunraku provision makes it), or try it with --emulate.",
         )
     try:
         keys = load_keys(path)
     except KeyFileError as error:
-        return {}, (f"{error}. {_MOVES_FREELY} Mend the key file.",)
+        return {}, (f"{error}. {moves_freely} Mend the key file.",)
     except FileNotFoundError:
         cure = "Correct `keys` under sensors in the box file, or run: bunraku provision."
-        return {}, (f"There is no key file {path}. {_MOVES_FREELY} {cure}",)
+        return {}, (f"There is no key file {path}. {moves_freely} {cure}",)
     except OSError as error:
         reason = f"{path}: the key file cannot be read ({error.strerror})"
-        return {}, (f"{reason}. {_MOVES_FREELY} Let this user read it, or play as the user who provisioned.",)
+        return {}, (f"{reason}. {moves_freely} Let this user read it, or play as the user who provisioned.",)
     return keys, tuple(
         f"{path}: {unknown_sensor(name, keys)}. It is not let in, and the dancer moves freely there. "
         f"Provision it (bunraku provision --name {name}), or rename another one (bunraku sensors rename)."

@@ -147,10 +147,18 @@ class Sharing:
             "sensors": sensors,
             "temperature_c": self._thermometer.celsius(),
             "receivers": [
-                {"name": one.name, "sent": one.sent, "dropped": one.dropped, "error": one.last_error}
+                {
+                    "name": one.name,
+                    "sent": one.sent,
+                    "dropped": one.dropped,
+                    "error": one.last_error,
+                    "gone": one.is_gone,
+                    "asked_for": one.is_asked_for,
+                }
                 for one in parts.outputs.receivers
             ],
-            "complaints": parts.complaints,
+            "not_let_in": parts.not_let_in,
+            "complaints": parts.complaints if parts.not_let_in else (),
             "fallbacks": fallbacks,
         }
         parts.outputs.publish_health(told)

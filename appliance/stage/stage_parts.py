@@ -69,6 +69,11 @@ class StageParts:
     newest_primary: SensorReading | None = field(default=None)
 
     @property
+    def not_let_in(self) -> list[str]:
+        """Sensors of the show that have no key here."""
+        return [name for name in self.worn if not self.link.lets_in(name)]
+
+    @property
     def first(self) -> StagePuppet:
         """The one that cues and commands lead."""
         return self.puppets[0]

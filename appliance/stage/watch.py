@@ -9,6 +9,7 @@ from appliance.box.fallback import Fallbacks
 from appliance.dancer.live import SILENT_S as LIVE_SILENT_S
 from appliance.dancer.puppeteers import HOLD_S
 from appliance.sensor import wire
+from appliance.sensor.link import FOREIGN
 from appliance.sensor.state import LOW_BATTERY, SensorState
 from appliance.show.sources import LIVE
 from appliance.stage import fallback as rows
@@ -21,8 +22,6 @@ from appliance.stage.stage_parts import StageParts
 SILENT_S = 0.5
 CHARGED = 25  # percent: above it a low battery may be said again
 
-_FOREIGN = ("length", "magic", "version", "kind", "device", "tag", "old_session", "old_hello")
-
 
 class Watch:
     """Checks for silent sensors at each tick, for all else once a second, after the frame has left."""
@@ -32,12 +31,16 @@ class Watch:
         self.fallbacks = Fallbacks(rows.OF_THE_STAGE)
         self._worn = [joints[0] for joints in parts.worn.values()]
         self._silent = [False] * len(self._worn)
+        self._fell_silent = [False] * len(self._worn)  # since the last check
+        self._refused: dict[str, int] = {}
         self._is_source_late = False
         self._dropped: dict[str, int] = {}
         self._ways: dict[str, str] = {}
         self._said: set[tuple[str, str]] = set()  # what is so, and was said
         self.fallbacks.set(rows.ITERATIONS_LOWERED.name, "" if admission.fits else admission.sentence())
-        self.fallbacks.set(rows.NOT_LET_IN.name, " ".join(parts.complaints))
+        self.fallbacks.concern(rows.NOT_LET_IN.name, parts.not_let_in)
+        self._missing = parts.not_let_in
+        self.fallbacks.set(rows.NOT_LET_IN.name, self._why_not_let_in())
 
     def count_silences(self, now: float) -> None:
         """At each tick: sensors, and a live dancer, that have just fallen silent. Allocates nothing."""
@@ -55,6 +58,7 @@ class Watch:
             if silent != self._silent[place]:
                 self._silent[place] = silent
                 if silent:
+                    self._fell_silent[place] = True
                     self.fallbacks.count(rows.SENSOR_SILENT.name, now)
 
     def note_start(self, now: float, resuming: Resumption, not_shared: str, is_recorded: bool) -> None:
@@ -89,7 +93,9 @@ class Watch:
             {one.name: one.dropped for one in self._parts.outputs.receivers if one.is_asked_for},
         )
         gone = {name for name, dropped in self._dropped.items() if dropped > before.get(name, 0)}
-        self._update_fallbacks(now, health, bool(gone))
+        for receiver in self._parts.outputs.receivers:
+            receiver.is_gone = receiver.name in gone
+        self._update_fallbacks(now, health, gone)
         return [
             *(sentence for sensor in sensors for sentence in self._sensor_news(sensor)),
             *self._silence_news(now, {sensor.name for sensor in sensors}),
@@ -97,23 +103,52 @@ class Watch:
             *self._output_news(gone),
         ]
 
-    def _update_fallbacks(self, now: float, health: Health, is_receiver_gone: bool) -> None:
-        every, counts = self.fallbacks, self._parts.link.counts
+    def _update_fallbacks(self, now: float, health: Health, gone: set[str]) -> None:
+        every, link = self.fallbacks, self._parts.link
+        counts = link.counts
+        self._name_them(now, gone)
         every.hold(rows.SENSOR_SILENT.name, any(self._silent))
         every.hold(rows.SOURCE_LATE.name, self._is_source_late)
         every.follow(rows.READING_REFUSED.name, counts.get("norm", 0), now)
-        every.follow(rows.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in _FOREIGN), now)
+        every.follow(rows.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in FOREIGN), now)
         every.follow(rows.POSE_REFUSED.name, self._parts.live_refused, now)
         every.follow(rows.TICK_LATE.name, health.late, now)
         every.follow(rows.TICK_SKIPPED.name, health.skipped, now)
         every.follow(rows.OVER_BUDGET.name, health.over_budget, now)
         every.follow(rows.NETWORK_FAILED.name, health.not_finite, now)
-        intakes = self._parts.link.intakes
-        cables = filter(None, (getattr(one, "trouble", None) for one in intakes))
+        cables = filter(None, (getattr(one, "trouble", None) for one in link.intakes))
         every.set(rows.CABLE_AWAY.name, " ".join(cables))
-        is_absent = any(getattr(one, "address_is_absent", False) for one in intakes)
+        is_absent = any(getattr(one, "address_is_absent", False) for one in link.intakes)
         every.set(rows.ADDRESS_ABSENT.name, is_absent)
-        every.set(rows.RECEIVER_GONE.name, is_receiver_gone)
+        every.set(rows.RECEIVER_GONE.name, bool(gone))
+        every.set(rows.NOT_LET_IN.name, self._why_not_let_in())
+
+    def _why_not_let_in(self) -> bool | str:
+        """As at the start, or that keys were removed or added since."""
+        missing = self._parts.not_let_in
+        return bool(missing) and (missing != self._missing or " ".join(self._parts.complaints) or True)
+
+    def _name_them(self, now: float, gone: set[str]) -> None:
+        """What each fallback is about: the sensors, cables, addresses and receivers by name."""
+        every, link = self.fallbacks, self._parts.link
+        silences = zip(self._parts.worn, self._silent, self._fell_silent, strict=True)
+        every.concern(rows.SENSOR_SILENT.name, [name for name, is_so, fell in silences if is_so or fell])
+        self._fell_silent[:] = [False] * len(self._fell_silent)
+        refused = link.refused()
+        grown = [name for name, count in refused.items() if count > self._refused.get(name, 0)]
+        self._refused = refused
+        every.concern(rows.READING_REFUSED.name, grown)
+        every.concern(rows.PACKET_REFUSED.name, filter(None, [link.stranger]))
+        away = [one.name for one in link.intakes if getattr(one, "trouble", None)]
+        every.concern(rows.CABLE_AWAY.name, away)
+        absent = [one.name for one in link.intakes if getattr(one, "address_is_absent", False)]
+        every.concern(rows.ADDRESS_ABSENT.name, absent)
+        every.concern(rows.RECEIVER_GONE.name, sorted(gone))
+        every.concern(rows.NOT_LET_IN.name, self._parts.not_let_in)
+        chosen = [one.live for one in self._parts.puppets if one.live is not None and one.live.is_chosen]
+        late = [LIVE for live in chosen if LIVE_SILENT_S < live.silent_s(now) < math.inf]
+        late += [one.wanted for one in self._made if one.is_late]
+        every.concern(rows.SOURCE_LATE.name, dict.fromkeys(late))
 
     def _changes(self, what: str, name: str, is_so: bool) -> bool:
         """Whether this is to be said: it was not so at the last call and is now, or the reverse."""

@@ -163,3 +163,14 @@ def test_a_genuine_packet_with_any_payload_never_raises() -> None:
     counted = box.counted()
     assert counted.get("accepted", 0) < 5000
     assert "tag" not in counted
+
+
+def test_who_sends_what_is_none_of_ours_is_told_by_name() -> None:
+    box = Box()
+    sensor = box.pair()
+    assert (box.link.stranger, box.link.refused()) == ("", {})
+    box.wires.waiting.append((b"hello, world", 100.0, ("192.168.4.99", 5353)))
+    box.hear(sensor.numbered(1, length=0.5))
+    assert box.link.stranger == "192.168.4.99:5353"
+    assert box.link.refused() == {"left-wrist": 1}
+    assert box.link.lets_in("left-wrist") and not box.link.lets_in("nobody")

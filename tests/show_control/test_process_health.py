@@ -166,7 +166,7 @@ def test_the_desk_answers_and_the_status_counts(folder: Path) -> None:
             return [answer for answer in answers if answer[2] == "stage"]  # a busy machine has others, too
 
         until(lambda: len(told()) == 2)
-        assert told()[0] == ["/fallbacks/fallback", "tick-late", "stage", 3, 1, words]
+        assert told()[0] == ["/fallbacks/fallback", "tick-late", "stage", 3, 1, words, ""]
         until(lambda: Status(*asker.ask_all("/status")[0][1:]).fallbacks == 1)
         asker.close()
     control.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +17,7 @@ from appliance.generator.fallback import OF_THE_GENERATOR
 from appliance.keeper.fallback import OF_THE_KEEPER
 from appliance.lights.fallback import OF_THE_LIGHTS
 from appliance.projector.fallback import OF_THE_PROJECTOR
+from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, SerialConfig
 from appliance.show.osc import OscConfig
@@ -256,3 +258,13 @@ def test_names_are_for_scripts_and_words_are_sentences(name: str) -> None:
     row = EVERY[name]
     assert re.fullmatch(r"[a-z]+(-[a-z]+)+", row.name)
     assert row.words[0].isupper() and row.words.endswith(".")
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_the_page_names_what_each_fallback_is_about(language: str) -> None:
+    table = json.loads((ROOT / f"appliance/console/page/words/{language}.json").read_text())
+    for name, row in EVERY.items():
+        if row.named:
+            said = table[f"named_{name}"]
+            assert "{about}" in said
+            assert language != "en" or said.replace("{about}", "x") == row.named.format(about="x")
+
+

@@ -56,10 +56,10 @@ def test_the_health_of_the_dance() -> None:
 
 def test_fallbacks_in_force_are_reported_with_their_words() -> None:
     told = (
-        ("stage", Fallen("sensor-silent", 3, True, "Sensor left-wrist is silent.")),
+        ("stage", Fallen("sensor-silent", 3, True, "Sensor left-wrist is silent. Charge it.")),
         ("lights", Fallen("wire-gone", 1, False, "It is back.")),
     )
     found = list(box_state.stage(HostView(stage=RunningStage(1, {}, told))))
-    assert [(one.what, one.words) for one in found[1:]] == [
-        ("stage: sensor-silent", "Sensor left-wrist is silent.")
+    assert [(one.what, one.verdict, one.words, one.cure) for one in found[1:]] == [
+        ("stage: sensor-silent", "wrong", "Sensor left-wrist is silent.", "Charge it.")
     ]

@@ -16,6 +16,13 @@ _EARLIEST = 2026  # this program did not exist before
 _TIME_ERROR = 5  # adjtimex(2): the clock is not synchronized
 _ASK_S = 3.0
 _LATE_SHARE = 0.001
+_SEEN = frozenset(  # by the audience, as long as they are in force
+    (
+        *("sensor-silent", "cable-away", "address-absent", "sensor-not-let-in", "receiver-gone"),
+        *("network-not-finite", "frames-not-shared", "source-late", "stage-hung", "dmx-away", "lights-safe"),
+        *("picture-black", "sound-card-away", "no-sound-card", "sound-rests", "motion-not-made"),
+    )
+)
 
 
 def stage(host: HostView) -> Iterator[Finding]:
@@ -41,10 +48,19 @@ def stage(host: HostView) -> Iterator[Finding]:
     else:
         yield ok("stage", words)
     for complaint in health.get("complaints") or []:
-        yield better("stage", str(complaint), "docs/technician.md has more.")
+        yield better("stage", *_halves(str(complaint), "stage"))
     for process, fallback in host.stage.fallbacks:
         if fallback.active and process != "preflight":  # its refusals stand beside the show
-            yield better(f"{process}: {fallback.name}", fallback.words, "docs/technician.md has more.")
+            judged = wrong if fallback.name in _SEEN or fallback.name.endswith("-died") else better
+            yield judged(f"{process}: {fallback.name}", *_halves(fallback.words, process))
+
+
+def _halves(sentences: str, process: str) -> tuple[str, str]:
+    """What happened, and what to do: that is the last sentence."""
+    happened, _, cure = sentences.rpartition(". ")
+    if not happened:
+        return sentences, f"`journalctl -b -u bunraku-{process}` says more."
+    return f"{happened}.", cure
 
 
 def units(host: HostView) -> Iterator[Finding]:

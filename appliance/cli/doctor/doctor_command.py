@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from appliance.cli.doctor import box_state, processor, storage, venue
+from appliance.cli.doctor import box_state, processor, show_parts, storage, venue
 from appliance.cli.doctor.finding import ORDER, Finding, wrong
 from appliance.cli.doctor.host_view import HostView, running_stage
 from appliance.cli.doctor.sample import Sample, sample
@@ -21,6 +21,9 @@ from appliance.show.config_error import ConfigError
 
 CHECKS = (
     box_state.stage,
+    show_parts.sensors,
+    show_parts.receivers,
+    show_parts.wires,
     storage.choice,
     storage.releases,
     box_state.units,

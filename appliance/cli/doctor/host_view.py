@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from appliance.box.fallback import Fallen, fallen
-from appliance.box.process_health import ProcessHealth
+from appliance.box.mounts import Mount, mounts
+from appliance.box.process_health import Member, ProcessHealth
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.outputs.frame_reader import FrameReader
 from appliance.release.choice import RUN
@@ -24,6 +24,7 @@ class RunningStage:
     pid: int
     health: dict[str, Any]
     fallbacks: tuple[tuple[str, Fallen], ...] = ()  # of all processes of the box: the process, the fallback
+    members: tuple[Member, ...] = ()  # the processes beside it
 
 
 @dataclass(frozen=True)
@@ -83,10 +84,9 @@ class HostView:
             return words[1:2] == ["appliance"] or "".join(words[1:2]).startswith("appliance.")
         return Path("".join(words[:1])).name == "bunraku"
 
-    def mounts(self) -> dict[str, tuple[str, Sequence[str]]]:
-        """Mount point -> kind of file system, its options."""
-        rows = (line.split() for line in (self.text("/proc/mounts") or "").splitlines())
-        return {row[1]: (row[2], row[3].split(",")) for row in rows if len(row) >= 4}
+    def mounts(self) -> list[Mount]:
+        """What is mounted where, in the order in which it was."""
+        return mounts(self.text("/proc/self/mountinfo") or self.text("/proc/mounts") or "")
 
 
 def running_stage(box: BoxConfig) -> RunningStage | None:
@@ -105,4 +105,5 @@ def running_stage(box: BoxConfig) -> RunningStage | None:
         health, now = reader.health() or {}, time.monotonic()
         with contextlib.closing(ProcessHealth(folder)) as shared:
             told = [("stage", one) for one in fallen(health.get("fallbacks"))] + shared.fallbacks(now)
-        return RunningStage(reader.facts.pid, health, tuple(told))
+            members = tuple(shared.members(now))
+        return RunningStage(reader.facts.pid, health, tuple(told), members)

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from appliance.box.mounts import Mount, in_memory, mount_of
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
 from appliance.cli.doctor.host_view import HostView
 from appliance.release.choice import DATA, RUN, STICK, Choice
+from appliance.show.config_error import ConfigError
+from appliance.show.yaml_file import read_yaml
 
 LEAST_FREE_BYTES, LEAST_FREE_SHARE = 256 << 20, 0.10
 LEAST_MEMORY_KB = 200 << 10
 RELEASES = Path("/data/bunraku-releases")  # of a box made from the image
 WORN = 8  # of ten steps of an eMMC's life
+_LOST = "sensors' keys, neutral poses, shows from sticks and the journal"
 _KEPT = "the journal, the place of the dance, what the box knows about sensors"
 
 
 def data_folders(host: HostView) -> Iterator[Finding]:
     """Where the box keeps what must survive a power cut."""
-    box = host.box
-    wanted = {"state": box.state_folder, "journal": box.journal.folder}
-    folders = {folder for folder in wanted.values() if folder is not None}
+    box, mounted = host.box, host.mounts()
+    keys = box.sensors.keys
+    wanted = (box.state_folder, box.journal.folder, keys.parent if keys is not None else None)
+    folders = {folder for folder in wanted if folder is not None}
     if host.at(DATA).is_dir():
         folders.add(DATA)
     if not folders:
@@ -31,10 +38,10 @@ def data_folders(host: HostView) -> Iterator[Finding]:
             "Add both; the installed box has them under /data.",
         )
     for folder in sorted(folders):
-        yield _folder(host, folder)
+        yield _folder(host, folder, mounted)
 
 
-def _folder(host: HostView, folder: Path) -> Finding:
+def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
     """The verdict on one of them, or on its nearest existing parent."""
     what, there = "data", host.at(folder)
     while not there.exists() and there != there.parent:
@@ -46,6 +53,15 @@ def _folder(host: HostView, folder: Path) -> Finding:
             what,
             f"{folder} cannot be read ({error.strerror}): {_KEPT} are lost at a power cut.",
             "`dmesg | tail` says why; often the card or its contact.",
+        )
+    disk = mount_of(folder.resolve() if host.is_here else folder, mounted)
+    if disk is not None and in_memory(disk, mounted):
+        return wrong(
+            what,
+            f"{folder} is in memory ({disk.kind}), not on a disk: {_LOST} are gone at power-off.",
+            "Give /data a partition of its own, and keep a read-only root's overlay off it "
+            "(`overlayroot=tmpfs:recurse=0` in the kernel's command line). Until then provision the sensors "
+            "again after each power-on.",
         )
     free, whole = room.f_bavail * room.f_frsize, room.f_blocks * room.f_frsize
     words = f"{folder}: {free / 1e6:,.0f} of {whole / 1e6:,.0f} MB are free."
@@ -61,18 +77,44 @@ def _folder(host: HostView, folder: Path) -> Finding:
             f"This user may not write in {folder}.",
             f"`sudo chown -R bunraku {folder}`, or run me as that user.",
         )
+    if (why := _why_not_kept(there)) is not None:
+        return wrong(
+            what,
+            f"{folder} does not keep what is written there ({why}): {_KEPT} are lost at a power cut.",
+            "`dmesg | tail` says why; then a new card or disk.",
+        )
     if free < min(LEAST_FREE_BYTES, LEAST_FREE_SHARE * whole):
         return better(
             what,
             f"{words} The journal keeps less than it should. The audience sees nothing.",
             "`journal: {minutes: 10}` in the box file, or remove what else lies there.",
         )
-    return ok(what, words)
+    return ok(what, f"{words} What is written there lasts{f' ({disk.kind})' if disk is not None else ''}.")
+
+
+def _why_not_kept(folder: Path) -> str | None:
+    """Write a file, have it leave the cache, and read it from the disk; None where it came back whole."""
+    written, name = os.urandom(4096), None
+    try:
+        descriptor, name = tempfile.mkstemp(prefix=".doctor-", dir=folder)
+        with os.fdopen(descriptor, "rb+", buffering=0) as file:
+            file.write(written)
+            os.fsync(file.fileno())
+            os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+            file.seek(0)
+            is_whole = file.read() == written
+    except OSError as error:
+        return str(error.strerror).lower()
+    finally:
+        if name is not None:
+            with contextlib.suppress(OSError):
+                Path(name).unlink()
+    return None if is_whole else "a file came back changed"
 
 
 def media(host: HostView) -> Iterator[Finding]:
     """The data partition that /etc/fstab names, and the stick."""
-    mounted = host.mounts()
+    mounted = {str(one.point): one.kind for one in host.mounts()}
     rows = (line.split() for line in (host.text("/etc/fstab") or "").splitlines())
     named = {row[1] for row in rows if len(row) > 1 and not row[0].startswith("#")}
     where = str(DATA.parent)
@@ -83,23 +125,35 @@ def media(host: HostView) -> Iterator[Finding]:
             "`lsblk -f` and `dmesg | tail` say why; the disk's contact, or a new disk.",
         )
     elif where in mounted:
-        yield ok("data partition", f"It is there ({mounted[where][0]}).")
+        yield ok("data partition", f"It is there ({mounted[where]}).")
     if str(STICK.parent) in mounted:
         yield ok("stick", "One is plugged in, to read.")
 
 
 def system_partition(host: HostView) -> Iterator[Finding]:
     """On an appliance the system partition is read-only: a power cut cannot damage it."""
-    kind, options = host.mounts().get("/", ("", ()))
-    if not kind:
+    mounted = host.mounts()
+    root = mount_of(Path("/"), mounted)
+    if root is None:
         return
-    if kind in ("overlay", "squashfs") or "ro" in options:
+    if root.kind == "overlay" and in_memory(root, mounted):
+        yield ok(
+            "system",
+            "Its partition is read-only, and what is written over it is in memory: a power cut cannot damage "
+            "it. What lasts is under 'data'.",
+        )
+    elif (
+        root.kind == "squashfs"
+        or root.is_read_only
+        or (root.kind == "overlay" and not root.option("upperdir"))
+    ):
         yield ok("system", "Its partition is read-only: a power cut cannot damage it.")
     else:
         yield better(
             "system",
             "Its partition is writable: a power cut may damage it.",
-            "For a tour: the image (`make image`), or a read-only root with an overlay.",
+            "For a tour: the image (`make image`), or a read-only root with an overlay, once /data has a "
+            "partition of its own.",
         )
 
 
@@ -112,7 +166,7 @@ def wear(host: HostView) -> Iterator[Finding]:
             yield wrong(
                 f"wear of {name}",
                 f"{10 * max(steps)} % of its life are over.",
-                "Replace it before the next city; docs/touring.md says how.",
+                "Replace it before the next city: a new card or disk, installed like the first one.",
             )
         elif steps and max(steps) > 0:
             yield ok(f"wear of {name}", f"At most {10 * max(steps)} % of its life are over.")
@@ -147,12 +201,23 @@ def choice(host: HostView) -> Iterator[Finding]:
     chosen = Choice.read(host.at(RUN / "chosen.json"))
     if chosen is None:
         return
-    yield ok("show", f"{chosen.first.show}, box file {chosen.first.box} ({chosen.first.source}).")
+    yield ok(
+        "show", f"{_name_of(chosen.first.show)} ({chosen.first.source}), box file {chosen.first.box.name}."
+    )
     if chosen.refused:
         words = "What is new was refused, and the show before dances:\n" + "\n".join(chosen.refused)
         yield better("show", words, "Mend it on the stick, and plug it in again.")
     for one in chosen.aside:
         yield better("show", one.words, "Mend it, and bring it again on a stick.")
+
+
+def _name_of(show: Path) -> str:
+    """As its show.yaml has it; the folder's name where that cannot be read."""
+    try:
+        name = read_yaml(show / "show.yaml").values.get("name")
+    except ConfigError:
+        name = None
+    return f"'{name}'" if isinstance(name, str) else show.name
 
 
 def releases(host: HostView) -> Iterator[Finding]:

@@ -14,7 +14,12 @@ from serial.tools.list_ports_common import ListPortInfo
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
 from appliance.cli.doctor.host_view import HostView
 from appliance.outputs.dmx.adapter_wire import AdapterError
-from appliance.outputs.dmx.serial_port import find_device, is_bare_ftdi, is_usb_pro
+from appliance.outputs.dmx.serial_port import (
+    adapters_here,
+    find_device,
+    is_bare_ftdi,
+    is_usb_pro,
+)
 from appliance.show.box import out_of_reach
 from appliance.show.dmx import IN_WORDS, DmxConfig
 
@@ -107,7 +112,7 @@ def radios(host: HostView) -> Iterator[Finding]:
             yield better(
                 "wi-fi",
                 f"{card.name} is the access point, on a Pi's own radio: it loses clients after hours.",
-                "A router for 2.4 GHz on Ethernet; docs/touring.md.",
+                "A router for 2.4 GHz on Ethernet.",
             )
         if host.is_here and "on" in _output_of("iw", "dev", card.name, "get", "power_save").split()[-1:]:
             yield better(
@@ -174,6 +179,14 @@ def _adapter(host: HostView, what: str, wire: DmxConfig) -> Finding:
             f"{IN_WORDS[wire.wire]}: {error}. Its lamps stay as they are.",
             "Plug it in: it is taken by itself.",
         )
+    others = [port for port in adapters_here(_KINDS[wire.wire]) if port.device != device]
+    if others and wire.device is None and wire.serial is None:
+        listed = ", ".join(f"{port.device} (serial: {port.serial_number})" for port in others)
+        return better(
+            what,
+            f"It takes {device}, the first adapter of its kind. Also plugged in: {listed}.",
+            "Say which one: its USB serial number as `serial:` of the wire in the box file.",
+        )
     return _device(host, what, device)
 
 
@@ -198,8 +211,8 @@ def display(host: HostView) -> Iterator[Finding]:
         yield better(
             "display",
             "None is connected: no picture. Dance and lights go on.",
-            "Projector on, cable in; `video=HDMI-A-1:1920x1080M@60D` for one that sleeps "
-            "(docs/technician.md).",
+            "Projector on, cable in. One that sleeps needs `video=HDMI-A-1:1920x1080M@60D` in the kernel's "
+            "command line.",
         )
     if not host.found("/dev/dri/renderD*"):
         yield better(

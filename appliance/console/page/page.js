@@ -56,8 +56,11 @@ function verdict() {
   setText(byId("verdict"), words(`verdict_${key}`, said));
 }
 
-function spoken(fallback) {
-  return hasWords(`fallback_${fallback.name}`) ? words(`fallback_${fallback.name}`) : fallback.words;
+// In the reader's language, and always by the name of the sensor, receiver, wire or disk that it is about.
+function spoken({ name, about, words: said }) {
+  if (about && hasWords(`named_${name}`)) return words(`named_${name}`, { about });
+  const sentence = hasWords(`fallback_${name}`) ? words(`fallback_${name}`) : said ?? "";
+  return about && !sentence.includes(about) ? `${about}: ${sentence}` : sentence;
 }
 
 // What happened; what the audience sees and what to do stand below, in full.
