@@ -14,7 +14,7 @@ from serial.tools.list_ports_common import ListPortInfo
 from appliance.outputs.dmx.adapter_wire import AdapterError
 
 WRITE_TIMEOUT_S = 0.25  # ten universes: an adapter that takes nothing for this long hangs
-FTDI = (0x0403, 0x6001)
+FTDI, FTDI_CHIPS = 0x0403, (0x6001, 0x6014, 0x6015)  # FT232R, FT232H, FT230X and FT231X
 _PRO_WORDS = ("DMX USB PRO", "ULTRADMX")
 
 
@@ -22,11 +22,19 @@ def find_device(device: str | None, number: str | None, is_kind: Callable[[ListP
     """The path of the adapter. Raises AdapterError where no such adapter is plugged in."""
     if device is not None:
         return device
-    for port in sorted(list_ports.comports()):
-        if port.serial_number == number if number is not None else is_kind(port):
-            return str(port.device)
+    if number is None:
+        found = adapters_here(is_kind)
+    else:
+        found = [port for port in list_ports.comports() if port.serial_number == number]
+    if found:
+        return str(found[0].device)
     wanted = f"with the USB serial number {number}" if number is not None else "of this kind"
     raise AdapterError(f"no adapter {wanted} is plugged in")
+
+
+def adapters_here(is_kind: Callable[[ListPortInfo], bool]) -> list[ListPortInfo]:
+    """All adapters of a kind that are plugged in; without a serial number the first one is taken."""
+    return [port for port in sorted(list_ports.comports()) if is_kind(port)]
 
 
 def is_usb_pro(port: ListPortInfo) -> bool:
@@ -36,7 +44,7 @@ def is_usb_pro(port: ListPortInfo) -> bool:
 
 def is_bare_ftdi(port: ListPortInfo) -> bool:
     """Whether it is an FTDI chip without a controller behind it, as far as USB tells."""
-    return (port.vid, port.pid) == FTDI and not is_usb_pro(port)
+    return port.vid == FTDI and port.pid in FTDI_CHIPS and not is_usb_pro(port)
 
 
 def open_port(

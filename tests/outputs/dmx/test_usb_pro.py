@@ -16,6 +16,7 @@ from appliance.outputs.dmx.adapter_wire import AdapterError, AdapterWire
 from appliance.outputs.dmx.serial_port import find_device, is_bare_ftdi, is_usb_pro
 from appliance.outputs.dmx.usb_pro import usb_pro_wire
 from hw_sim.dmx.usb_pro import UsbProWidget
+from tests.conftest import ROOT
 from tests.outputs.dmx.conftest import config, universe
 
 Until = Callable[[Callable[[], bool]], None]
@@ -251,6 +252,18 @@ def test_an_adapter_is_found_by_what_it_is() -> None:
     assert find_device("/dev/dmx", "EN2", is_usb_pro) == "/dev/dmx"
     with pytest.raises(AdapterError, match="no adapter with the USB serial number EN9 is plugged in"):
         find_device(None, "EN9", is_usb_pro)
+
+
+@pytest.mark.parametrize("product_id", [0x6001, 0x6014, 0x6015])
+def test_every_chip_of_a_bare_cable_is_found_by_itself(
+    monkeypatch: pytest.MonkeyPatch, product_id: int
+) -> None:
+    cable, clock = port("/dev/ttyUSB0", "USB UART", "D1"), port("/dev/ttyUSB1", "A clock", "C1")
+    cable.pid, clock.pid = product_id, 0x6010  # two channels: no cable for DMX
+    monkeypatch.setattr(list_ports, "comports", lambda: [clock, cable])
+    assert find_device(None, None, is_bare_ftdi) == "/dev/ttyUSB0"
+    rules = (ROOT / "deploy/system/usr/lib/udev/rules.d/60-bunraku.rules").read_text()
+    assert f"{product_id:04x}" in rules
 
 
 def test_an_ultradmx_is_no_bare_cable() -> None:
