@@ -119,6 +119,7 @@ class Watch:
         cables = filter(None, (getattr(one, "trouble", None) for one in link.intakes))
         every.set(rows.CABLE_AWAY.name, " ".join(cables))
         is_absent = any(getattr(one, "address_is_absent", False) for one in link.intakes)
+            *self._stamp_news(),
         every.set(rows.ADDRESS_ABSENT.name, is_absent)
         every.set(rows.RECEIVER_GONE.name, bool(gone))
         every.set(rows.NOT_LET_IN.name, self._why_not_let_in())
@@ -221,3 +222,13 @@ class Watch:
                 if is_broken
                 else "The network gives poses again. The dancer moves."
             )
+    def _stamp_news(self) -> Iterator[str]:
+        """Once: that this system does not say when a datagram came."""
+        for intake in self._parts.link.intakes:
+            if self._changes("stamps", intake.name, not getattr(intake, "has_stamps", True)):
+                yield (
+                    f"This system does not stamp what comes in on {intake.name}: a reading counts as arrived "
+                    "when it is read, up to 20 ms late. The dance goes on, a little less in step with the "
+                    "sensor. Linux itself stamps; emulators (qemu-user) do not."
+                )
+

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import time
 from collections.abc import Iterator
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -39,6 +41,27 @@ def test_times_that_are_invented_are_kept(link: SensorLink, radio: Radio) -> Non
         radio.socket.send(radio.wearable.reading())
         (reading,) = link.drain(now)
         assert reading.arrival == now
+
+
+def test_a_system_without_stamps_is_heard_at_the_time_of_reading(monkeypatch: pytest.MonkeyPatch) -> None:
+    class NoStamps(socket.socket):
+        def setsockopt(self, *option: Any) -> None:
+            if option[:2] == (socket.SOL_SOCKET, SO_TIMESTAMPNS):
+                raise OSError(errno.ENOPROTOOPT, "Protocol not available")
+            super().setsockopt(*option)
+
+    monkeypatch.setattr(socket, "socket", NoStamps)
+    intake = UdpIntake("127.0.0.1", 0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(intake.address)
+        sender.send(b"a packet")
+        ((packet, arrival, origin),) = intake.receive_packets(1234.5)
+        assert (bytes(packet), arrival) == (b"a packet", 1234.5)
+        intake.reserve_sockets({origin})  # one of its own needs no stamps either
+        sender.send(b"another")
+        assert [bytes(packet) for packet, _, _ in intake.receive_packets(1234.6)] == [b"another"]
+    assert not intake.has_stamps and not intake.counts
+    intake.close()
 
 
 class Clocks:

@@ -152,6 +152,46 @@ def test_receiver_gone(stage: Watch, danced: StageParts) -> None:
     assert of(stage, rows.RECEIVER_GONE, 3.0)[1:3] == (1, False)
 
 
+def test_what_a_fallback_is_about_is_told_by_name(stage: Watch, danced: StageParts) -> None:
+    for now in (2.0, 2.12):
+        hear(danced, 2.0)
+        stage.count_silences(now)
+    danced.outputs.receivers[0].dropped += 4
+    stage.check(3.0, Health())
+    receiver = danced.outputs.receivers[0].name
+    assert danced.outputs.receivers[0].is_gone
+    for row, name in (
+        (rows.SENSOR_SILENT, "left-wrist"),
+        (rows.NOT_LET_IN, "left-wrist"),
+        (rows.RECEIVER_GONE, receiver),
+        (rows.CABLE_AWAY, danced.link.intakes[0].name),
+    ):
+        told = of(stage, row, 3.0)
+        assert told.active and told.about == name and name in told.words, row.name
+    hear(danced, 3.1)  # it is back, and the name of what was silent stays
+    stage.count_silences(3.12)
+    stage.check(4.0, Health())
+    told = of(stage, rows.SENSOR_SILENT, 20.0)
+    assert (told.active, told.about) == (False, "left-wrist")
+
+
+def test_a_system_that_stamps_no_datagrams_is_told_once(stage: Watch, danced: StageParts) -> None:
+    assert not any("stamp" in words for words in stage.check(1.0, Health()))
+    danced.link.intakes[0].has_stamps = False  # type: ignore[attr-defined]
+    assert [words for words in stage.check(2.0, Health()) if "does not stamp" in words]
+    assert not any("stamp" in words for words in stage.check(3.0, Health()))
+
+
+def test_a_sensor_that_has_a_key_by_now_is_let_in(stage: Watch, danced: StageParts) -> None:
+    assert of(stage, rows.NOT_LET_IN, 0.0).active
+    danced.link.set_keys({"left-wrist": SensorKey("left-wrist", 7, bytes(16))})
+    stage.check(1.0, Health())
+    assert not of(stage, rows.NOT_LET_IN, 1.0).active
+    danced.link.set_keys({})
+    stage.check(2.0, Health())
+    assert of(stage, rows.NOT_LET_IN, 2.0)[1:3] == (2, True)
+
+
 def test_not_realtime(stage: Watch) -> None:
     stage.note_missing_rights(())
     assert of(stage, rows.NOT_REALTIME, 0.0).times == 0
@@ -253,11 +293,6 @@ def test_the_table_for_desks_has_each_fallback() -> None:
     assert sorted(re.findall(r"^\| `([a-z-]+)` \|", page, re.MULTILINE)) == sorted(EVERY)
 
 
-@pytest.mark.parametrize("name", EVERY)
-def test_names_are_for_scripts_and_words_are_sentences(name: str) -> None:
-    row = EVERY[name]
-    assert re.fullmatch(r"[a-z]+(-[a-z]+)+", row.name)
-    assert row.words[0].isupper() and row.words.endswith(".")
 @pytest.mark.parametrize("language", ["en", "de"])
 def test_the_page_names_what_each_fallback_is_about(language: str) -> None:
     table = json.loads((ROOT / f"appliance/console/page/words/{language}.json").read_text())
@@ -268,3 +303,8 @@ def test_the_page_names_what_each_fallback_is_about(language: str) -> None:
             assert language != "en" or said.replace("{about}", "x") == row.named.format(about="x")
 
 
+@pytest.mark.parametrize("name", EVERY)
+def test_names_are_for_scripts_and_words_are_sentences(name: str) -> None:
+    row = EVERY[name]
+    assert re.fullmatch(r"[a-z]+(-[a-z]+)+", row.name)
+    assert row.words[0].isupper() and row.words.endswith(".")

@@ -51,10 +51,11 @@ class UdpIntake:
         except OSError as error:
             self._socket.close()
             raise PortError(_advice(host, port, error)) from error
-        _prepare(self._socket, COMMON_BUFFER_BYTES)
+        self.has_stamps = _prepare(self._socket, COMMON_BUFFER_BYTES)
         if sys.platform == "linux":  # after bind: a second box must fail, our own sockets must not
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         self._bound: Origin = self._socket.getsockname()
+        # has_stamps: else a datagram counts as arrived when it is read, up to a tick late
         self.address: tuple[str, int] = (self._bound[0], self._bound[1])
         self.name = f"{self._bound[0]}:{self._bound[1]}"
         self._own: dict[Origin, socket.socket] = {}
@@ -201,11 +202,15 @@ def is_own(host: str) -> bool:
     return True
 
 
-def _prepare(one: socket.socket, buffer_bytes: int) -> None:
+def _prepare(one: socket.socket, buffer_bytes: int) -> bool:
+    """Whether the kernel stamps its datagrams; it need not (qemu's user mode does not)."""
     one.setblocking(False)
     one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
-    if sys.platform == "linux":
+    try:
         one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+    except OSError:
+        return False
+    return sys.platform == "linux"
 
 
 def _advice(host: str, port: int, error: Exception) -> str:
