@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -56,7 +56,7 @@ class TrainingLoop(ABC, Generic[Report]):
     """Counts steps and seconds over all runs; a kind of training defines what a step and a report are."""
 
     report_type: type[Report]
-    saved: ClassVar[tuple[str, ...]]  # networks and optimisers in a checkpoint
+    saved: tuple[str, ...]  # networks and optimisers in a checkpoint
 
     def __init__(
         self, duration: Duration, processes: Processes = ALONE, device: torch.device = PROCESSOR

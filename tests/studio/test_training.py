@@ -46,9 +46,6 @@ def same(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
-LEARNED = (*Training.saved, "lessons", "sequences", "random", "step")
-
-
 @pytest.mark.parametrize("network", ["coupled", "mlp", "lstm"])
 def test_interrupted_and_resumed_is_uninterrupted_bit_for_bit(
     dancer: Dataset, tmp_path: Path, network: str
@@ -67,9 +64,30 @@ def test_interrupted_and_resumed_is_uninterrupted_bit_for_bit(
 
     one, other = whole.state(), resumed.state()
     assert one["step"] == other["step"] == 40
-    for name in LEARNED:
+    for name in (*whole.saved, "lessons", "sequences", "random", "step"):
         assert same(one[name], other[name]), name
     assert one["history"][-1]["held_out_degrees"] == other["history"][-1]["held_out_degrees"]
+
+
+def test_only_a_training_whose_motion_is_seen_has_a_motion_critic(dancer: Dataset) -> None:
+    of_motion = {"motion_critic", "motion_optimizer"}
+    seen = Training(dancer, TINY)
+    assert of_motion < seen.state().keys()
+    for settings in (replace(TINY, network="mlp"), replace(TINY, sequences=0)):
+        training = Training(dancer, settings)
+        training.train_step()
+        state = training.state()
+        assert not of_motion & state.keys()
+        Training(dancer, settings).restore(state)
+        older = {**state, **{name: seen.state()[name] for name in of_motion}}
+        again = Training(dancer, settings)
+        again.restore(older)  # earlier releases saved one that no step had touched
+        assert same(again.state()["averaged"], state["averaged"])
+
+
+def test_settings_of_an_older_checkpoint_are_read(dancer: Dataset) -> None:
+    saved = Training(dancer, TINY).state()["settings"]
+    assert Settings.from_state({**saved, "betas": (0.9, 0.999)}) == TINY
 
 
 def test_the_seed_alone_decides(dancer: Dataset, tmp_path: Path) -> None:

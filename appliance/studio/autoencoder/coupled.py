@@ -47,15 +47,27 @@ def matrix_of_products() -> Tensor:
     return table
 
 
-class HandEncoder(nn.Module):
+class MeanLatent(nn.Module):
+    """Three layers, the middle one residual: the mean latent (B, Z) for what is known of a window (B, S)."""
+
+    def __init__(self, seen: int, width: int, latent: int) -> None:
+        super().__init__()
+        self.first = nn.Linear(seen, width)
+        self.second = nn.Linear(width, width)
+        self.last = nn.Linear(width, latent)
+
+    def mean(self, seen: Tensor) -> Tensor:
+        x = nn.functional.elu(self.first(seen))
+        mean: Tensor = self.last(x + nn.functional.elu(self.second(x)))
+        return mean
+
+
+class HandEncoder(MeanLatent):
     """Mean latent near a latent while joints have given orientations."""
 
     def __init__(self, shape: Shape, width: int = HAND_WIDTH) -> None:
-        super().__init__()
+        super().__init__(shape.latent + shape.joints * (1 + 9 * shape.curves), width, shape.latent)
         self.time = TimeBasis(shape)
-        self.first = nn.Linear(shape.latent + shape.joints * (1 + 9 * shape.curves), width)
-        self.second = nn.Linear(width, width)
-        self.last = nn.Linear(width, shape.latent)
         self.matrix: Tensor
         self.register_buffer("matrix", matrix_of_products(), persistent=False)
 
@@ -68,12 +80,10 @@ class HandEncoder(nn.Module):
         products = (windows[..., :, None] * windows[..., None, :]).flatten(-2)
         matrices = torch.matmul(products, self.matrix) * held[:, None, :, None]
         curves = torch.matmul(self.time.curves, matrices.flatten(2)).flatten(1)
-        x = nn.functional.elu(self.first(torch.cat([latent, curves, held], dim=-1)))
-        mean: Tensor = self.last(x + nn.functional.elu(self.second(x)))
-        return mean
+        return self.mean(torch.cat([latent, curves, held], dim=-1))
 
 
-class PlaceEncoder(nn.Module):
+class PlaceEncoder(MeanLatent):
     """Mean latent while joints are at given places; it knows the bones, and so where a window's joints are.
 
     Places: (B, M, 3) in metres from the root joint, axes of the heading-free window, mean of its poses by
@@ -82,11 +92,8 @@ class PlaceEncoder(nn.Module):
     """
 
     def __init__(self, shape: Shape, width: int = PLACE_WIDTH) -> None:
-        super().__init__()
         joints = shape.joints
-        self.first = nn.Linear(4 * joints, width)
-        self.second = nn.Linear(width, width)
-        self.last = nn.Linear(width, shape.latent)
+        super().__init__(4 * joints, width, shape.latent)
         self.parents: Tensor
         self.turns: Tensor
         self.reaches: Tensor
@@ -129,9 +136,7 @@ class PlaceEncoder(nn.Module):
     def forward(self, places: Tensor, held: Tensor) -> Tensor:
         """(B, Z) for the joints of places (B, M, 3) that are held (B, M), 0 or 1."""
         seen = (places - self.middle) / self.spread * held[..., None]
-        x = nn.functional.elu(self.first(torch.cat([seen.flatten(1), held], dim=-1)))
-        mean: Tensor = self.last(x + nn.functional.elu(self.second(x)))
-        return mean
+        return self.mean(torch.cat([seen.flatten(1), held], dim=-1))
 
 
 class Coupled(Mlp):

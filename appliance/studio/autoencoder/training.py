@@ -32,6 +32,7 @@ SAMPLED_PLACES = 4096  # windows, to measure where the dancer's joints are
 PLACED = 64  # windows of a step from which the place encoder learns
 HAND_PACE = 2.0  # of the hand encoder's learning rate: it follows answers, not the critic alone
 SAMPLED_SEQUENCES = 500  # to measure how the dancer moves
+_NO_LONGER_SETTINGS = ("betas",)  # in older checkpoints; nothing read it
 SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
 
 
@@ -51,10 +52,6 @@ class Settings:
     steps: int = 0
     batch: int = 256
     learning_rate: float = 1e-3
-    betas: tuple[float, float] = (
-        0.9,
-        0.999,
-    )  # of Adam; a network that follows the motion critic: (0.5, 0.99)
     critic_learning_rate: float = 5e-4
     smoothing: float = 0.999  # of the averaged weights
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
@@ -80,7 +77,8 @@ class Settings:
         """The settings of a checkpoint."""
         answers = {**saved["answers"], "nearness": Nearness(**saved["answers"]["nearness"])}
         parts = {"weights": losses.LossWeights(**saved["weights"]), "answers": AnswerSettings(**answers)}
-        return Settings(**{**saved, **parts})
+        kept = {name: value for name, value in saved.items() if name not in _NO_LONGER_SETTINGS}
+        return Settings(**{**kept, **parts})
 
 
 @dataclass
@@ -98,15 +96,7 @@ class Training(TrainingLoop[Report]):
     """State of a training: networks, optimisers, averages, history."""
 
     report_type = Report
-    saved = (
-        "autoencoder",
-        "averaged",
-        "critic",
-        "optimizer",
-        "critic_optimizer",
-        "motion_critic",
-        "motion_optimizer",
-    )
+    saved = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer")
 
     def __init__(
         self,
@@ -171,20 +161,10 @@ class Training(TrainingLoop[Report]):
             self.lessons = Copies(self.train_windows, settings.input_noise_degrees, processes)
         self._chances = chances
         self.sequences: Sequences | None = None
-        poses = max(motion_critic.blended_poses(settings.window), 3)
-        self.motion_critic = MotionCritic(shape.joints, poses).to(self.device)
-        self.motion_optimizer = torch.optim.Adam(
-            self.motion_critic.parameters(),
-            lr=settings.motion_learning_rate,
-            betas=ADVERSARIAL_BETAS,
-            fused=True,
-        )
         if isinstance(network, Coupled) and settings.sequences:
             sequences = Sequences(dataset, settings.window, self.device)
             if len(sequences):
-                self.sequences = sequences
-                known = motion_critic.blended(sequences.draw(SAMPLED_SEQUENCES).windows)
-                self.motion_critic.measure(motion_critic.level(known)[0])
+                self._let_motion_be_seen(sequences)
         self._go_apart()
         self._critic_loss = torch.zeros((), device=self.device)
 
@@ -299,6 +279,22 @@ class Training(TrainingLoop[Report]):
                 raw = self.autoencoder.decode_raw(latents + share_of_pass(number) * pull)
                 windows = rotation.normalize(raw.float())
         return windows
+
+    def _let_motion_be_seen(self, sequences: Sequences) -> None:
+        """Add the motion critic, which no other kind of training has, nor its checkpoint."""
+        settings = self.settings
+        poses = max(motion_critic.blended_poses(settings.window), 3)
+        self.sequences = sequences
+        self.motion_critic = MotionCritic(self.autoencoder.shape.joints, poses).to(self.device)
+        self.motion_optimizer = torch.optim.Adam(
+            self.motion_critic.parameters(),
+            lr=settings.motion_learning_rate,
+            betas=ADVERSARIAL_BETAS,
+            fused=True,
+        )
+        known = motion_critic.blended(sequences.draw(SAMPLED_SEQUENCES).windows)
+        self.motion_critic.measure(motion_critic.level(known)[0])
+        self.saved = (*self.saved, "motion_critic", "motion_optimizer")
 
     def _see_motion(self, sequences: Sequences) -> tuple[Tensor, dict[str, Tensor]]:
         """One step of the motion critic, and the network's loss for what it says of dances with hands."""
@@ -430,8 +426,9 @@ class Training(TrainingLoop[Report]):
             group["lr"] = group["pace"] * self.settings.learning_rate * warm * max(cosine, 0.005)
         for group in self.critic_optimizer.param_groups:
             group["lr"] = self.settings.critic_learning_rate * max(cosine, 0.1)
-        for group in self.motion_optimizer.param_groups:
-            group["lr"] = self.settings.motion_learning_rate * max(cosine, 0.1)
+        if self.sequences is not None:
+            for group in self.motion_optimizer.param_groups:
+                group["lr"] = self.settings.motion_learning_rate * max(cosine, 0.1)
 
 
 def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]]:

@@ -23,6 +23,7 @@ from appliance.studio.autoencoder.coupled import (
     STEP,
     Coupled,
     HandEncoder,
+    MeanLatent,
     PlaceEncoder,
     matrix_of_products,
 )
@@ -95,10 +96,7 @@ def _hands(graph: Graph, hands: HandEncoder, shape: Shape, latent: str, windows:
     steps = _reshaped(graph, matrices, -1, shape.window, shape.joints * 9)
     basis = graph.constant("curves", hands.time.curves.numpy())
     curves = _reshaped(graph, graph.op("MatMul", basis, steps), -1, shape.curves * shape.joints * 9)
-    seen = graph.op("Concat", latent, curves, held, axis=1)
-    x = EXACT.elu(graph, EXACT.linear(graph, seen, hands.first, "hands.first"))
-    more = EXACT.elu(graph, EXACT.linear(graph, x, hands.second, "hands.second"))
-    return EXACT.linear(graph, graph.op("Add", x, more), hands.last, "hands.last")
+    return _mean_latent(graph, hands, graph.op("Concat", latent, curves, held, axis=1), "hands")
 
 
 def step_to_places(graph: Graph, places: PlaceEncoder, shape: Shape, window: str, gate: str) -> str:
@@ -121,13 +119,18 @@ def step_to_places(graph: Graph, places: PlaceEncoder, shape: Shape, window: str
     scaled = graph.op("Div", apart, graph.constant("places.spread", places.spread.numpy()))
     scaled = graph.op("Mul", scaled, graph.op("Unsqueeze", held, axis_last))
     seen = graph.op("Concat", _reshaped(graph, scaled, -1, shape.joints * 3), held, axis=1)
-    x = EXACT.elu(graph, EXACT.linear(graph, seen, places.first, "places.first"))
-    more = EXACT.elu(graph, EXACT.linear(graph, x, places.second, "places.second"))
-    means = EXACT.linear(graph, graph.op("Add", x, more), places.last, "places.last")
+    means = _mean_latent(graph, places, seen, "places")
     there, now = graph.name("there"), graph.name("now")
     graph.ops("Split", [means], [there, now], axis=0, num_outputs=2)
     any_placed = graph.op("ReduceMax", placed, axis_last, keepdims=1)
     return graph.op("Mul", graph.op("Sub", there, now), any_placed)
+
+
+def _mean_latent(graph: Graph, encoder: MeanLatent, seen: str, name: str) -> str:
+    """(P, Z): MeanLatent.mean of (P, S), in float."""
+    x = EXACT.elu(graph, EXACT.linear(graph, seen, encoder.first, f"{name}.first"))
+    more = EXACT.elu(graph, EXACT.linear(graph, x, encoder.second, f"{name}.second"))
+    return EXACT.linear(graph, graph.op("Add", x, more), encoder.last, f"{name}.last")
 
 
 def _where(graph: Graph, places: PlaceEncoder, shape: Shape, window: str) -> str:
