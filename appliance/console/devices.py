@@ -6,18 +6,19 @@ import hashlib
 import json
 import secrets
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from appliance.box.record import WholeFile
 from appliance.pose.foreign_file import plain_json
 
-DIGITS = 6
+DIGITS, LONG_DIGITS = 6, 10
 MOST_DEVICES = 32  # the one that was not seen for the longest time gives way
 LONGEST_NAME = 40
-FREE_TRIES, PAUSE_S = 5, 60.0
-_MOST_ASKERS = 256
-_ALL_TRIES = 60  # in PAUSE_S, of all addresses together: a million PINs take eleven days
+FREE_TRIES, PAUSE_S, LONGEST_PAUSE_S = 5, 60.0, 900.0
+MOST_WRONG = 1000  # of all addresses, in a day: then a million PINs are too few
+_MOST_ASKERS = 4096
+_DAY_S = 24 * 3600.0
 _LARGEST = 1 << 16
 
 
@@ -47,7 +48,7 @@ class Devices:
 
     @property
     def pin(self) -> str:
-        """Six digits."""
+        """Six digits; ten after an attack."""
         self._look()
         return self._pin
 
@@ -61,6 +62,13 @@ class Devices:
         """A new PIN; all devices are forgotten."""
         self._write(new_pin(), ())
         return self._pin
+
+    def lengthen_pin(self) -> bool:
+        """A new PIN that takes too long to guess, whether there was none yet; devices stay remembered."""
+        if len(self.pin) == LONG_DIGITS:
+            return False
+        self._write(new_pin(LONG_DIGITS), self._devices)
+        return True
 
     def remember(self, name: str) -> str:
         """Remember one more device; its token."""
@@ -94,7 +102,7 @@ class Devices:
             values = plain_json(self._file.read()[0])
             devices = tuple(Device(**device) for device in values["devices"])
             pin = values["pin"]
-            if not (isinstance(pin, str) and len(pin) == DIGITS and pin.isdecimal()):
+            if not (isinstance(pin, str) and len(pin) in (DIGITS, LONG_DIGITS) and pin.isdecimal()):
                 return
         except (OSError, ValueError, KeyError, TypeError, IndexError):
             return
@@ -108,40 +116,58 @@ class Devices:
 
 @dataclass(frozen=True)
 class _Tries:
+    """Wrong PINs in a row, and when the last one came."""
+
     count: int = 0
-    since: float = 0.0
+    last: float = 0.0
 
     def more(self, now: float) -> _Tries:
-        fresh = now - self.since > PAUSE_S
-        return _Tries(1, now) if fresh else replace(self, count=self.count + 1)
+        return _Tries(1 if now - self.last > LONGEST_PAUSE_S else self.count + 1, now)
 
-    def wait_s(self, most: int, now: float) -> float:
-        return max(0.0, self.since + PAUSE_S - now) if self.count >= most else 0.0
+    def wait_s(self, now: float) -> float:
+        """Each wrong PIN after the free ones doubles the pause."""
+        if self.count < FREE_TRIES:
+            return 0.0
+        pause_s = PAUSE_S * 2.0 ** min(self.count - FREE_TRIES, 10)
+        return max(0.0, self.last + min(pause_s, LONGEST_PAUSE_S) - now)
 
 
 class WrongPins:
-    """How many wrong PINs came from where; five a minute from one address are let through."""
+    """How many wrong PINs came from where. An address waits for its own: nobody else does.
+
+    Many addresses together guess faster than one, so `are_too_many` asks for a longer PIN.
+    """
 
     def __init__(self) -> None:
         self._of: dict[str, _Tries] = {}
-        self._all = _Tries()
+        self._all, self._since = 0, 0.0
 
     def wait_s(self, asker: str, now: float) -> float:
         """How long this address waits before its next try; 0: none."""
-        own = self._of.get(asker, _Tries()).wait_s(FREE_TRIES, now)
-        return max(own, self._all.wait_s(_ALL_TRIES, now))
+        return self._of.get(asker, _Tries()).wait_s(now)
 
     def note(self, asker: str, now: float) -> None:
         """One more wrong PIN."""
         self._of[asker] = self._of.pop(asker, _Tries()).more(now)
-        self._all = self._all.more(now)
         while len(self._of) > _MOST_ASKERS:
             self._of.pop(next(iter(self._of)))
+        if now - self._since > _DAY_S:
+            self._all, self._since = 0, now
+        self._all += 1
+
+    def forget(self, asker: str) -> None:
+        """This address gave the right PIN."""
+        self._of.pop(asker, None)
+
+    @property
+    def are_too_many(self) -> bool:
+        """Whether all of a day together come near to guessing six digits."""
+        return self._all >= MOST_WRONG
 
 
-def new_pin() -> str:
-    """Six digits that nobody guesses."""
-    return f"{secrets.randbelow(10**DIGITS):0{DIGITS}}"
+def new_pin(digits: int = DIGITS) -> str:
+    """Digits that nobody guesses."""
+    return f"{secrets.randbelow(10**digits):0{digits}}"
 
 
 def _digest(token: str) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from aiohttp import web
 
 from appliance.console.devices import Device, Devices
+from appliance.console.door import Door, plain_address
 
 COOKIE = "bunraku_device"
 _READING = ("GET", "HEAD")
@@ -30,18 +31,24 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Guard:
-    """Refuses with 403 and one sentence. viewers: networks that may look; names: the box's own."""
+    """Refuses with 403 and one sentence. viewers: networks that may look; names: the box's own.
 
-    def __init__(self, viewers: Sequence[str], names: Sequence[str], devices: Devices) -> None:
+    door: what lets connections in, and hears here which are of known devices.
+    """
+
+    def __init__(self, viewers: Sequence[str], names: Sequence[str], devices: Devices, door: Door) -> None:
         self._viewers = [ipaddress.ip_network(one) for one in viewers]
         own = socket.gethostname().lower()
         self._names = {"localhost", own, f"{own}.local", *(name.lower() for name in names)}
-        self._devices = devices
+        self._devices, self._door = devices, door
         self.refused = 0
 
     @web.middleware
     async def check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Let a request through, or refuse it."""
+        if request.transport is not None:
+            connection = request.transport.get_extra_info("peername")
+            self._door.note_request(connection, self.device(request) is not None, _upgrades(request))
         if complaint := self._complaint(request):
             self.refused += 1
             return web.Response(status=403, text=complaint, headers=_HEADERS)
@@ -73,9 +80,8 @@ class Guard:
             return "This device may not open the page. The box file lists those that may: `console: viewers`."
         if not self._is_own(request.host):
             return "The box does not know this name as its own. Use its address, or list the name."
-        upgrades = request.headers.get("Upgrade", "").lower() == "websocket"
         origin = request.headers.get("Origin")
-        if origin is None and not upgrades and request.method in _READING:
+        if origin is None and not _upgrades(request) and request.method in _READING:
             return ""
         if origin != f"{request.scheme}://{request.host}":
             return "This request comes from another page than the box's own."
@@ -101,6 +107,9 @@ class Guard:
 
 
 def peer(request: web.Request) -> str:
-    """The address that a request comes from; an IPv4 address also where it came in by IPv6."""
-    address = (request.remote or "").split("%")[0].lower()
-    return address.removeprefix("::ffff:")
+    """The address that a request comes from."""
+    return plain_address(request.remote or "")
+
+
+def _upgrades(request: web.Request) -> bool:
+    return request.headers.get("Upgrade", "").lower() == "websocket"

@@ -192,7 +192,10 @@ def _numbers(given: Any, count: int) -> tuple[float, ...]:
     """So many numbers; () for anything else."""
     if not isinstance(given, list) or len(given) != count or not all(type(v) in (int, float) for v in given):
         return ()
-    return tuple(map(float, given))
+    try:
+        return tuple(map(float, given))
+    except OverflowError:
+        return ()
 
 
 def _axis_angle(turned: tuple[float, ...]) -> tuple[float, float, float, float]:

@@ -12,15 +12,20 @@ from pathlib import Path
 from aiohttp import web
 
 from appliance.box.fallback import Fallbacks
+from appliance.box.log_limit import limit_log
 from appliance.box.notify import Notifier
+from appliance.box.open_files import open_more_files
 from appliance.box.process_health import ProcessHealth, ProcessHealthWriter
 from appliance.box.realtime import give_way
+from appliance.box.runtime_folder import kept_file
 from appliance.box.show_state import ShowStateReader
 from appliance.console.about import About
 from appliance.console.box_view import BoxView
 from appliance.console.certificate import certificate_in, https_context
 from appliance.console.desk import Desk
 from appliance.console.devices import Devices
+from appliance.console.door import Door
+from appliance.console.fallback import OF_THE_PAGE
 from appliance.console.guard import Guard
 from appliance.console.hands import Hands
 from appliance.console.happened import Happened
@@ -31,7 +36,7 @@ from appliance.console.rehearsed import FOLDER, ZIP, Rehearsed
 from appliance.console.rig import Rig
 from appliance.console.sensor_changes import SensorChanges
 from appliance.console.server import Server
-from appliance.console.settings import Settings
+from appliance.console.settings import WHERE, Settings
 from appliance.console.stage_view import StageView
 from appliance.console.venue import Venue
 from appliance.console.watchers import Watchers
@@ -42,13 +47,16 @@ _PULSE_S = 0.1
 _IDLE_S = 0.2  # how often the stage is looked for while no browser shows the dance
 _NICER = 10
 _LAST_REQUESTS_S = 0.5
-_WAITING_CONNECTIONS = 64
+_WAITING_CONNECTIONS = 256
 
 
 def run_console(settings: Settings) -> int:
     """Serve the page until SIGTERM or Ctrl-C; the exit status. Raises OSError where it has no place."""
     give_way(_NICER)
-    return asyncio.run(_serve(settings))
+    open_more_files()
+    limit_log()
+    with kept_file(Path(settings.folder) / WHERE):
+        return asyncio.run(_serve(settings))
 
 
 async def _serve(settings: Settings) -> int:
@@ -57,9 +65,11 @@ async def _serve(settings: Settings) -> int:
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
     folder = Path(settings.folder)
     devices, stage, watchers = Devices(Path(settings.kept)), StageView(folder), Watchers()
-    guard, desk = Guard(settings.viewers, settings.names, devices), Desk(settings.control)
+    fallbacks = Fallbacks(OF_THE_PAGE)
+    door, desk = Door(fallbacks), Desk(settings.control)
+    guard = Guard(settings.viewers, settings.names, devices, door)
     box = BoxView(desk, stage, ProcessHealth(folder), ShowStateReader(folder))
-    health, notifier = ProcessHealthWriter(folder, "console", Fallbacks(())), Notifier()
+    health, notifier = ProcessHealthWriter(folder, "console", fallbacks), Notifier()
     happened, about = Happened(guard, settings.journal), About(settings.about)
     prove = Prove(guard, folder, Path(settings.kept).parent, settings.about, settings.is_installed)
     logs = Logs(guard, folder, settings.is_installed)
@@ -72,17 +82,20 @@ async def _serve(settings: Settings) -> int:
     if settings.rehearsal:
         others += Rehearsed(guard, stage, box, Path(settings.kept).parent).routes()
         others += [*hands.routes(), *PoseMap(stage).routes()]
-    parts = (guard, devices, desk, stage, box, watchers, happened, about)
+    parts = (guard, devices, desk, stage, box, watchers, happened, about, fallbacks)
     told = {"rehearsal": settings.rehearsal, "installed": settings.is_installed}
     app = Server(*parts, lambda: {**told, "cue_kept": (rehearsed / ZIP).is_file()}, others).app()
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=_LAST_REQUESTS_S, keepalive_timeout=30.0)
     await runner.setup()
     listening = socket.socket(fileno=settings.descriptor)
     listening.setblocking(False)
-    context = _https(settings) if settings.https else None
-    await web.SockSite(runner, listening, backlog=_WAITING_CONNECTIONS, ssl_context=context).start()
+    listening.listen(_WAITING_CONNECTIONS)
+    context, serve = _https(settings) if settings.https else None, runner.server
+    assert serve is not None
     notifier.ready("The page is served.")
     tasks = [
+        asyncio.create_task(door.accept(listening, serve, context)),
+        asyncio.create_task(door.watch()),
         asyncio.create_task(_pulse(notifier, health)),
         asyncio.create_task(_refresh(box, watchers)),
         asyncio.create_task(_send_frames(stage, watchers)),
@@ -97,6 +110,7 @@ async def _serve(settings: Settings) -> int:
     await prove.close()
     await hands.close()
     await runner.cleanup()
+    listening.close()
     faults = [fault for task in ended if (fault := task.exception())]
     if faults:  # a task of ours broke: start anew, and let its traceback be seen
         health.close()

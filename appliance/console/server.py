@@ -10,11 +10,13 @@ from collections.abc import Callable, Iterable
 
 from aiohttp import web
 
+from appliance.box.fallback import Fallbacks
 from appliance.console.about import About
 from appliance.console.body import said
 from appliance.console.box_view import BoxView
 from appliance.console.desk import Desk, NoAnswerError
-from appliance.console.devices import DIGITS, LONGEST_NAME, Devices, WrongPins
+from appliance.console.devices import LONG_DIGITS, LONGEST_NAME, Devices, WrongPins
+from appliance.console.fallback import PIN_CHANGED
 from appliance.console.guard import COOKIE, Guard, peer
 from appliance.console.happened import Happened
 from appliance.console.metrics import CONTENT_TYPE, metrics
@@ -27,6 +29,7 @@ from appliance.show_control.status_messages import QUESTIONS
 
 _YEAR_S = 365 * 24 * 3600
 _MOST_ARGUMENTS = 32  # a line over the map
+_WRONG = (web.HTTPBadRequest, web.HTTPForbidden, web.HTTPRequestEntityTooLarge, web.HTTPRequestTimeout)
 _NOT_FROM_HERE = frozenset((*QUESTIONS, "/sensors/list", "/ping"))  # answered to the page in another way
 
 
@@ -43,11 +46,13 @@ class Server:
         watchers: Watchers,
         happened: Happened,
         about: About,
+        fallbacks: Fallbacks,
         offers: Callable[[], dict[str, bool]],
         others: Iterable[web.RouteDef] = (),
     ) -> None:
         self._others = tuple(others)
         self._happened, self._about, self._offers = happened, about, offers
+        self._fallbacks = fallbacks
         self._guard, self._devices, self._desk = guard, devices, desk
         self._stage, self._box, self._watchers = stage, box, watchers
         self._wrong_pins, self._languages = WrongPins(), languages()
@@ -84,7 +89,8 @@ class Server:
         return web.Response(body=metrics(self._box.value).encode(), headers={"Content-Type": CONTENT_TYPE})
 
     async def _watch(self, request: web.Request) -> web.StreamResponse:
-        return await self._watchers.serve(request, self._box.words)
+        is_known = self._guard.device(request) is not None
+        return await self._watchers.serve(request, self._box.words, peer(request), is_known)
 
     async def _show(self, request: web.Request) -> web.Response:
         return web.json_response({**self._stage.facts, "generation": self._stage.generation})
@@ -110,6 +116,15 @@ class Server:
         )
 
     async def _take_pin(self, request: web.Request) -> web.Response:
+        try:
+            return await self._unlock(request)
+        except _WRONG:
+            self._wrong_pins.note(peer(request), time.monotonic())
+            if self._wrong_pins.are_too_many and self._devices.lengthen_pin():
+                self._fallbacks.set(PIN_CHANGED.name, True)
+            raise
+
+    async def _unlock(self, request: web.Request) -> web.Response:
         values = await said(request)
         pin, name = values.get("pin"), values.get("name", "")
         asker, now = peer(request), time.monotonic()  # after the body: no other request comes in between
@@ -117,10 +132,11 @@ class Server:
             headers = {"Retry-After": str(math.ceil(wait_s))}
             raise web.HTTPTooManyRequests(text="Too many wrong PINs. Wait a minute.", headers=headers)
         if not isinstance(pin, str) or not isinstance(name, str) or not is_readable([name]):
-            raise web.HTTPBadRequest(text="A PIN is six digits, and a name is a text.")
-        if not secrets.compare_digest(pin.encode()[: 4 * DIGITS], self._devices.pin.encode()):
-            self._wrong_pins.note(asker, now)
+            raise web.HTTPBadRequest(text="A PIN is a text of digits, and a name is a text.")
+        if not secrets.compare_digest(pin.encode()[: 4 * LONG_DIGITS], self._devices.pin.encode()):
             raise web.HTTPForbidden(text="This is not the PIN. The box says it: bunraku console pin.")
+        self._wrong_pins.forget(asker)
+        self._fallbacks.set(PIN_CHANGED.name, "")
         token = self._devices.remember(name.strip()[:LONGEST_NAME] or "unnamed")
         response = web.json_response({"known": True})
         is_https = request.scheme == "https"

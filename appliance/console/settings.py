@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 
+WHERE = "console.path"  # in the runtime folder: PIN and devices, host and port of the page that runs
+
 
 @dataclass(frozen=True)
 class Settings:

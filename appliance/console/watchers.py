@@ -6,8 +6,12 @@ import asyncio
 import contextlib
 import json
 import socket
+import time
+from collections import Counter
 
 from aiohttp import WSMsgType, web
+
+from appliance.console.door import gives_way
 
 MOST = 64
 LONGEST_MESSAGE = 64  # bytes; what a browser says here is whether it wants frames
@@ -17,13 +21,16 @@ _FEW = 8  # browsers that get each frame; with more of them each gets every seco
 
 
 class _Watcher:
-    """One browser."""
+    """One browser. is_known: its device gave the PIN; began: monotonic seconds."""
 
-    def __init__(self) -> None:
-        self.words: str | None = None
+    def __init__(self, address: str, is_known: bool, words: str, transport: asyncio.Transport | None) -> None:
+        self.address, self.is_known, self.began = address, is_known, time.monotonic()
+        self.transport = transport
+        self.words: str | None = words
         self.frame: bytes | None = None
         self.wants_frames = self.wants_ghost = False
         self.ready = asyncio.Event()
+        self.ready.set()
 
     async def send_on(self, browser: web.WebSocketResponse) -> None:
         """Send what lies in the slots, for as long as the browser takes it."""
@@ -71,18 +78,20 @@ class Watchers:
                 one.frame = with_ghost if one.wants_ghost else frame
                 one.ready.set()
 
-    async def serve(self, request: web.Request, words: str) -> web.StreamResponse:
-        """One browser, from its first word to its last."""
-        if len(self._watchers) >= MOST:
+    async def serve(
+        self, request: web.Request, words: str, address: str, is_known: bool
+    ) -> web.StreamResponse:
+        """One browser, from its first word to its last. Where all places are taken, a stranger's is given to
+        a device that gave the PIN, and to a stranger from an address that has fewer.
+        """
+        watcher = _Watcher(address, is_known, words, request.transport)
+        if len(self._watchers) >= MOST and not self._make_room(watcher):
             raise web.HTTPServiceUnavailable(text="Too many browsers watch already. Close one.")
         browser = web.WebSocketResponse(
             heartbeat=_QUIET_S, max_msg_size=LONGEST_MESSAGE, compress=False, writer_limit=1, timeout=1.0
         )
         await browser.prepare(request)
         _keep_little(request)
-        watcher = _Watcher()
-        watcher.words = words
-        watcher.ready.set()
         self._watchers[watcher] = browser
         sending = asyncio.create_task(watcher.send_on(browser))
         try:
@@ -93,9 +102,23 @@ class Watchers:
                     break
                 watcher.wants_frames, watcher.wants_ghost = wanted
         finally:
-            del self._watchers[watcher]
+            self._watchers.pop(watcher, None)
             sending.cancel()
         return browser
+
+    def _make_room(self, comes: _Watcher) -> bool:
+        """Whether a stranger gave its place up."""
+        strangers = [one for one in self._watchers if not one.is_known]
+        if not strangers:
+            return False
+        leaving = gives_way((one, one.address, one.began) for one in strangers)
+        crowd = Counter(one.address for one in strangers)
+        if not comes.is_known and crowd[leaving.address] <= crowd[comes.address] + 1:
+            return False
+        del self._watchers[leaving]
+        if leaving.transport is not None:
+            leaving.transport.abort()
+        return True
 
     async def close(self) -> None:
         """Say goodbye to all: they come back by themselves."""

@@ -5,7 +5,16 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
-from appliance.console.devices import FREE_TRIES, MOST_DEVICES, PAUSE_S, Devices, WrongPins
+from appliance.console.devices import (
+    DIGITS,
+    FREE_TRIES,
+    LONG_DIGITS,
+    MOST_DEVICES,
+    MOST_WRONG,
+    PAUSE_S,
+    Devices,
+    WrongPins,
+)
 
 
 def test_a_device_is_known_by_its_token_until_it_is_revoked(tmp_path: Path) -> None:
@@ -59,8 +68,14 @@ def test_wrong_pins_cost_their_address_a_minute() -> None:
     assert wrong.wait_s("a", 100.0 + PAUSE_S + 1.0) == 0.0
 
 
-def test_many_addresses_together_are_slowed_down_too() -> None:
-    wrong = WrongPins()
-    for number in range(1000):
+def test_many_addresses_together_hold_up_no_other_one_but_ask_for_a_longer_pin(tmp_path: Path) -> None:
+    wrong, devices = WrongPins(), Devices(tmp_path / "kept.json")
+    token = devices.remember("phone")
+    for number in range(MOST_WRONG):
+        assert not wrong.are_too_many
         wrong.note(f"10.0.{number // 250}.{number % 250}", 5.0)
-    assert wrong.wait_s("192.168.0.1", 5.0) > 0.0
+    assert wrong.wait_s("192.168.0.1", 5.0) == 0.0
+    assert wrong.are_too_many
+    assert devices.lengthen_pin() and not devices.lengthen_pin()
+    assert len(Devices(tmp_path / "kept.json").pin) == LONG_DIGITS and devices.known(token)
+    assert len(devices.change_pin()) == DIGITS

@@ -250,7 +250,7 @@ def test_a_page_for_a_network_refuses_others(tmp_path: Path) -> None:
         with socket.create_connection(("::1", host), 60) if socket.has_ipv6 else socket.socket() as one:
             one.sendall(f"GET /status HTTP/1.1\r\nHost: [::1]:{host}\r\nConnection: close\r\n\r\n".encode())
             assert one.recv(100).startswith(b"HTTP/1.1 200")
-    guard = Guard(["192.168.0.0/24", "fd00::/8"], [], None)  # type: ignore[arg-type]
+    guard = Guard(["192.168.0.0/24", "fd00::/8"], [], None, None)  # type: ignore[arg-type]
     for address, may in (
         ("127.0.0.1", True),
         ("::1", True),

@@ -77,6 +77,7 @@ async function givePin() {
   }
   byId("pin").close();
   tell(true);
+  document.dispatchEvent(new Event("known"));
   const then = waiting;
   waiting = null;
   then?.();

@@ -134,6 +134,7 @@ await loadWords(me.languages);
 const box = new Box();
 const dance = new Dance(byId("stage"), byId("held"), box, words);
 initDevice(me, words);
+document.addEventListener("known", () => box.reopen());  // as a device with the PIN, which gives way to nobody
 initPicture();
 initHappened();
 initProve();
