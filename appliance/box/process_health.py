@@ -11,14 +11,20 @@ from typing import Any, NamedTuple
 from appliance.box.block import BlockWriter
 from appliance.box.fallback import Fallback, Fallbacks, Fallen, fallen
 from appliance.box.record import Record
+from appliance.box.runtime_folder import renew_lost
 from appliance.pose.foreign_file import kept_json, plain_json
 
-PROCESSES = ("lights", "projector", "keeper", "console", "generator", "sound")
+PROCESSES = ("control", "lights", "projector", "keeper", "console", "generator", "sound")
 BEAT_S, LATE_S = 1.0, 5.0
 _LARGEST = 8192
 _CHOSEN = "chosen.json"
 
 DIED = {
+    "control": Fallback(
+        "control-died",
+        "Show control died or hung. The dance went on; commands waited until it was started again, two "
+        "seconds at most. If it goes on, look at its messages: journalctl -u bunraku-control.",
+    ),
     "lights": Fallback(
         "lights-died",
         "The lights' process died or hangs. The nodes hold or fade as they are set, and it is started again "
@@ -36,7 +42,7 @@ DIED = {
     ),
     "generator": Fallback(
         "generator-died",
-        "The generator died or hangs. The last phrase plays on, and it is started again within two seconds. "
+        "The generator died or hangs. The last phrase plays on, and it is started again within seconds. "
         "If it goes on, look at its messages: journalctl -u bunraku-generator.",
     ),
     "console": Fallback(
@@ -88,6 +94,7 @@ class ProcessHealthWriter:
         """Call it often; monotonic seconds."""
         if now >= self._due:
             self._due = now + BEAT_S
+            renew_lost()
             self._write(now, ended=False)
 
     def end(self, now: float) -> None:
@@ -105,6 +112,7 @@ class ProcessHealthWriter:
             return
         told = self._fallbacks.happened(now)
         values = {"pid": os.getpid(), "starts": self._starts, "beat": now, "ended": ended, "fallbacks": told}
+        values["parts"] = dict(self._fallbacks.parts)
         packed = json.dumps(values).encode()
         while len(packed) > _LARGEST and told:
             values["fallbacks"] = told = told[:-1]
@@ -112,7 +120,6 @@ class ProcessHealthWriter:
         self._block.write(packed)
 
 
-        values["parts"] = dict(self._fallbacks.parts)
 class Member(NamedTuple):
     """A process beside the stage. late: it published nothing for LATE_S, and did not end.
 
@@ -123,6 +130,7 @@ class Member(NamedTuple):
     starts: int
     late: bool
     fallbacks: tuple[Fallen, ...]
+    parts: dict[str, str]
 
 
 class ProcessHealth:
@@ -130,7 +138,6 @@ class ProcessHealth:
 
     def __init__(self, folder: Path) -> None:
         self._blocks = {process: _record(process).reader(folder) for process in PROCESSES}
-    parts: dict[str, str]
         self._chosen, self._chosen_at = folder / _CHOSEN, -1
         self._of_choice: tuple[Fallen, ...] = ()
 

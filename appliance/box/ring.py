@@ -49,14 +49,19 @@ class RingWriter:
     """Fill `payload`, then `publish`: one copy into the next slot; what was written before stays whole."""
 
     def __init__(self, ring: Ring, memory: mmap.mmap) -> None:
-        whole = memoryview(memory)
-        self._newest = whole[ring.at : ring.at + _TAIL.size].cast("Q")
-        starts = map(ring.slot_at, range(ring.slots))
-        self._slots = [whole[start : start + ring.slot_bytes] for start in starts]
+        self._ring = ring
+        self.move_to(memory)
         self._image = bytearray(ring.slot_bytes)
         self._tail_at = ring.slot_bytes - _TAIL.size
         self.payload = memoryview(self._image)[_HEAD.size : _HEAD.size + ring.capacity]
         self._sequence = self._newest[0]
+
+    def move_to(self, memory: mmap.mmap) -> None:
+        """From now on write into this file, which has the same content."""
+        whole, ring = memoryview(memory), self._ring
+        self._newest = whole[ring.at : ring.at + _TAIL.size].cast("Q")
+        starts = map(ring.slot_at, range(ring.slots))
+        self._slots = [whole[start : start + ring.slot_bytes] for start in starts]
 
     def publish(self) -> None:
         """Make the whole payload the newest one; nothing here is for the collector to visit."""

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from appliance.box.ring import Ring, RingReader, RingWriter
+from appliance.box.runtime_folder import hold, is_lost
 
 Shape = tuple[int, int]  # slots and capacity of a ring, bytes
 
@@ -32,8 +33,8 @@ class RingFileWriter:
     def __init__(self, path: Path, descriptor: int, rings: Sequence[Ring]) -> None:
         self._path = path
         self._descriptor = descriptor
-        memory = mmap.mmap(descriptor, rings[-1].end, mmap.MAP_SHARED | mmap.MAP_POPULATE)
-        self.rings = [RingWriter(ring, memory) for ring in rings]
+        self._memory = _mapped(descriptor, rings[-1].end)
+        self.rings = [RingWriter(ring, self._memory) for ring in rings]
 
     @classmethod
     def new(cls, path: Path, kind: str, version: int, shapes: Sequence[Shape]) -> RingFileWriter:
@@ -73,11 +74,36 @@ class RingFileWriter:
             _lock(descriptor)
             found = cls(path, descriptor, rings)
             failing.pop_all()
+        hold(found)
         return found
 
     def publish(self) -> None:
         """Put a new file in the place of the one before: from now on readers find it."""
         _temporary(self._path).rename(self._path)
+        hold(self)
+
+    def renew(self) -> bool:
+        """A file that was deleted is put there again with all that it holds, and written on.
+
+        Whether it was. Raises OSError where there is no room for it.
+        """
+        if self._descriptor < 0 or not is_lost(self._path):
+            return False
+        temporary, size = _temporary(self._path), len(self._memory)
+        with contextlib.ExitStack() as failing:
+            descriptor = _made(temporary)
+            failing.callback(temporary.unlink, missing_ok=True)
+            failing.callback(os.close, descriptor)
+            os.posix_fallocate(descriptor, 0, size)
+            memory = _mapped(descriptor, size)
+            memory[:] = self._memory[:]
+            temporary.rename(self._path)
+            failing.pop_all()
+        for ring in self.rings:
+            ring.move_to(memory)
+        self._let_go()
+        self._memory, self._descriptor = memory, descriptor
+        return True
 
     def close(self, remove: bool = False) -> None:
         """Release the file; `remove`: it goes too, unless another one has taken its place."""
@@ -86,9 +112,12 @@ class RingFileWriter:
         with contextlib.suppress(OSError):
             if remove and os.path.samestat(os.fstat(self._descriptor), self._path.stat()):
                 self._path.unlink()
+        self._let_go()
+        self._descriptor = -1
+
+    def _let_go(self) -> None:
         fcntl.flock(self._descriptor, fcntl.LOCK_UN)  # the mapping holds on to the file, and to its lock
         os.close(self._descriptor)
-        self._descriptor = -1
 
 
 class RingFileReader:
@@ -177,6 +206,10 @@ class RingFileReader:
             return f"{self._path} is damaged. Start {self._writer} again."
         self.rings = [RingReader(ring, descriptor) for ring in _rings(shapes)]
         return ""
+
+
+def _mapped(descriptor: int, size: int) -> mmap.mmap:
+    return mmap.mmap(descriptor, size, mmap.MAP_SHARED | mmap.MAP_POPULATE)
 
 
 def _header(kind: str, version: int, shapes: Sequence[Shape]) -> bytes:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import stat
-from collections.abc import Mapping
+import threading
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
+from weakref import WeakSet
 
 if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
@@ -75,6 +78,77 @@ def _require_own(folder: Path) -> None:
         )
 
 
+class Renewable(Protocol):
+    """What a process has in the runtime folder, and can put there again."""
+
+    def renew(self) -> bool:
+        """Whether it was lost and is there again. Raises OSError where the folder does not take it."""
+        ...
+
+
+_HELD: WeakSet[Renewable] = WeakSet()
+_HOLDING = threading.Lock()
+
+
+def hold(one: Renewable) -> None:
+    """From now on `renew_lost` looks after it, for as long as it lives."""
+    with _HOLDING:
+        _HELD.add(one)
+
+
+def renew_lost() -> str | None:
+    """Once a second: put everything of this process that was deleted from the folder there again.
+
+    None: nothing was. "": it is there again. Else why it is not, for people.
+    """
+    with _HOLDING:
+        held = list(_HELD)
+    found: str | None = None
+    for one in held:
+        try:
+            if one.renew() and found is None:
+                found = ""
+        except OSError as error:
+            found = f"{error.filename or 'The runtime folder'} cannot be made again ({error.strerror})."
+    return found
+
+
+def is_lost(path: Path) -> bool:
+    """Whether nothing is there; the folder is made again (mode 0700) where it is gone too."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return True
+    return False
+
+
+@contextlib.contextmanager
+def kept_file(path: Path) -> Iterator[None]:
+    """Inside, a small file that nobody writes a second time is remembered, and put there again."""
+    one = _KeptFile(path)
+    with contextlib.suppress(OSError):
+        one.renew()
+    hold(one)
+    yield
+
+
+class _KeptFile:
+    def __init__(self, path: Path) -> None:
+        self._path, self._changed, self._content = path, -1, b""
+
+    def renew(self) -> bool:
+        if self._content and is_lost(self._path):
+            with contextlib.suppress(FileExistsError), self._path.open("xb") as file:
+                os.fchmod(file.fileno(), 0o600)
+                file.write(self._content)
+            return True
+        with contextlib.suppress(FileNotFoundError):
+            if (changed := self._path.stat().st_mtime_ns) != self._changed:
+                self._changed, self._content = changed, self._path.read_bytes()
+        return False
+
+
 class Claim:
     """One living process a place: `Claim(folder, "stage")` holds it until it is closed or the process ends.
 
@@ -82,23 +156,38 @@ class Claim:
     """
 
     def __init__(self, folder: Path, place: str) -> None:
-        path = folder / f"{place}.lock"
+        self._path, self._descriptor = folder / f"{place}.lock", -1
         try:
-            self._descriptor = os.open(
-                path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, mode=0o600
-            )
-        except OSError as error:
-            raise RuntimeFolderError(
-                f"{path}: cannot be opened ({error.strerror}). Nothing starts there. {_CURE}"
-            ) from error
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._take()
         except BlockingIOError:
-            os.close(self._descriptor)
             raise AlreadyHereError(
                 f"Another {place} runs in {folder}. It goes on, and this one does not start. Stop it, or "
                 "give each box a folder of its own: `runtime:` in the box file."
             ) from None
+        except OSError as error:
+            raise RuntimeFolderError(
+                f"{self._path}: cannot be opened ({error.strerror}). Nothing starts there. {_CURE}"
+            ) from error
+        hold(self)
+
+    def renew(self) -> bool:
+        """As in `Renewable`; a place that another process has taken meanwhile is left to it."""
+        if self._descriptor < 0 or not is_lost(self._path):
+            return False
+        with contextlib.suppress(BlockingIOError):
+            self._take()
+        return True
+
+    def _take(self) -> None:
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+        descriptor = os.open(self._path, flags, mode=0o600)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            raise
+        self.close()
+        self._descriptor = descriptor
 
     def close(self) -> None:
         """Give the place back."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from appliance.box.notify import WATCHDOG_S
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.cli.companions import Companion
 from appliance.cli.options import (
@@ -26,14 +27,14 @@ from appliance.cli.options import (
 )
 from appliance.cli.page_address import address, address_of, open_console_port
 from appliance.console.devices import Devices
-from appliance.console.settings import Settings
+from appliance.console.settings import WHERE, Settings
 from appliance.show.config_error import NotAskedForError, Problem
 from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
 
-_KEPT, _WHERE = "console.json", "console.path"
+_KEPT = "console.json"
 
 console = command_group(
     "Serve the page: a browser at the venue shows the box and, with the PIN, commands it. `bunraku play` "
@@ -187,7 +188,7 @@ def choose_show(
 def card_lines(box: BoxConfig) -> tuple[str, ...]:
     """For the projector's test card: address and PIN of the page that runs here; nothing without one."""
     try:
-        kept, host, port = (_runtime(box) / _WHERE).read_text().splitlines()
+        kept, host, port = (_runtime(box) / WHERE).read_text().splitlines()
         https = box.console is not None and box.console.https
         return f"page {address(host, int(port), https)}", f"pin {Devices(Path(kept)).pin}"
     except (OSError, ValueError, StageError):
@@ -217,7 +218,7 @@ def console_command(
     folder = _runtime(box)
     with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as opened:
         host, port = opened.getsockname()[:2]
-        (folder / _WHERE).write_text(f"{kept}\n{host}\n{port}\n")
+        (folder / WHERE).write_text(f"{kept}\n{host}\n{port}\n")
     settings = Settings(
         folder=str(folder),
         descriptor=descriptor,
@@ -254,7 +255,13 @@ def page_companion(
         say(f"The page: {address_of(page.fileno(), https)}, PIN {Devices(kept).pin}.")
     except OSError as error:
         say(f"{kept}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
-    return Companion("The page", command, "Browsers come back by themselves.", descriptors=(page.fileno(),))
+    return Companion(
+        "The page",
+        command,
+        "Browsers come back by themselves.",
+        descriptors=(page.fileno(),),
+        watchdog_s=WATCHDOG_S["console"],
+    )
 
 
 def kept_in(box: BoxConfig) -> Path:
@@ -287,7 +294,7 @@ def _kept_here(box: BoxConfig) -> Path:
     """The same as the page that runs here says: in a rehearsal it keeps them elsewhere."""
     path = kept_in(box)
     with contextlib.suppress(OSError, StageError):  # root does not meet the box's processes
-        told = Path((_runtime(box) / _WHERE).read_text().partition("\n")[0])
+        told = Path((_runtime(box) / WHERE).read_text().partition("\n")[0])
         path = told if told.is_file() else path
     return path
 

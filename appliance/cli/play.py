@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from appliance.box.leftovers import forget_run
 from appliance.box.log_writer import SAID, LogWriter
+from appliance.box.runtime_folder import kept_file
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.readings import readings_line
 from appliance.sensor.memory import forget_memory
@@ -79,6 +80,8 @@ def play_show(
             keeps = journal is not None or (box.state_folder is not None and not emulate)
         speaker = LogWriter()
         opened.callback(speaker.close)
+        if chosen is not None:
+            opened.enter_context(kept_file(chosen))
         shown = rehearse is not None and _has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
         if cue is not None:

@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from appliance.box.runtime_folder import hold, is_lost
+
 if TYPE_CHECKING:
     from appliance.sensor.keys import SensorKey
 
@@ -23,6 +25,7 @@ Place = Literal["stage", "projector", "lights", "generator"]
 Delivery = Literal["sent", "full", "absent"]  # full: the receiver's socket is; absent: there is no receiver
 ANSWERS = "control"
 _LARGEST = 65536
+_FOLDER = os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC
 # What parsing raises for a datagram that no process of this box sent.
 _NONSENSE = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
 
@@ -127,18 +130,35 @@ class _Mailbox:
     """A Unix datagram socket in a folder, reached through /proc: a socket's own path ends after 107 bytes."""
 
     def __init__(self, folder: Path, place: str) -> None:
-        self._folder = os.open(folder, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
+        self._whole = folder
+        self._folder = os.open(folder, _FOLDER)
         self._name = f"{place}.sock"
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         try:
             with contextlib.suppress(FileNotFoundError):
                 os.unlink(self._name, dir_fd=self._folder)  # of a process that was killed
-            self._socket.bind(self._path(self._name))
-            self._inode = os.stat(self._name, dir_fd=self._folder).st_ino
+            self._bind(self._socket)
         except OSError:
             self._socket.close()
             os.close(self._folder)
             raise
+        hold(self)
+
+    def _bind(self, one: socket.socket) -> None:
+        one.bind(self._path(self._name))
+        self._inode = os.stat(self._name, dir_fd=self._folder).st_ino
+
+    def renew(self) -> bool:
+        """Where the socket or its folder was deleted: another one in its place, with the same descriptor."""
+        if self._socket.fileno() < 0 or not is_lost(self._whole / self._name):
+            return False
+        folder = os.open(self._whole, _FOLDER)
+        os.close(self._folder)
+        self._folder = folder
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as made:
+            self._bind(made)
+            os.dup2(made.fileno(), self._socket.fileno(), inheritable=False)
+        return True
 
     def fileno(self) -> int:
         return self._socket.fileno()

@@ -127,7 +127,20 @@ OF_THE_STAGE = (
         PLACE_NOT_NOTED,
         STAGE_RESTARTED,
         POWER_CUT,
+SOURCE_JUMPED = Fallback(
+    "source-jumped",
+    "The root of a live dancer jumped farther than anybody moves: the figure goes on from where it stood. "
+    "Check the tracking in the program that sends it.",
+)
+FOLDER_LOST = Fallback(
+    "folder-lost",
+    "The folder where the box's processes meet was deleted, or files in it. The audience saw nothing of it: "
+    "it was made again, with what is in force. Find what deletes it: a cleaner of temporary files, or a "
+    "person.",
+)
         SOURCE_LATE,
         POSE_REFUSED,
     ),
 )
+        SOURCE_JUMPED,
+        FOLDER_LOST,

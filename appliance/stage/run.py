@@ -10,6 +10,7 @@ from appliance.box.clock import Slot, TickClock
 from appliance.box.live_pose import LivePoseReader
 from appliance.box.notify import Notifier
 from appliance.box.realtime import enter_realtime, leave_realtime
+from appliance.box.runtime_folder import renew_lost
 from appliance.box.show_state import ShowStateReader
 from appliance.dancer.phrase_cache import MEMORY
 from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
@@ -263,13 +264,14 @@ class Stage:
         if most := self.second_look.most_that_fits(self.health.slowest_ms, times.coding):
             self._carry_out(Order("allow", (float(most),)), now)
             self._say_and_note(self.watch.note_second_look(most))
+        folder_news = self.watch.note_folder(now, renew_lost())
         news = self.watch.check(now, self.health, self.parts.link.states(now))
         line = self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked)
         line = "  ".join(filter(None, (line, self.watch.fallbacks.line(now))))
         self.notifier.status(line)
         self.say(line)
         self._publish_health(now)
-        for sentence in news:
+        for sentence in filter(None, (folder_news, *news)):
             self._say_and_note(sentence)
         for imu_id, offsets in self.parts.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)

@@ -85,6 +85,22 @@ class Watch:
 
     def check(self, now: float, health: Health, sensors: Sequence[SensorState] = ()) -> list[str]:
         """Once a second: bring the fallbacks up to date; sentences about what changed since the last call.
+    def note_folder(self, now: float, lost: str | None) -> str:
+        """Once a second, as renew_lost told it; a sentence where that is news."""
+        if lost is None:
+            self.fallbacks.set(rows.FOLDER_LOST.name, False)
+            return ""
+        if not lost:
+            self.fallbacks.count(rows.FOLDER_LOST.name, now)
+            return rows.FOLDER_LOST.words
+        words = (
+            f"The folder where the box's processes meet was deleted, or files in it: {lost} The dance goes "
+            "on, but commands, lights and picture may not come back once they end. Start the box again: "
+            "systemctl restart bunraku.target, or `bunraku play`."
+        )
+        self.fallbacks.set(rows.FOLDER_LOST.name, words)
+        return words if self._changes("folder", lost, True) else ""
+
 
         now: monotonic seconds; sensors: as the link sees them at this moment.
         """
