@@ -1,20 +1,37 @@
-"""Notifies systemd: ready, still alive, what is going on, about to end (sd_notify(3))."""
+"""Notifies a supervisor: ready, still alive, what is going on, about to end (sd_notify(3)).
+
+systemd on an installed box, `bunraku play` for its companions: each process is watched the same in both.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import socket
-from collections.abc import Mapping
+import struct
+from collections.abc import Iterator, Mapping
 
+# How long a process may give no sign before it is started again, seconds; its unit says the same.
+WATCHDOG_S = {
+    "control": 2.0,
+    "lights": 2.0,
+    "generator": 5.0,
+    "console": 5.0,
+    "sound": 5.0,
+    "keeper": 8.0,
+    "projector": 10.0,
+}
+READY, ALIVE, ENDING = "READY=1", "WATCHDOG=1", "STOPPING=1"
 _PINGS_IN_A_PERIOD = 4
+_SENDER = struct.Struct("3i")  # struct ucred: process, user, group
+_LARGEST = 4096
 
 
 class Notifier:
-    """Tells systemd how this process is; does nothing without systemd, never raises, never waits.
+    """Tells the supervisor how this process is; does nothing without one, never raises, never waits.
 
     Takes $NOTIFY_SOCKET, $WATCHDOG_USEC and $WATCHDOG_PID, which systemd sets for a unit with Type=notify
-    and WatchdogSec=. A word for which systemd has no room at the moment is lost; READY comes again.
+    and WatchdogSec=. A word for which there is no room at the moment is lost; READY comes again.
     """
 
     def __init__(self, environ: Mapping[str, str] | None = None) -> None:
@@ -32,13 +49,13 @@ class Notifier:
 
     def ready(self, status: str = "") -> None:
         """It works now."""
-        self._owed = "" if self._send("READY=1", status) else "READY=1\n"
+        self._owed = "" if self._send(READY, status) else f"{READY}\n"
 
     def ping(self, now: float) -> None:
         """It still works; monotonic seconds. Call it often: sent four times a period."""
         if now >= self._due and self._socket is not None and self.every_s != float("inf"):
             self._due = now + self.every_s
-            if self._send(f"{self._owed}WATCHDOG=1"):
+            if self._send(f"{self._owed}{ALIVE}"):
                 self._owed = ""
 
     def status(self, words: str) -> None:
@@ -47,7 +64,7 @@ class Notifier:
 
     def stopping(self) -> None:
         """It ends by itself now."""
-        self._send("STOPPING=1")
+        self._send(ENDING)
 
     def close(self) -> None:
         """Say nothing more."""
@@ -67,6 +84,36 @@ class Notifier:
         except OSError:
             return False
         return True
+
+
+class NotifyListener:
+    """The supervisor's end, for children of this process. Raises OSError without a socket."""
+
+    def __init__(self) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+        self._socket.bind("")  # a free name in the abstract space, which the kernel chooses
+
+    def environ(self, watchdog_s: float) -> dict[str, str]:
+        """What a child finds it by."""
+        name = self._socket.getsockname()[1:]
+        return {"NOTIFY_SOCKET": f"@{os.fsdecode(name)}", "WATCHDOG_USEC": str(round(watchdog_s * 1e6))}
+
+    def heard(self) -> Iterator[tuple[int, str]]:
+        """Sender's process and words of all that waits; the kernel tells the process."""
+        while True:
+            try:
+                words, told, _, _ = self._socket.recvmsg(_LARGEST, socket.CMSG_SPACE(_SENDER.size))
+            except OSError:
+                return
+            for level, kind, sender in told:
+                if (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS):
+                    yield _SENDER.unpack(sender)[0], words.decode(errors="replace")
+
+    def close(self) -> None:
+        """Hear nothing more."""
+        self._socket.close()
 
 
 def _address(named: str) -> str:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
+import signal
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from appliance.box.notify import ALIVE, ENDING, READY, NotifyListener
 from appliance.box.parent_death import PARENT, TOLD
 
 SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0
@@ -19,6 +22,10 @@ _LIVED_S = 10.0  # after a life of this length the shortest pause counts again
 _REPORTED = 3  # deaths in a row that are reported one by one
 _MOST_DOUBLINGS = 10  # of the pause: beyond it is the longest one anyway
 _LOOK_S = 0.1
+READY_S = 60.0  # from its start to its first sign, on a machine that does ten other things
+_STOOD_STILL_S = 1.0  # between two looks: this process itself was held up, and blames nobody for it
+_OF_OURS = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID")  # a supervisor's of this process
+_LAST_LINE_S = 0.3  # after SIGABRT, at which Python prints where it hangs
 LAST_WORDS_S, _KILLED_WITHIN_S = 3.0, 1.0
 
 
@@ -27,7 +34,7 @@ class Companion:
     """One process beside the stage.
 
     meanwhile: a sentence, what is missing while it is away. may_close: the user may end it for good.
-    descriptors: the open files that it inherits.
+    descriptors: the open files that it inherits. watchdog_s: without a sign for this long it is killed.
     """
 
     name: str
@@ -35,6 +42,7 @@ class Companion:
     meanwhile: str
     may_close: bool = False
     descriptors: tuple[int, ...] = ()
+    watchdog_s: float = math.inf
 
 
 class Companions:
@@ -47,7 +55,11 @@ class Companions:
         self, companions: Sequence[Companion], say: Callable[[str], None], may_start: Callable[[], bool]
     ) -> None:
         self._may_start = may_start
-        self._running = [_Running(companion, say) for companion in companions]
+        try:
+            self._listener: NotifyListener | None = NotifyListener()
+        except OSError:  # no descriptor is left: unwatched is better than not at all
+            self._listener = None
+        self._running = [_Running(companion, say, self._listener) for companion in companions]
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._supervise, name="companions", daemon=True)
 
@@ -60,6 +72,8 @@ class Companions:
         self._closing.set()
         if self._running:
             self._thread.join()
+        if self._listener is not None:
+            self._listener.close()
 
     def _supervise(self) -> None:
         """Start all children from this thread: Linux ends them when the thread that started them ends."""
@@ -67,6 +81,9 @@ class Companions:
             if self._closing.wait(_LOOK_S / 4):
                 return
         while True:
+            for process, words in () if self._listener is None else self._listener.heard():
+                for running in self._running:
+                    running.note(process, words, time.monotonic())
             for running in self._running:
                 running.check(time.monotonic())
             if self._closing.wait(_LOOK_S):
@@ -93,8 +110,11 @@ class Backoff:
 class _Running:
     """A companion and its process."""
 
-    def __init__(self, companion: Companion, say: Callable[[str], None]) -> None:
-        self._companion, self._say = companion, say
+    def __init__(
+        self, companion: Companion, say: Callable[[str], None], listener: NotifyListener | None
+    ) -> None:
+        self._companion, self._say, self._listener = companion, say, listener
+        self._silent_at = self._looked_at = self._killed_at = math.inf
         self._process: subprocess.Popen[bytes] | None = None
         self._started_at = 0.0
         self._starts_at = 0.0
@@ -109,6 +129,30 @@ class _Running:
             self._note_exit(status, now)
         if self._process is None and not self._is_over and now >= self._starts_at:
             self._start(now)
+        elif self._process is not None:
+            self._watch(self._process, now)
+
+    def note(self, process: int, words: str, now: float) -> None:
+        """A sign came from a process, perhaps from this one."""
+        if self._process is None or self._process.pid != process:
+            return
+        lines = words.splitlines()
+        if ENDING in lines:
+            self._silent_at = math.inf
+        elif READY in lines or ALIVE in lines:
+            self._silent_at = now + self._companion.watchdog_s
+
+    def _watch(self, process: subprocess.Popen[bytes], now: float) -> None:
+        """Kill it where it hangs; its end is noticed like any other."""
+        stood_still = now - self._looked_at > _STOOD_STILL_S
+        self._looked_at = now
+        if stood_still:
+            self._silent_at = max(self._silent_at, now + self._companion.watchdog_s)
+        elif now >= self._killed_at + _LAST_LINE_S:
+            process.kill()
+        elif now >= self._silent_at and self._killed_at == math.inf:
+            self._killed_at = now
+            process.send_signal(signal.SIGABRT)
 
     def request_end(self) -> None:
         if self._process is not None:
@@ -125,7 +169,9 @@ class _Running:
             self._process.wait(_KILLED_WITHIN_S)
 
     def _start(self, now: float) -> None:
-        self._started_at = now
+        self._started_at = self._looked_at = now
+        is_watched = self._listener is not None and self._companion.watchdog_s < math.inf
+        self._silent_at, self._killed_at = now + READY_S if is_watched else math.inf, math.inf
         try:
             self._process = subprocess.Popen(
                 self._companion.command,
@@ -139,7 +185,11 @@ class _Running:
 
     def _environment(self) -> dict[str, str]:
         told = {} if self._told is None else {TOLD: str(self._told)}
-        return {**os.environ, PARENT: str(os.getpid()), **told}
+        watched: dict[str, str] = {}
+        if self._listener is not None and self._companion.watchdog_s < math.inf:
+            watched = self._listener.environ(self._companion.watchdog_s) | {"PYTHONFAULTHANDLER": "1"}
+        inherited = {name: value for name, value in os.environ.items() if name not in _OF_OURS}
+        return {**inherited, PARENT: str(os.getpid()), **told, **watched}
 
     def _note_exit(self, status: int, now: float) -> None:
         companion = self._companion
@@ -154,6 +204,8 @@ class _Running:
                 )
             self._told = status
             self._starts_at = now + RETRY_S
+        elif self._killed_at < math.inf:
+            self._start_later(f"hung: it gave no sign for {self._companion.watchdog_s:g} s", now)
         elif status < 0:
             self._start_later(f"was killed (signal {-status})", now)
         else:

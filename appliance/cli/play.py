@@ -192,6 +192,7 @@ def _companions(
     show: Show, box: BoxConfig, control: socket.socket | None, window: bool
 ) -> Iterator[Companion]:
     """The processes beside the stage."""
+    from appliance.box.notify import WATCHDOG_S
     from appliance.cli.companions import Companion
     from appliance.cli.control import control_command
 
@@ -201,20 +202,30 @@ def _companions(
             control_command(box, control.fileno()),
             "What is in force stays in force; commands wait for a moment.",
             descriptors=(control.fileno(),),
+            watchdog_s=WATCHDOG_S["control"],
         )
     named = () if box.path is None else ("--box", str(box.path))
     bunraku = (sys.executable, "-m", "appliance.cli")
     if show.config.motion.made_sources:
-        yield Companion("The generator", (*bunraku, "generate", *named), "The last phrase plays on.")
+        yield Companion(
+            "The generator",
+            (*bunraku, "generate", *named),
+            "The last phrase plays on.",
+            watchdog_s=WATCHDOG_S["generator"],
+        )
     if box.outputs.dmx and show.config.lights.fixtures:
         yield Companion(
             "The process for the lights",
             (*bunraku, "lights", *named),
             "The lights stay as they are for a moment.",
+            watchdog_s=WATCHDOG_S["lights"],
         )
     if window and show.config.strings and (box.path is None or box.sound):
         yield Companion(
-            "The process for the sound", (*bunraku, "sound", *named), "The strings are silent for a moment."
+            "The process for the sound",
+            (*bunraku, "sound", *named),
+            "The strings are silent for a moment.",
+            watchdog_s=WATCHDOG_S["sound"],
         )
     if window:
         yield Companion(
@@ -222,6 +233,7 @@ def _companions(
             (*bunraku, "project", *named, "--window"),
             "The picture is black for a moment.",
             may_close=True,
+            watchdog_s=WATCHDOG_S["projector"],
         )
 
 
@@ -234,6 +246,7 @@ def _forget_run(stage: Stage) -> None:
 
 def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Companion:
     """The process that writes the journal, the checkpoint and the sensors' memory to the disk."""
+    from appliance.box.notify import WATCHDOG_S
     from appliance.cli.companions import Companion
 
     named = () if box_file is None else ("--box", str(box_file))
@@ -242,6 +255,7 @@ def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Comp
         "The keeper",
         (sys.executable, "-m", "appliance.cli", "keep", *named, *kept),
         "What is danced meanwhile waits in memory.",
+        watchdog_s=WATCHDOG_S["keeper"],
     )
 
 

@@ -17,6 +17,7 @@ from appliance.box.realtime import give_way
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
 from appliance.box.stop_signals import stop_signals
+from appliance.box.watchdog import Patience, end_process, guarded
 from appliance.generator.fallback import OF_THE_GENERATOR
 from appliance.generator.generator import Generator, save_memory
 from appliance.outputs.frame_reader import FrameReader
@@ -27,6 +28,8 @@ from appliance.show_control.orders import OrderInbox
 
 _LOOK_S = 0.05
 _NICE = 10
+# A variation of a phrase of ten minutes takes some ten seconds on a small machine.
+_PATIENCE_S, _HUNG = 30.0, 75
 
 
 def run_generator(directory: Path | None, box_file: Path | None) -> None:
@@ -50,13 +53,18 @@ def run_generator(directory: Path | None, box_file: Path | None) -> None:
         fallbacks = Fallbacks(OF_THE_GENERATOR)
         health = ProcessHealthWriter(folder, "generator", fallbacks)
         opened.callback(health.close)
-        notifier.ready("The generator makes what the stage asks for.")
+        patience = Patience(_PATIENCE_S)
 
-        def pulse() -> None:
-            now = time.monotonic()
+        def is_well(now: float) -> None:
             notifier.ping(now)
             health.publish_health(now)
 
+        def pulse() -> None:
+            patience.note_sign(time.monotonic())
+
+        is_well(time.monotonic())
+        opened.enter_context(guarded(patience, lambda: False, _give_up, is_well=is_well))
+        notifier.ready("The generator makes what the stage asks for.")
         while not stopped():
             pulse()
             stage.newest(time.monotonic())
@@ -76,6 +84,13 @@ def run_generator(directory: Path | None, box_file: Path | None) -> None:
             with contextlib.closing(generator):
                 _generate(generator, inbox, show_state, is_over, pulse)
         health.end(time.monotonic())
+
+
+def _give_up() -> None:
+    end_process(
+        f"Making a motion has taken {_PATIENCE_S:g} s. The last phrase plays on; the generator starts again.",
+        _HUNG,
+    )
 
 
 def _generate(

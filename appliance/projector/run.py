@@ -16,6 +16,7 @@ from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import AlreadyHereError, Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
+from appliance.box.watchdog import Patience, guarded
 from appliance.outputs.frame_reader import FrameReader
 from appliance.projector.alignment import AlignmentFile, alignment_folder
 from appliance.projector.context import GlContext
@@ -37,7 +38,7 @@ from appliance.projector.resolution import Resolution
 from appliance.projector.stamp import stamp
 from appliance.projector.stream.feed import Feed
 from appliance.projector.stream.keying import keyed
-from appliance.projector.watchdog import Patience, end_process, guarded
+from appliance.projector.watchdog import PATIENCE_S, give_up
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
 from appliance.show_control.orders import OrderInbox
@@ -110,7 +111,7 @@ class Run:
         self._resolution = Resolution(self._pacing.period_s, adapts=config.picture is None)
         self._is_resolution_said = False
         self._meter = Meter()
-        self._patience = Patience()
+        self._patience = Patience(PATIENCE_S)
         self._lines: tuple[str, ...] = ()
         self._warned = not self.context.is_software
 
@@ -137,7 +138,7 @@ class Run:
         notifier = notifier or Notifier({})
         try:
             with guarded(
-                self._patience, lambda: self.projector.is_preparing, end_process, is_well=notifier.ping
+                self._patience, lambda: self.projector.is_preparing, give_up, is_well=notifier.ping
             ):
                 self._show_pictures(stopped, notifier)
             self._health.end(time.monotonic())
@@ -188,7 +189,7 @@ class Run:
         drawn = time.monotonic()
         self._window.show()
         swapped = time.monotonic()
-        self._patience.note_swap(swapped)
+        self._patience.note_sign(swapped)
         self._meter.note_swap(swapped, left_stage)
         look = self.projector.shown if left_stage is not None else None
         if self._resolution.note_picture(drawn, drawn - begun, look):

@@ -11,7 +11,9 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
+from appliance.box.process_health import COMMANDS_DROPPED, ProcessHealthWriter
 from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.box.stop_signals import stop_signals
 from appliance.show_control.command_handler import CommandHandler
@@ -55,6 +57,8 @@ class ControlProcess:
             self._dispatch = OrderDispatch(sender)
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
+            self._health = ProcessHealthWriter(folder, "control", Fallbacks(()))
+            opened.callback(self._health.close)
             self._replies = Listeners(settings.replies)
             opened.callback(self._replies.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
@@ -85,6 +89,7 @@ class ControlProcess:
     def turn(self) -> None:
         """Handle up to _AT_ONCE datagrams, urgent ones first, and what is due.
 
+        self._health.end(self._monotonic())
         The clock is read after each datagram: this process may have been held up while it received one.
         """
         taken = 0
@@ -103,6 +108,7 @@ class ControlProcess:
         if taken == _AT_ONCE:
             time.sleep(_REST_S)
 
+        self._health.publish_health(now)
     def _answer(self, asker: Address, message: Message) -> None:
         """To the sender of a command, and to every listener that waits for replies elsewhere."""
         self.port.send(asker, message)

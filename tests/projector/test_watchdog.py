@@ -11,14 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.projector import watchdog
+from appliance.box import watchdog
+from appliance.box.watchdog import Patience, guarded
 from appliance.projector.projector_error import GPU_LOST
-from appliance.projector.watchdog import PATIENCE_S, Patience, guarded
+from appliance.projector.watchdog import PATIENCE_S
 
 HANGS = """
 import ctypes, sys, time
 from pathlib import Path
-from appliance.projector import watchdog
+from appliance.box import watchdog
 from appliance.projector.run import Options, Run
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
@@ -30,7 +31,7 @@ def hang(window):
     shown.append(show(window))
     if len(shown) > 3:
         print("hangs", flush=True)
-        watchdog.PATIENCE_S = 0.6
+        run._patience.patience_s = 0.6
         while True:
             ctypes.CDLL(None).pause()
 
@@ -50,26 +51,26 @@ def over_at(patience: Patience, begin: float, end: float, is_preparing: bool = F
 
 
 def test_patience_is_over_after_five_seconds_without_a_picture() -> None:
-    patience = Patience()
+    patience = Patience(PATIENCE_S)
     assert over_at(patience, 100.0, 160.0) is None  # before the first picture nothing is expected
-    patience.note_swap(160.0)
+    patience.note_sign(160.0)
     assert over_at(patience, 160.0, 164.6) is None
-    patience.note_swap(164.0)
+    patience.note_sign(164.0)
     assert over_at(patience, 165.0, 190.0) == 164.0 + PATIENCE_S
 
 
 def test_preparing_a_show_may_take_long() -> None:
-    patience = Patience()
+    patience = Patience(PATIENCE_S)
     patience.is_over(99.5, False)
-    patience.note_swap(100.0)
+    patience.note_sign(100.0)
     assert over_at(patience, 100.0, 130.0, is_preparing=True) is None
     assert over_at(patience, 130.0, 150.0) == 129.5 + PATIENCE_S
 
 
 def test_a_process_that_was_stopped_blames_no_display() -> None:
-    patience = Patience()
+    patience = Patience(PATIENCE_S)
     patience.is_over(99.5, False)
-    patience.note_swap(100.0)
+    patience.note_sign(100.0)
     assert over_at(patience, 100.0, 102.0) is None
     assert over_at(patience, 160.0, 180.0) == 160.0 + PATIENCE_S
 
@@ -90,8 +91,8 @@ def test_the_guard_gives_up_once_and_ends_with_what_it_guards(monkeypatch: pytes
             assert time.monotonic() < until
             time.sleep(0.002)
 
-    patience = Patience()
-    patience.note_swap(100.0)
+    patience = Patience(PATIENCE_S)
+    patience.note_sign(100.0)
     with guarded(patience, lambda: False, gave_up.set, clock, is_well.append):
         await_looks()
         for now in (101.5, 103.0, 104.5):  # noqa: B007
