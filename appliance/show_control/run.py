@@ -54,11 +54,11 @@ class ControlProcess:
             opened.callback(sender.close)
             self.observer = StageObserver(folder)
             opened.callback(self.observer.close)
+            self._health = ProcessHealthWriter(folder, "control", Fallbacks(()))
+            opened.callback(self._health.close)
             self._dispatch = OrderDispatch(sender)
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
-            self._health = ProcessHealthWriter(folder, "control", Fallbacks(()))
-            opened.callback(self._health.close)
             self._replies = Listeners(settings.replies)
             opened.callback(self._replies.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
@@ -85,11 +85,11 @@ class ControlProcess:
             self.turn()
             notifier.ping(self._monotonic())
         notifier.stopping()
+        self._health.end(self._monotonic())
 
     def turn(self) -> None:
         """Handle up to _AT_ONCE datagrams, urgent ones first, and what is due.
 
-        self._health.end(self._monotonic())
         The clock is read after each datagram: this process may have been held up while it received one.
         """
         taken = 0
@@ -100,6 +100,7 @@ class ControlProcess:
         now = self._monotonic()
         self.observer.note_dropped(self._intake.dropped + self.port.dropped(), now)
         self.handler.follow_stage(now)
+        self._health.publish_health(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)
         for words in (self.port.news(now), self._news.look(self.handler.show_state, now)):
@@ -108,7 +109,23 @@ class ControlProcess:
         if taken == _AT_ONCE:
             time.sleep(_REST_S)
 
-        self._health.publish_health(now)
+    def _count(self, now: float) -> None:
+        """Tell of what came to the port and was not heard."""
+        own, intake, port = self.observer.own, self._intake, self.port
+        intake.note_kernel()
+        own.follow(COMMANDS_DROPPED.name, intake.dropped, now)
+        own.follow(LIVE_DROPPED.name, intake.live_dropped, now)
+        own.follow(SENDER_NOT_LISTED.name, port.strangers, now)
+        own.concern(SENDER_NOT_LISTED.name, filter(None, [port.newest_stranger]))
+
+    def _failures(self, now: float) -> str:
+        """A sentence about commands that ended in an error of this program, at most once a minute."""
+        failed = self.handler.failed
+        if failed == self._failures_said or now < self._failures_said_at + _SAY_EVERY_S:
+            return ""
+        self._failures_said, self._failures_said_at = failed, now
+        return f"A command ended in an error of this program ({failed} so far): {self.handler.failure}"
+
     def _answer(self, asker: Address, message: Message) -> None:
         """To the sender of a command, and to every listener that waits for replies elsewhere."""
         self.port.send(asker, message)

@@ -68,17 +68,22 @@ NETWORK_FAILED = Fallback(
     "network-not-finite",
     "The network gave poses that are not numbers: the last good pose is held. Copy the show bundle again.",
 )
+FIGURE_REFUSED = Fallback(
+    "figure-impossible",
+    "A figure came out with numbers that no stage has, and did not leave the box: the last good frame stayed "
+    "and the dance goes on from its phrase. Export the journal for us: bunraku journal export.",
+)
 RECEIVER_GONE = Fallback(
     "receiver-gone",
     "A receiver does not get the dance; the others do, and it is tried again each second. Start it, or check "
     "its address.",
+    "Receiver {about} does not get the dance; the others do, and it is tried again each second. Start it, or "
+    "check its address.",
 )
 NOT_REALTIME = Fallback(
     "not-realtime",
     "The stage has no real-time rights: other programs can hold it up. bunraku doctor tells how.",
 )
-    "Receiver {about} does not get the dance; the others do, and it is tried again each second. Start it, or "
-    "check its address.",
 NOT_SHARED = Fallback(
     "frames-not-shared",
     "Frames cannot be shared: neither lights nor projector see the dance. Free memory in the runtime folder.",
@@ -101,11 +106,20 @@ POWER_CUT = Fallback(
     "power-cut",
     "The power was cut: the dance went on where it was, less than a second before. Check the plug.",
 )
+PLACE_DROPPED = Fallback(
+    "place-dropped",
+    "The place where the dance stood was damaged, or held numbers that no stage has: it was dropped. The "
+    "show went on from the last sound place, or began at the beginning. Export the journal for us: bunraku "
+    "journal export.",
+)
 SOURCE_LATE = Fallback(
     "source-late",
     "What the puppet was to start from did not come in time: the last phrase plays on, and the source takes "
     "over again when it is back. Of a live dancer check the program that sends it, and the network; of vary, "
     "granular, path and improvise the generator: journalctl -u bunraku-generator.",
+    "What the puppet was to start from did not come in time ({about}): the last phrase plays on, and the "
+    "source takes over again when it is back. Of a live dancer check the program that sends it, and the "
+    "network; of vary, granular, path and improvise the generator: journalctl -u bunraku-generator.",
 )
 POSE_REFUSED = Fallback(
     "pose-refused",
@@ -113,20 +127,6 @@ POSE_REFUSED = Fallback(
     "goes on from the last good one, and after half a second from the phrase. Check the skeleton in the "
     "program that sends it.",
 )
-OF_THE_STAGE = (
-    *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),
-    *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED),
-    *(
-    "What the puppet was to start from did not come in time ({about}): the last phrase plays on, and the "
-    "source takes over again when it is back. Of a live dancer check the program that sends it, and the "
-    "network; of vary, granular, path and improvise the generator: journalctl -u bunraku-generator.",
-        RECEIVER_GONE,
-        NOT_REALTIME,
-        NOT_SHARED,
-        NOT_RECORDED,
-        PLACE_NOT_NOTED,
-        STAGE_RESTARTED,
-        POWER_CUT,
 SOURCE_JUMPED = Fallback(
     "source-jumped",
     "The root of a live dancer jumped farther than anybody moves: the figure goes on from where it stood. "
@@ -138,9 +138,21 @@ FOLDER_LOST = Fallback(
     "it was made again, with what is in force. Find what deletes it: a cleaner of temporary files, or a "
     "person.",
 )
+OF_THE_STAGE = (
+    *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),
+    *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED, FIGURE_REFUSED),
+    *(
+        RECEIVER_GONE,
+        NOT_REALTIME,
+        NOT_SHARED,
+        NOT_RECORDED,
+        PLACE_NOT_NOTED,
+        PLACE_DROPPED,
+        STAGE_RESTARTED,
+        POWER_CUT,
         SOURCE_LATE,
         POSE_REFUSED,
-    ),
-)
         SOURCE_JUMPED,
         FOLDER_LOST,
+    ),
+)

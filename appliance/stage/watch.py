@@ -83,8 +83,6 @@ class Watch:
             f"Up to {most} coding iterations fit by now. The dancer dances the show's own iterations again."
         )
 
-    def check(self, now: float, health: Health, sensors: Sequence[SensorState] = ()) -> list[str]:
-        """Once a second: bring the fallbacks up to date; sentences about what changed since the last call.
     def note_folder(self, now: float, lost: str | None) -> str:
         """Once a second, as renew_lost told it; a sentence where that is news."""
         if lost is None:
@@ -101,6 +99,8 @@ class Watch:
         self.fallbacks.set(rows.FOLDER_LOST.name, words)
         return words if self._changes("folder", lost, True) else ""
 
+    def check(self, now: float, health: Health, sensors: Sequence[SensorState] = ()) -> list[str]:
+        """Once a second: bring the fallbacks up to date; sentences about what changed since the last call.
 
         now: monotonic seconds; sensors: as the link sees them at this moment.
         """
@@ -117,6 +117,7 @@ class Watch:
             *self._silence_news(now, {sensor.name for sensor in sensors}),
             *self._source_news(now),
             *self._output_news(gone),
+            *self._stamp_news(),
         ]
 
     def _update_fallbacks(self, now: float, health: Health, gone: set[str]) -> None:
@@ -135,7 +136,6 @@ class Watch:
         cables = filter(None, (getattr(one, "trouble", None) for one in link.intakes))
         every.set(rows.CABLE_AWAY.name, " ".join(cables))
         is_absent = any(getattr(one, "address_is_absent", False) for one in link.intakes)
-            *self._stamp_news(),
         every.set(rows.ADDRESS_ABSENT.name, is_absent)
         every.set(rows.RECEIVER_GONE.name, bool(gone))
         every.set(rows.NOT_LET_IN.name, self._why_not_let_in())
@@ -219,6 +219,16 @@ class Watch:
                 else "No live dancer is heard: the phrase plays on. Check the program that sends it."
             )
 
+    def _stamp_news(self) -> Iterator[str]:
+        """Once: that this system does not say when a datagram came."""
+        for intake in self._parts.link.intakes:
+            if self._changes("stamps", intake.name, not getattr(intake, "has_stamps", True)):
+                yield (
+                    f"This system does not stamp what comes in on {intake.name}: a reading counts as arrived "
+                    "when it is read, up to 20 ms late. The dance goes on, a little less in step with the "
+                    "sensor. Linux itself stamps; emulators (qemu-user) do not."
+                )
+
     def _output_news(self, gone: set[str]) -> Iterator[str]:
         """What a person should know of the receivers, and of the network."""
         for receiver in self._parts.outputs.receivers:
@@ -238,13 +248,3 @@ class Watch:
                 if is_broken
                 else "The network gives poses again. The dancer moves."
             )
-    def _stamp_news(self) -> Iterator[str]:
-        """Once: that this system does not say when a datagram came."""
-        for intake in self._parts.link.intakes:
-            if self._changes("stamps", intake.name, not getattr(intake, "has_stamps", True)):
-                yield (
-                    f"This system does not stamp what comes in on {intake.name}: a reading counts as arrived "
-                    "when it is read, up to 20 ms late. The dance goes on, a little less in step with the "
-                    "sensor. Linux itself stamps; emulators (qemu-user) do not."
-                )
-
