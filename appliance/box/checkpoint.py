@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from appliance.box.record import Record, SlotFile
 from appliance.pose.foreign_file import plain_json
+from appliance.pose.possible import FARTHEST_ON_STAGE_M
 
 LARGEST = 4000  # bytes of a packed checkpoint; one slot on the disk is a page of 4096
 PLACE = Record("place", "place", LARGEST)
@@ -20,6 +21,7 @@ _NUMBERS = struct.Struct("<q9d4HBB")
 _OTHER = struct.Struct("<9d2H")  # of another puppet: its places as above, its iterations
 _ENDED = 1
 _MOST = 0xFFFF
+_MOST_NUMBER = 1 << 62  # of ticks and seeds; parameters and seconds stay far below it
 
 
 class Standing(NamedTuple):
@@ -116,7 +118,7 @@ def packed(place: Checkpoint) -> bytes:
 
 
 def unpacked(payload: bytes) -> Checkpoint | None:
-    """The place in these bytes; None when they are none that this program knows."""
+    """The place in these bytes; None when they are none that this program knows, or where no stage stands."""
     try:
         tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
             _NUMBERS.unpack_from(payload)
@@ -150,14 +152,22 @@ def unpacked(payload: bytes) -> Checkpoint | None:
             int(later[3]) if later[3:] else 0,
             _liveliness(*later[4]) if later[4:] and later[4] else None,
         )
-    except (struct.error, ValueError, TypeError):
+    except (struct.error, ValueError, TypeError, OverflowError):
         return None
-    sound = [*(place.liveliness or ()), position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z]
+    metres = [x, z, strayed_x, strayed_z]
+    numbers = [*(place.liveliness or ()), position_s, start_s, end_s, rate, heading, tick, place.made]
     for one in place.others:
-        sound += [one.position_s, *one.excerpt, one.rate, *one.standing, *one.strayed]
+        metres += [*one.standing[:2], *one.strayed]
+        numbers += [one.position_s, *one.excerpt, one.rate, one.standing[2], one.made]
     for _, values in place.motion:
-        sound += values
-    return place if all(math.isfinite(number) for number in sound) else None
+        numbers += values
+    is_possible = _are_within(metres, FARTHEST_ON_STAGE_M) and _are_within(numbers, _MOST_NUMBER)
+    return place if is_possible else None
+
+
+def _are_within(numbers: Iterable[float], most: float) -> bool:
+    """Whether all are numbers, and none is larger than `most`."""
+    return all(-most <= number <= most for number in numbers)
 
 
 def _split(payload: bytes) -> tuple[bytes, list[tuple[float, ...]]]:
@@ -206,7 +216,12 @@ class CheckpointWriter:
 
 
 class CheckpointReader:
-    """Reads the place in memory; the stage may be there or not."""
+    """Reads the place in memory; the stage may be there or not.
+
+    dropped: whether what was read last is none that a stage could go on from.
+    """
+
+    dropped = False
 
     def __init__(self, folder: Path) -> None:
         self._block = PLACE.reader(folder)
@@ -214,7 +229,9 @@ class CheckpointReader:
     def read(self) -> Checkpoint | None:
         """The newest place; None where none was written. Never waits, never raises."""
         payload = self._block.read()
-        return None if payload is None else unpacked(payload)
+        place = None if payload is None else unpacked(payload)
+        self.dropped = payload is not None and place is None
+        return place
 
     def goes_on(self) -> bool:
         """Whether a show is on: a stage lives, and has not said that its show has ended. Never raises."""
@@ -232,8 +249,13 @@ class CheckpointReader:
 
 def read_checkpoint(path: Path) -> Checkpoint | None:
     """The newest whole place on the disk; None where there is none. Never raises."""
-    places = (unpacked(payload) for payload in SlotFile(path).read())
-    return next((place for place in places if place is not None), None)
+    return next(iter(read_checkpoints(path)[0]), None)
+
+
+def read_checkpoints(path: Path) -> tuple[list[Checkpoint], bool]:
+    """The whole places on the disk, the newest first, and whether one was dropped. Never raises."""
+    places = [unpacked(payload) for payload in SlotFile(path).read()]
+    return [place for place in places if place is not None], None in places
 
 
 def boot_id() -> str:

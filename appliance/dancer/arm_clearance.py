@@ -65,6 +65,11 @@ class ArmClearance:
         are_turned = [self._clear(*one, pose, figure, places, around) for one in enumerate(self._trunk.arms)]
         return any(are_turned)
 
+    def begin_anew(self) -> None:
+        """Forget the ticks before: no arm is turned."""
+        self._ways = [None] * len(self._ways)
+        self._turns = [_NO_TURN] * len(self._turns)
+
     def state(self) -> dict[str, Any]:
         """What later poses depend on, for `restore`: plain values."""
         return {"ways": list(self._ways), "turns": list(self._turns)}

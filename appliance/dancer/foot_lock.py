@@ -95,6 +95,12 @@ class FootLock:
                 self._reach(leg, pose, figure, points[leg.rows[-1]])
         self._before = points
 
+    def begin_anew(self) -> None:
+        """Forget the ticks before: feet stand where the next pose has them."""
+        self._before = None
+        for leg in self._legs:
+            leg.x, leg.z, leg.step = 0.0, 0.0, [0.0, 0.0]
+
     def state(self) -> dict[str, Any]:
         """What later poses depend on, for `restore`: plain values."""
         return {"before": self._before, "legs": [[leg.x, leg.z, *leg.step] for leg in self._legs]}

@@ -108,6 +108,13 @@ class Grounding:
         """(3,): from the phrase's root to where grounding stood it in the last tick, metres."""
         return np.array((self._offset_x, self._height or 0.0, self._offset_z), dtype=np.float32)
 
+    def begin_anew(self) -> None:
+        """Forget the ticks before: the next pose stands on its path."""
+        self._offset_x = self._offset_z = self._step_x = self._step_z = 0.0
+        self._height = self._before = None
+        self._foot_lock.begin_anew()
+        self._arms.begin_anew()
+
     def draw_hips(self, x: float, z: float, weight: float) -> None:
         """From the next pose on let the root stand at x, z (metres), as far as the weight (0..1) says.
 
@@ -211,7 +218,7 @@ class Grounding:
         self._step_x += FOLLOW * (-standing * slide_x - self._step_x)
         self._step_z += FOLLOW * (-standing * slide_z - self._step_z)
         far = (self._offset_x**2 + self._offset_z**2) / FAR_M**2
-        kept = 1.0 - self._leak * (1.0 + far)
+        kept = max(0.0, 1.0 - self._leak * (1.0 + far))  # below 0 an offset of 17 m would grow for ever
         self._offset_x = (self._offset_x + self._step_x) * kept
         self._offset_z = (self._offset_z + self._step_z) * kept
 

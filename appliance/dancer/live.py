@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,21 +11,29 @@ import numpy as np
 from appliance.dancer.extrapolation import Extrapolation
 from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.pose import quaternion
+from appliance.pose.possible import FARTHEST_M, most_step_m
 
 SILENT_S = 0.5  # after which the phrase plays on
 SHORTEST_S, LONGEST_S = 0.004, 0.1  # between two poses of a stream: 10 to 250 a second
 _FOLLOW = 0.1  # share of a new interval in the estimate
 _UNIT = 0.1  # a quaternion this far from unit length is none
+_JOINT_FADE_S = 0.5  # in which a joint goes over to the stream, or back to the phrase
 
 
 class Live:
     """Lays a stream of poses over the phrase's window, fading in and out; once a tick.
 
     Poses come at any rate, and are interpolated between the last two: that costs one interval. The window's
-    later poses are extrapolated as those of a hand are. Where the stream says where its root is, the
-    figure moves by as much, from where it stood at the takeover; else it stays on the phrase's path.
+    later poses are extrapolated as those of a hand are. Joints that do not come stay with the phrase. Where
+    the stream says where its root is, the figure moves by as much, from where it stood at the takeover; else
+    it stays on the phrase's path. A root that jumps farther than anybody moves takes the figure nowhere: it
+    goes on from where it stood.
     A stream that is silent for SILENT_S gives way to the phrase, and comes back with its next pose.
+
+    jumps: how often its root jumped.
     """
+
+    jumps = 0
 
     def __init__(self, joints: int, window: int, tick_s: float = 0.02) -> None:
         self._tick_s = tick_s
@@ -32,6 +41,10 @@ class Live:
         self._extrapolation = Extrapolation(joints, window)
         self._is_new = np.ones((joints, 1), dtype=np.bool_)
         self._before, self._newest, self._present = np.tile(quaternion.IDENTITY, (3, joints, 1))
+        self._comes = np.zeros(joints, dtype=np.bool_)  # joints of the newest pose
+        self._came, self._follows = np.zeros((2, joints), dtype=np.float32)  # how far each is the stream's
+        self._phrases_share = np.empty((window, joints), dtype=np.float32)
+        self._joint_step = tick_s / _JOINT_FADE_S
         self._window = np.tile(quaternion.IDENTITY, (window, joints, 1))
         self._roots = np.zeros((window, 3), dtype=np.float32)
         self._root = np.zeros((2, 3), dtype=np.float32)  # of the pose before, and of the newest
@@ -50,6 +63,10 @@ class Live:
         """How much of what the puppet starts from it is, 0..1."""
         return self._share * self._share * (3 - 2 * self._share)
 
+    def share_of(self, joints: Sequence[int]) -> float:
+        """The same of these joints: less where they stay with the phrase."""
+        return self.share * (float(self._came[[*joints]].mean()) if joints else 1.0)
+
     def silent_s(self, now: float) -> float:
         """Seconds since its last pose; infinite before the first."""
         return now - self._arrival
@@ -59,28 +76,37 @@ class Live:
         self._chosen, self._step = chosen, min(1.0, self._tick_s / max(fade_s, self._tick_s))
 
     def hear(self, pose: FloatArray, root: FloatArray, arrival: float, phrase: FloatArray) -> bool:
-        """A pose (J, 4) of local quaternions, its root (3,) in metres (not numbers: unknown); False: no pose.
+        """A pose (J, 4) of local quaternions, its root (3,) in metres; False: no pose.
 
-        phrase (J, 4): the phrase's pose of this moment, whose signs the stream takes over.
+        Joints that do not come, and a root that is unknown, are not numbers. phrase (J, 4): the phrase's pose
+        of this moment, whose signs the stream takes over.
         """
         lengths = np.sqrt(np.einsum("jk,jk->j", pose, pose))
-        if not (np.abs(lengths - 1.0) < _UNIT).all():  # also where one is not a number
+        comes = ~np.isnan(pose).all(axis=1)
+        if not comes.any() or not (np.abs(lengths[comes] - 1.0) < _UNIT).all():
             return False
         interval_s, was_silent = arrival - self._arrival, self.silent_s(arrival) > SILENT_S
         if not was_silent:
             self._interval_s += _FOLLOW * (min(max(interval_s, SHORTEST_S), LONGEST_S) - self._interval_s)
         np.copyto(self._before, self._newest)
-        np.divide(pose, lengths[:, None], out=self._newest)
-        reference = phrase if was_silent and not self._share else self._before
+        np.divide(pose, lengths[:, None], out=self._newest, where=comes[:, None])
+        from_phrase = (self._came == 0.0) | (was_silent and not self._share)
+        reference = np.where(from_phrase[:, None], phrase, self._before)
         signs = np.where(np.einsum("jk,jk->j", self._newest, reference) < 0.0, -1.0, 1.0)
         self._newest *= signs[:, None].astype(np.float32)
-        knows_root = bool(np.isfinite(root).all())
+        knows_root = bool((np.abs(root) <= FARTHEST_M).all())
+        if knows_root and self._has_root and not was_silent:
+            self._carry_on(root, min(max(interval_s, SHORTEST_S), LONGEST_S))
         self._root[0] = self._root[1]
         self._root[1] = root if knows_root else 0.0
+        fresh = comes & (not was_silent) & ~self._comes
         if was_silent:
             np.copyto(self._before, self._newest)
             self._root[0] = self._root[1]
             self._is_new[:] = True
+        elif fresh.any():
+            self._before[fresh], self._is_new[fresh] = self._newest[fresh], True
+        self._comes[:] = comes
         if knows_root and (was_silent or not self._has_root):
             self._offset[:] = np.nan  # taken when the next window is laid over
         self._has_root, self._arrival = knows_root, arrival
@@ -92,13 +118,20 @@ class Live:
         self._share = min(1.0, self._share + self._step) if comes else max(0.0, self._share - self._step)
         if not self._share:
             self._offset[:] = np.nan
+            self._came[:] = self._comes
             return window, roots
+        np.clip(self._comes, self._came - self._joint_step, self._came + self._joint_step, out=self._came)
         share = min(max((now - self._arrival) / self._interval_s, 0.0), 1.0)
         self._slerp(self._before, self._newest, share, out=self._present)
+        stays = (self._came == 0.0)[:, None]
+        np.copyto(self._present, window[0], where=stays)
+        self._is_new |= stays
         self._extrapolation(self._present, self._is_new, out=self._window)
         self._is_new[:] = False
         rows = self._window.reshape(-1, 4)
-        self._over(rows, window.reshape(-1, 4), 1.0 - self.share, out=rows)
+        np.multiply(self._came, self._came * (3.0 - 2.0 * self._came), out=self._follows)
+        self._phrases_share[:] = 1.0 - self.share * self._follows
+        self._over(rows, window.reshape(-1, 4), self._phrases_share.reshape(-1), out=rows)
         self._roots[:] = roots
         if self._has_root:
             root = self._root[0] + share * (self._root[1] - self._root[0])
@@ -107,6 +140,18 @@ class Live:
             self._roots += np.float32(self.share) * (root + self._offset - self._roots)
         return self._window, self._roots
 
+    def stand_anew(self) -> None:
+        """Take the figure from where it stands to the stream's root, as at a takeover."""
+        self._offset[:] = np.nan
+
+    def _carry_on(self, root: FloatArray, interval_s: float) -> None:
+        """Where the root has jumped since the pose before, count places from there."""
+        jump = root - self._root[1]
+        if math.hypot(*jump.tolist()) > most_step_m(interval_s):
+            self.jumps += 1
+            self._root += jump
+            self._offset -= jump
+
     def state(self) -> dict[str, Any]:
         """What later windows depend on, for `restore`: plain values and copies of arrays."""
         return {
@@ -114,7 +159,8 @@ class Live:
             "roots": self._root.copy(),
             "offset": self._offset.copy(),
             "has_root": self._has_root,
-            "is_new": bool(self._is_new[0]),
+            "is_new": self._is_new.copy(),
+            "comes": [self._comes.copy(), self._came.copy()],
             "times": [self._arrival, self._interval_s],
             "chosen": [self._chosen, self._share, self._step],
             "extrapolation": self._extrapolation.state(),
@@ -125,6 +171,7 @@ class Live:
         self._before[:], self._newest[:], self._present[:] = state["poses"]
         self._root[:], self._offset[:] = state["roots"], state["offset"]
         self._has_root, self._is_new[:] = state["has_root"], state["is_new"]
+        self._comes[:], self._came[:] = state.get("comes", (True, 1.0))  # of another release: all came
         self._arrival, self._interval_s = state["times"]
         self._chosen, self._share, self._step = state["chosen"]
         self._extrapolation.restore(state["extrapolation"])

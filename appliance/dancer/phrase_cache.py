@@ -10,6 +10,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from appliance.dancer.phrase import FPS
 from appliance.dancer.slerp import FloatArray
 from appliance.pose.bvh import read_bvh
 from appliance.pose.foreign_file import opened, plain_json
+from appliance.pose.possible import possible_roots
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
@@ -29,7 +31,7 @@ MEMORY = "prepared"  # in the folder where the box's processes meet
 SUFFIX = ".phrase"
 LARGEST = 64 * 2**20  # bytes: longer phrases are read again, the folder may be one in memory
 
-_MAGIC = b"bunraku phrase 1\n"
+_MAGIC = b"bunraku phrase 2\n"  # 2: impossible steps of the root are left out
 _HEAD = struct.Struct("<17sII3x")  # magic, bytes of the facts, CRC-32 of all that follows
 _ALIGNED = 64
 
@@ -58,7 +60,7 @@ class PhraseCache:
         phrase = read_bvh(path)
         if not phrase.skeleton.same_joints(skeleton):
             return None
-        phrase = phrase.resampled(FPS)
+        phrase = replace(phrase, roots=possible_roots(phrase.roots, phrase.fps)).resampled(FPS)
         floor = survey(phrase) if grounded else None
         if self._memory is not None:
             with contextlib.suppress(OSError):

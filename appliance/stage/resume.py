@@ -11,11 +11,15 @@ from appliance.box.checkpoint import (
     CheckpointReader,
     CheckpointWriter,
     boot_id,
-    read_checkpoint,
+    read_checkpoints,
 )
 from appliance.show.box import Resume
 from appliance.stage.reconcile import Reconciler
 
+_BEGINS = (
+    "The place where the dance stood is damaged, or holds numbers that no stage has: it was dropped, and the "
+    "show begins at the beginning. Export its journal for us."
+)
 TRIES = 5  # starts from one place without a frame: then it is the place that is wrong
 
 
@@ -23,7 +27,7 @@ class Resumption:
     """Reads the last checkpoint and writes the next ones: some microseconds a tick, and never to a disk.
 
     restarts, power_cuts: how often this show went on after one; went_on: whether it does so in this start;
-    complaint: why no checkpoint is written, else "".
+    complaint: why no checkpoint is written, else "". dropped: a place held numbers that no stage has.
     """
 
     def __init__(self, show: str, runtime: Path, state: Path | None, wanted: Resume) -> None:
@@ -31,7 +35,7 @@ class Resumption:
         self._show, self._boot = show, boot_id()
         self.complaint = ""
         self.went_on = False
-        self._found, self._after_power_cut = _found(runtime, state, wanted, self._boot)
+        self._found, self._after_power_cut, self.dropped = _found(runtime, state, wanted, self._boot)
         self.restarts = self._found.restarts if self._found else 0
         self.power_cuts = self._found.power_cuts if self._found else 0
         self._now: Checkpoint | None = None
@@ -54,7 +58,7 @@ class Resumption:
         """Before the first tick: put the dance where the show was. A sentence about it, or ""."""
         place = self._found
         if place is None:
-            return ""
+            return _BEGINS if self.dropped else ""
         if self._after_power_cut:
             self.power_cuts += 1
         else:
@@ -159,16 +163,21 @@ class Resumption:
             self._writer, self.complaint = None, f"The place of the dance is not kept: {error}"
 
 
-def _found(runtime: Path, state: Path | None, wanted: Resume, boot: str) -> tuple[Checkpoint | None, bool]:
-    """The checkpoint to go on from, if any; and whether the machine was restarted since."""
+def _found(
+    runtime: Path, state: Path | None, wanted: Resume, boot: str
+) -> tuple[Checkpoint | None, bool, bool]:
+    """The checkpoint to go on from, if any; whether the machine was restarted since; whether one was dropped
+    because no stage stands there.
+    """
     if wanted == "never":
-        return None, False
+        return None, False, False
     reader = CheckpointReader(runtime)
-    place = reader.read()
+    place, dropped = reader.read(), reader.dropped
     reader.close()
     if place is None and state is not None:
-        place = read_checkpoint(state / FILE)
+        places, was_dropped = read_checkpoints(state / FILE)
+        place, dropped = next(iter(places), None), dropped or was_dropped
     if place is None or place.ended:
-        return None, False
+        return None, False, dropped
     power_cut = place.boot != boot
-    return (None, False) if power_cut and wanted == "after_crash" else (place, power_cut)
+    return (None, False, dropped) if power_cut and wanted == "after_crash" else (place, power_cut, dropped)

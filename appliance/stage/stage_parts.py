@@ -316,6 +316,7 @@ def _stage_puppet(
         frame=JointFrame(len(show.skeleton)),
         crossfade_s=config.motion.crossfade_s,
         live=Live(len(show.skeleton), window) if config.motion.live else None,
+        feet=show.skeleton.feet,
         springs=next((one for one in puppeteers if isinstance(one, Springs)), None),
         place=place,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from appliance.box.checkpoint import Standing
 from appliance.dancer.blending import Blending
+from appliance.dancer.forward_kinematics import Figure
 from appliance.dancer.grounding import Grounding
 from appliance.dancer.hands import Hands
 from appliance.dancer.live import Live
@@ -22,6 +24,7 @@ from appliance.dancer.slerp import FloatArray
 from appliance.dancer.springs import Springs
 from appliance.outputs.joint_frame import JointFrame
 from appliance.pose import quaternion
+from appliance.pose.possible import FARTHEST_ON_STAGE_M
 from appliance.show.puppets import PuppetConfig
 from appliance.show.sources import LIVE
 from appliance.stage.iterations import Iterations
@@ -58,9 +61,10 @@ class StagePuppet:
     network dances,) blend, stand.
 
     hand_places: where the hands' joints stand among the moving ones; place None: where its phrase has it;
-    network_failed: the last good pose stays, because the network gave none. What the network takes besides:
-    liveliness, how much of the phrase's own stays while a hand holds (1: all of it), and noise (Z,), added to
-    the latent.
+    network_failed: the last good pose stays, because the network gave none. figures_refused: ticks whose
+    figure no stage has: the last good frame stays, and what led there is forgotten. What the network takes
+    besides: liveliness, how much of the phrase's own stays while a hand holds (1: all of it), and noise (Z,),
+    added to the latent.
     """
 
     puppet: Puppet
@@ -73,9 +77,11 @@ class StagePuppet:
     frame: JointFrame
     crossfade_s: float
     live: Live | None = None  # None: the show has no such source
+    feet: Sequence[int] = ()  # joints of the skeleton
     springs: Springs | None = None  # those among the hands
     place: Place | None = None
     network_failed: bool = False
+    figures_refused: int = 0
     liveliness: float = 1.0
     noise: FloatArray = field(init=False)
     _whole: FloatArray = field(init=False)  # (T, J, 4)
@@ -92,7 +98,7 @@ class StagePuppet:
     @property
     def lift(self) -> float:
         """How far the figure is to be above the floor, metres: in a jump of the phrase."""
-        return self.motion.lift * (1.0 - (self.live.share if self.live is not None else 0.0))
+        return self.motion.lift * (1.0 - (self.live.share_of(self.feet) if self.live is not None else 0.0))
 
     @property
     def source(self) -> str:
@@ -137,13 +143,23 @@ class StagePuppet:
         """Put the danced pose on the floor and into the world."""
         frame, grounding = self.frame, self.grounding
         self.puppet.restore(self.hands.holds, frame.holds)
-        figure = grounding.ground_pose(
-            self._danced,
-            self._roots[0],
-            self.lift,
-            self.motion.rest_heights,
-            frame.holds,
-        )
+        try:
+            figure = grounding.ground_pose(
+                self._danced,
+                self._roots[0],
+                self.lift,
+                self.motion.rest_heights,
+                frame.holds,
+            )
+            is_possible = _is_possible(figure)
+        except (ArithmeticError, ValueError):  # of numbers beyond what a float holds
+            is_possible = False
+        if not is_possible:
+            self.figures_refused += 1
+            grounding.begin_anew()
+            if self.live is not None:
+                self.live.stand_anew()
+            return
         frame.source[:] = self._whole[0]
         frame.pose[:] = grounding.pose
         frame.world[:] = figure.world
@@ -235,3 +251,10 @@ class StagePuppet:
         self._danced[:] = state["danced"]
         for name in _STANDING:
             getattr(self.frame, name)[:] = state["frame"][name]
+
+
+def _is_possible(figure: Figure) -> bool:
+    """Whether its numbers are some, and stand near the stage; two products and no array in a tick."""
+    world, positions = figure.world.reshape(-1), figure.positions.reshape(-1)
+    turned = math.isfinite(world.dot(world))
+    return turned and bool(positions.dot(positions) <= len(positions) * FARTHEST_ON_STAGE_M**2)

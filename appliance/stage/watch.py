@@ -69,6 +69,8 @@ class Watch:
         self.fallbacks.follow(rows.STAGE_RESTARTED.name, resuming.restarts, now)
         self.fallbacks.follow(rows.POWER_CUT.name, resuming.power_cuts, now)
         self.fallbacks.set(rows.PLACE_NOT_NOTED.name, resuming.complaint)
+        if resuming.dropped:
+            self.fallbacks.count(rows.PLACE_DROPPED.name, now)
         self.fallbacks.set(rows.NOT_SHARED.name, not_shared)
         self.fallbacks.set(rows.NOT_RECORDED.name, not is_recorded)
 
@@ -129,6 +131,10 @@ class Watch:
         every.follow(rows.READING_REFUSED.name, counts.get("norm", 0), now)
         every.follow(rows.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in FOREIGN), now)
         every.follow(rows.POSE_REFUSED.name, self._parts.live_refused, now)
+        puppets = self._parts.puppets
+        jumps = max(one.live.jumps if one.live is not None else 0 for one in puppets)
+        every.follow(rows.SOURCE_JUMPED.name, jumps, now)
+        every.follow(rows.FIGURE_REFUSED.name, sum(one.figures_refused for one in puppets), now)
         every.follow(rows.TICK_LATE.name, health.late, now)
         every.follow(rows.TICK_SKIPPED.name, health.skipped, now)
         every.follow(rows.OVER_BUDGET.name, health.over_budget, now)

@@ -23,11 +23,13 @@ from appliance.box.checkpoint import (
     Checkpoint,
     CheckpointReader,
     CheckpointWriter,
+    Standing,
     boot_id,
     packed,
     unpacked,
 )
 from appliance.box.ring_file import RingFileWriter
+from appliance.pose.possible import FARTHEST_ON_STAGE_M
 
 PLACE = Checkpoint(
     "Évora, night",
@@ -50,7 +52,7 @@ PLACE = Checkpoint(
     False,
     2,
 )
-_finite = st.floats(allow_nan=False, allow_infinity=False)
+_finite = st.floats(-FARTHEST_ON_STAGE_M, FARTHEST_ON_STAGE_M)
 _names = st.text(max_size=60)
 
 
@@ -84,6 +86,21 @@ def test_numbers_that_are_none_are_no_place() -> None:
     assert unpacked(packed(replace(PLACE, strayed=(0.0, math.inf)))) is None
     assert unpacked(packed(replace(PLACE, liveliness=(math.nan, 0, 0)))) is None
     assert unpacked(packed(replace(PLACE, motion=(("motion vary sigma", (math.inf,)),)))) is None
+
+
+@pytest.mark.parametrize("far", [1.01 * FARTHEST_ON_STAGE_M, -1e30, 1e200])
+def test_places_where_no_stage_stands_are_none(far: float) -> None:
+    other = Standing("main", 0.0, (0.0, 1.0), 1.0, (0.0, 0.0, 0.0), (0.0, 0.0), 3, 2)
+    for changes in (
+        {"x": far},
+        {"z": far},
+        {"strayed": (far, 0.0)},
+        {"others": (other._replace(standing=(0.0, far, 0.0)),)},
+        {"others": (other._replace(strayed=(0.0, far)),)},
+    ):
+        assert unpacked(packed(replace(PLACE, **changes))) is None
+    assert unpacked(packed(replace(PLACE, liveliness=(0.5, 10**400, 0)))) is None
+    assert unpacked(packed(replace(PLACE, others=(other,)))) == replace(PLACE, others=(other,))
 
 
 @pytest.mark.parametrize("length", range(len(packed(PLACE))))
@@ -182,6 +199,7 @@ BEGINNER = """
 import os, signal, sys
 from pathlib import Path
 from appliance.box.ring_file import RingFileWriter
+from appliance.pose.possible import FARTHEST_ON_STAGE_M
 RingFileWriter.new(Path(sys.argv[1]), "place", 1, [(2, 1000)])
 os.kill(os.getpid(), signal.SIGKILL)
 """

@@ -197,3 +197,34 @@ def test_recordings_stand_better_than_they_were_captured(
         assert max(after.worst_float_cm, after.worst_penetration_cm) < 1.0
         assert after.slide_cm_s < 15.0
         assert after.slide_cm_s < 0.5 * before.slide_cm_s
+
+
+@pytest.mark.parametrize("jump", [[40.0, 0.0, 0.0], [0.0, 60.0, 0.0], [-17.5, 0.0, 900.0]])
+@pytest.mark.parametrize("back_after", [1, 5, 1000])
+def test_a_root_that_jumps_moves_the_figure_for_a_moment_only(
+    hopping: Recording, jump: list[float], back_after: int
+) -> None:
+    """An offset of 17 m once grew with each tick until no float held it."""
+    floor = survey(hopping)
+    grounding, root = Grounding(hopping.skeleton, floor), np.array([0.0, STANDING_HIP_M, 0.0])
+    for tick in range(400):
+        here = root + np.array(jump) * (50 <= tick < 50 + back_after)
+        grounding.ground_pose(hopping.poses[0].astype(np.float32), here.astype(np.float32), 0.0)
+        strayed = grounding.root - here.astype(np.float32)
+        assert np.isfinite(grounding.figure.positions).all()
+        assert np.hypot(strayed[0], strayed[2]) < 1.1 * np.linalg.norm(jump), tick
+    assert np.hypot(*grounding.strayed) < 2.0
+
+
+def test_a_grounding_that_begins_anew_stands_on_the_path(hopping: Recording) -> None:
+    grounding, fresh = (Grounding(hopping.skeleton, survey(hopping)) for _ in range(2))
+    grounding.strayed = 1e200, -1e200
+    pose, root = hopping.poses[0].astype(np.float32), hopping.roots[0].astype(np.float32)
+    with np.errstate(all="ignore"), pytest.raises(OverflowError):
+        for _ in range(3):
+            grounding.ground_pose(pose, root, 0.0)
+    grounding.begin_anew()
+    for _ in range(5):
+        grounding.ground_pose(pose, root, 0.0)
+        fresh.ground_pose(pose, root, 0.0)
+    assert np.array_equal(grounding.figure.positions, fresh.figure.positions)

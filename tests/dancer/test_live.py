@@ -134,12 +134,77 @@ def test_signs_never_jump_whatever_the_stream_sends(seed: int) -> None:
         before = window
 
 
-@pytest.mark.parametrize("wrong", [0.0, 2.0, math.nan, math.inf])
+@pytest.mark.parametrize("wrong", [0.0, 2.0, math.inf])
 def test_what_is_no_pose_is_refused(wrong: float) -> None:
     live, bad = chosen(), pose(1.0)
     bad[2] = wrong
     assert not live.hear(bad, NOWHERE, 0.0, STILL[0])
+    bad[2, 3] = math.nan  # a torn joint is none that does not come
+    assert not live.hear(bad, NOWHERE, 0.0, STILL[0])
+    assert not live.hear(np.full_like(bad, math.nan), NOWHERE, 0.0, STILL[0])
     assert live.lay_over(0.0, STILL, ROOTS)[0] is STILL
+
+
+def partial(angle: float, *missing: int) -> np.ndarray:
+    """A pose without these joints."""
+    found = pose(angle)
+    found[[*missing]] = math.nan
+    return found
+
+
+def test_joints_that_do_not_come_stay_with_the_phrase() -> None:
+    live = chosen(0.2)
+    phrase = np.tile(quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.7), (WINDOW, JOINTS, 1)).astype(np.float32)
+    for tick in range(50):
+        assert live.hear(partial(1.0, 1, 4), NOWHERE, tick * TICK_S, phrase[0])
+        window = live.lay_over(tick * TICK_S, phrase, ROOTS)[0]
+    stays = quaternion.angle_between(window, phrase).max(axis=0)
+    assert stays[[1, 4]] == pytest.approx(0.0, abs=1e-3)
+    assert quaternion.angle_between(window[0], pose(1.0))[[0, 2, 3]] == pytest.approx(0.0, abs=1e-3)
+    assert live.share_of([1, 4]) == 0.0 and live.share_of([0, 2]) == 1.0
+
+
+def test_a_joint_that_no_longer_comes_goes_back_to_the_phrase_without_a_jump() -> None:
+    live, course = chosen(), []
+    for tick in range(200):
+        now = tick * TICK_S
+        live.hear(partial(1.0, 2) if 60 <= tick < 120 else pose(1.0), NOWHERE, now, STILL[0])
+        window = live.lay_over(now, STILL, ROOTS)[0]
+        course.append(quaternion.angle_between(window[0], STILL[0]))
+    turned = np.array(course)
+    assert turned[50] == pytest.approx(1.0, abs=1e-3) and turned[-1] == pytest.approx(1.0, abs=1e-3)
+    assert turned[115, 2] == pytest.approx(0.0, abs=1e-3)
+    assert turned[115, [0, 1, 3, 4]] == pytest.approx(1.0, abs=1e-3)
+    assert np.abs(np.diff(turned[2:], axis=0)).max() < 1.6 / 25  # half a second of 25 ticks, eased
+
+
+@pytest.mark.parametrize("jump", [30.0, -900.0])
+@pytest.mark.parametrize("lasts", [1, 5, 1000])
+def test_a_root_that_jumps_takes_the_figure_nowhere(jump: float, lasts: int) -> None:
+    live, path = chosen(), []
+    for tick in range(150):
+        root = np.array([0.01 * tick, 0.9, jump * (60 <= tick < 60 + lasts)], dtype=np.float32)
+        live.hear(pose(0.1), root, tick * TICK_S, STILL[0])
+        path.append(live.lay_over(tick * TICK_S, STILL, ROOTS)[1][0].copy())
+    assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() < 0.03
+    assert path[-1] == pytest.approx([1.0 + 1.48, 0.9, 2.0], abs=0.05)
+    assert live.jumps == (1 if lasts == 1000 else 2)
+
+
+@pytest.mark.parametrize("far", [2e3, 3e38, math.inf])
+def test_a_root_outside_the_world_is_unknown(far: float) -> None:
+    live = chosen()
+    live.hear(pose(0.1), np.array([far, 0.0, 0.0], dtype=np.float32), 0.0, STILL[0])
+    assert np.array_equal(live.lay_over(0.0, STILL, ROOTS)[1], ROOTS)
+
+
+def test_a_fast_dancer_is_believed() -> None:
+    live = chosen()
+    for tick in range(100):
+        root = np.array([0.2 * tick, 0.9, 0.0], dtype=np.float32)  # ten metres a second
+        live.hear(pose(0.1), root, tick * TICK_S + 0.015 * (tick % 2), STILL[0])
+        live.lay_over(tick * TICK_S, STILL, ROOTS)
+    assert live.jumps == 0
 
 
 def test_it_continues_from_a_state() -> None:

@@ -112,3 +112,17 @@ def test_a_bundle_can_be_prepared_beforehand(
     assert len(kept_in(bundle / FOLDER)) == 1
     monkeypatch.setattr(prepared, "read_bvh", lambda path: pytest.fail("it was read once more"))
     assert PhraseCache(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None
+
+
+def test_impossible_steps_of_the_root_are_left_out_before_the_floor_is_looked_for(
+    bundle: Path, tmp_path: Path
+) -> None:
+    path, sound = bundle / "phrase.bvh", read_bvh(bundle / "phrase.bvh")
+    jumping = swaying_phrase()
+    jumping.roots[60:] += [0.0, 40.0, -40.0]
+    write_bvh(path, jumping)
+    for _ in range(2):  # read, and kept
+        found = PhraseCache(bundle, tmp_path / "memory").phrase(path, FIGURE, grounded=True)
+        assert found is not None and found[1] is not None
+        np.testing.assert_allclose(found[0].roots, sound.roots, atol=1e-4)
+        assert found[1].lifts.max() < 0.01

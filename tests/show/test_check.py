@@ -173,6 +173,19 @@ def test_a_phrase_at_another_rate_is_a_warning(bundle: Path) -> None:
     assert finding.level == "warning" and "60 poses a second" in finding.message
 
 
+@pytest.mark.parametrize("frames", [[60], [60, 61, 90], list(range(20, 120, 2))])
+def test_a_root_that_jumps_is_a_warning_that_names_file_and_frames(bundle: Path, frames: list[int]) -> None:
+    phrase = recording(150)
+    for frame in frames:
+        phrase.roots[frame:, 0] += 40.0
+    write_bvh(bundle / "phrase.bvh", phrase)
+    finding = only(bundle)
+    assert (finding.level, finding.file) == ("warning", bundle / "phrase.bvh")
+    assert f"{frames[0] + 1} ({frames[0] / 50:.2f} s)" in finding.message
+    assert ("45 more" in finding.message) == (len(frames) == 50)
+    assert "goes on from where it stood" in finding.message
+
+
 def test_a_broken_phrase_keeps_its_line(bundle: Path) -> None:
     lines = (bundle / "phrase.bvh").read_text().splitlines()
     lines[-1] = lines[-1].replace("0", "nan", 1)

@@ -170,3 +170,58 @@ def test_the_newest_pose_comes_whole_and_once(tmp_path: Path) -> None:
 def test_no_phrase_may_have_the_guests_name(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="'live' is what the stream of motion capture is called"):
         load_show(write_show(tmp_path / "show", motion={"phrases": {LIVE: "phrase.bvh"}}))
+
+
+def test_a_root_that_jumps_for_a_moment_leaves_the_figure_where_it_was_and_is_told(parts: StageParts) -> None:
+    """Places were infinite for ever after."""
+    stream, watch = Stream(), Watch(parts, FITS)
+    parts.live_inbox, first = stream, parts.first
+    first.play(LIVE, 0.2)
+    for tick in range(300):
+        now = tick * 0.02
+        far = 30.0 if 100 <= tick < 105 else 0.0
+        stream.coming = LivePose(now, (far, 0.9, 0.0), pose(0.1))
+        parts.hear_live()
+        first.start(now)
+        first.stand()
+        first.advance()
+        assert np.abs(first.frame.positions).max() < 3.0
+    assert first.figures_refused == 0
+    watch.check(6.0, Health())
+    [jumped] = [one for one in watch.fallbacks.happened(6.0) if one.name == rows.SOURCE_JUMPED.name]
+    assert jumped.times == 2
+
+
+def test_feet_that_do_not_come_keep_the_jumps_of_the_phrase(parts: StageParts) -> None:
+    stream = parts.live_inbox = Stream()
+    parts.first.play(LIVE, 0.0)
+    rotations = np.frombuffer(pose(0.1), np.float32).reshape(-1, 4).copy()
+    rotations[[FIGURE.index("lFoot"), FIGURE.index("rFoot")]] = math.nan
+    for tick in range(60):
+        stream.coming = LivePose(0.02 * tick, (math.nan,) * 3, rotations.tobytes())
+        parts.hear_live()
+        parts.first.start(0.02 * tick)
+    assert parts.first.live is not None and parts.first.live.share == 1.0
+    parts.first.motion._stream._tracks[:, 3] = 0.25  # the phrase is in the air
+    assert parts.first.lift == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e200])
+def test_a_figure_that_is_none_never_leaves_and_the_dance_recovers_by_itself(
+    show: Path, tmp_path: Path, wrong: float
+) -> None:
+    night = Night(show, tmp_path / "runtime")
+    night.dance(50)
+    first, watch = night.parts.first, Watch(night.parts, FITS)
+    before = first.frame.positions.copy()
+    first.grounding.strayed = wrong, 0.0
+    with np.errstate(all="ignore"):
+        night.dance(1)
+    assert np.array_equal(first.frame.positions, before)
+    night.dance(100)
+    assert first.figures_refused == 1
+    assert np.isfinite(first.frame.positions).all()
+    assert np.abs(first.frame.positions - before).max() < 1.0
+    watch.check(1.0, Health())
+    [refused] = [one for one in watch.fallbacks.happened(1.0) if one.name == rows.FIGURE_REFUSED.name]
+    assert (refused.times, refused.active) == (1, True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -14,10 +15,13 @@ from appliance.box.clock import TICK_S
 from appliance.box.record import SlotFile
 from appliance.box.show_state import ShowState
 from appliance.show_control.orders import Order
+from appliance.stage.fallback import PLACE_DROPPED
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import TRIES, Resumption
+from appliance.stage.watch import Watch
 from tests.stage.places import PLACE, declare, put
 from tests.stage.shows import NOW
+from tests.stage.test_fallbacks import FITS
 
 
 def test_after_a_power_cut_all_that_is_declared_is_new(
@@ -187,3 +191,38 @@ def test_without_room_for_it_the_dance_goes_on(dance_of: Callable[[], Reconciler
     resuming.write_checkpoint(dance, 0)
     resuming.write_end()
     resuming.close()
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        replace(PLACE, x=1e30),
+        replace(PLACE, strayed=(0.0, -1e200)),
+        replace(PLACE, heading=math.inf),
+        replace(PLACE, liveliness=(0.5, 10**400, 0)),
+    ],
+)
+def test_a_place_where_no_stage_stands_is_dropped_and_told(
+    dance_of: Callable[[], Reconciler], runtime: Path, tmp_path: Path, place: Checkpoint
+) -> None:
+    """Three restarts died of it in their first tick."""
+    put(runtime, place)
+    dance = dance_of()
+    with closing(Resumption("A test", runtime, tmp_path / "state", "always")) as resuming:
+        assert "dropped, and the show begins at the beginning" in resuming.go_on(dance, NOW)
+        assert (resuming.dropped, resuming.went_on) == (True, False)
+        watch = Watch(dance.parts, FITS)
+        watch.note_start(NOW, resuming, "", True)
+    assert [one.name for one in watch.fallbacks.happened(NOW) if one.active] == [PLACE_DROPPED.name]
+
+
+def test_a_place_in_memory_that_is_dropped_leaves_the_one_on_the_disk(
+    dance_of: Callable[[], Reconciler], runtime: Path, tmp_path: Path
+) -> None:
+    put(runtime, replace(PLACE, z=-1e9))
+    with closing(SlotFile(tmp_path / "state" / FILE)) as file:
+        file.write(packed(PLACE))
+        file.write(packed(replace(PLACE, x=1e9)))
+    with closing(Resumption("A test", runtime, tmp_path / "state", "always")) as resuming:
+        assert "goes on at 2.0 s" in resuming.go_on(dance_of(), NOW)
+        assert resuming.dropped
