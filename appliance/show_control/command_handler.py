@@ -8,8 +8,18 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from appliance.box.show_state import ShowState
+from appliance.show.sources import LIVE
 from appliance.show_control.acknowledgements import Acknowledgements
-from appliance.show_control.command import PONG, REPLY, SENSORS_REPLY, STREAMS, Command, command
+from appliance.show_control.command import (
+    LONGEST_NAME,
+    PONG,
+    REPLY,
+    SENSORS_REPLY,
+    STREAMS,
+    Command,
+    command,
+)
+from appliance.show_control.fallback import COMMAND_FAILED, LIVE_PARTIAL, LIVE_REFUSED
 from appliance.show_control.key_file import KeyFile
 from appliance.show_control.live_input import LiveInput, is_live
 from appliance.show_control.names_of_show import joint_name
@@ -70,7 +80,8 @@ ORDERS: Mapping[str, tuple[Place, str]] = {
 class CommandHandler:
     """Declares what is to persist, dispatches orders for the rest, and replies.
 
-    refused: commands that were not carried out; reason: why the last one was not.
+    refused: commands that were not carried out; reason: why the last one was not. failed: those that ended in
+    an error of this program; failure: the last one's.
     """
 
     def __init__(
@@ -86,6 +97,7 @@ class CommandHandler:
         self.show_state = show_state
         self.refused = 0
         self.reason = ""
+        self.failed, self.failure = 0, ""
         self.acknowledgements = Acknowledgements(observer)
         self._observer, self._dispatch, self._keys = observer, dispatch, keys
         self._send, self._publish, self._live = send, publish, live
@@ -103,14 +115,14 @@ class CommandHandler:
         once: set[str] = set()
         for address, arguments in messages:
             if address in _ANSWERS or address.startswith(_LISTED):
-                self._refuse(f"{address} is an answer, no command.")
+                self._refuse(f"{address[:LONGEST_NAME]} is an answer, no command.")
                 continue
             try:
                 if address in TRACKERS:
                     self._follow_tracker(address, arguments, asker, now)
                     continue
                 if is_live(address):
-                    self._live.hear(address, arguments, self._observer.facts, now)
+                    self._hear_live(address, arguments, now)
                     continue
                 if address in once:
                     raise ValueError(f"{address} came twice in a bundle: once is enough.")
@@ -119,6 +131,9 @@ class CommandHandler:
                 self._carry_out(command(address, arguments), asker, now)
             except ValueError as error:
                 self._reply(asker, address, False, str(error))
+            except Exception as error:
+                self._note_failure(address, error, now)
+                self._reply(asker, address, False, COMMAND_FAILED.words)
 
     def follow_stage(self, now: float) -> None:
         """What has to be done without any command; call it often."""
@@ -130,11 +145,12 @@ class CommandHandler:
         if self._is_new_stage and facts is not None and (health := self._observer.health()):
             self._is_new_stage = False
             self._adopt(facts, health, now)
+        self._note_live(now)
         self.acknowledgements.send_due(now)
 
     def status(self, strangers: int, now: float) -> Status:
         """How the box is."""
-        return status(self.show_state, self._observer, self.refused, strangers, now)
+        return status(self.show_state, self._observer, self.refused, strangers, now, self._live.came(now))
 
     def _adopt(self, facts: Facts, health: Mapping[str, Any], now: float) -> None:
         """After a power cut the stage goes on in its cue: picture and lights too, unless declared since; and
@@ -185,6 +201,8 @@ class CommandHandler:
         if address == "/go" and before.going and observer.state(now) == "stopped":
             show_state = show_state.with_dance(now, SHOWS_RATE)
         self._publish_changed(show_state)
+        if show_state.generation != before.generation and self._takes_live:
+            words = f"{words} {self._live.words(now)}".lstrip()
         reply = partial(self._reply, asker, address)
         if address == "/go" or show_state.generation == before.generation:
             reply(True, words)
@@ -221,7 +239,34 @@ class CommandHandler:
         if not done:
             self._refuse(words)
         reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY
-        self._send(asker, (reply, address, int(done), words or "Done."))
+        self._send(asker, (reply, address[:LONGEST_NAME], int(done), words or "Done."))
+
+    @property
+    def _takes_live(self) -> bool:
+        """Whether the show is to start from a live dancer."""
+        show_state, facts = self.show_state, self._observer.facts
+        is_ours = facts is not None and show_state.show == facts.show_name
+        return is_ours and show_state.dance.get("phrase", (0, "", ()))[1] == LIVE
+
+    def _hear_live(self, address: str, arguments: Sequence[object], now: float) -> None:
+        try:
+            self._live.hear(address, arguments, self._observer.facts, now)
+        except ValueError as error:  # programs of motion capture hear no reply
+            self._observer.own.count(LIVE_REFUSED.name, now)
+            self._observer.own.concern(LIVE_REFUSED.name, [readable(str(error))])
+            raise
+
+    def _note_live(self, now: float) -> None:
+        missing = self._live.missing(now) if self._takes_live else ""
+        self._observer.own.set(LIVE_PARTIAL.name, bool(missing))
+        self._observer.own.concern(LIVE_PARTIAL.name, filter(None, [missing]))
+
+    def _note_failure(self, address: str, error: Exception, now: float) -> None:
+        """An error of this program ends no process on which PANIC hangs."""
+        self.failed += 1
+        self.failure = readable(f"{address[:LONGEST_NAME]}: {type(error).__name__}: {error}")
+        self._observer.own.count(COMMAND_FAILED.name, now)
+        self._observer.own.concern(COMMAND_FAILED.name, [readable(address[:LONGEST_NAME])])
 
     def _refuse(self, reason: str) -> None:
         self.refused += 1

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from appliance.box.live_pose import MOST_JOINTS, LivePoseWriter
+from appliance.dancer.live import SILENT_S
 from appliance.outputs.shared_frame import Facts
+from appliance.pose.possible import FARTHEST_M
 from appliance.show.sources import LIVE
 from appliance.show_control.command import require_read
 from appliance.show_control.vmc_input import BONE, ROOT, VmcInput
@@ -15,6 +17,8 @@ from appliance.show_control.vmc_input import PREFIX as VMC
 
 ROTATIONS, POSITIONS = "/mocap/0/joint/rot_local", "/mocap/0/joint/pos_world"
 _SILENT = "/mocap/0/joint/rot_world"  # says nothing new
+_MOST_NAMED = 5  # bones in a sentence
+_UNIT = 1.1  # no part of a rotation is larger
 
 
 def is_live(address: str) -> bool:
@@ -29,6 +33,8 @@ class LiveInput:
         self._writer = LivePoseWriter(folder)
         self._root = (math.nan, math.nan, math.nan)
         self._vmc: tuple[Facts, VmcInput] | None = None
+        self._heard_at = -math.inf
+        self._came = ""
 
     def hear(self, address: str, arguments: Sequence[object], facts: Facts | None, now: float) -> None:
         """One message that `is_live`. Raises ValueError with one clear sentence."""
@@ -56,17 +62,49 @@ class LiveInput:
         if not all(map(math.isfinite, numbers)):
             raise ValueError(f"{address}: a number is none.")
         if address == POSITIONS:
-            self._root = (numbers[0], numbers[1], numbers[2])
-        else:
-            self._writer.write(now, self._root, numbers)
+            x, y, z = numbers[:3]
+            if max(abs(x), abs(y), abs(z)) > FARTHEST_M:
+                raise ValueError(f"{address}: no root is farther than {FARTHEST_M:g} m from the middle.")
+            self._root = x, y, z
+            return
+        if max(map(abs, numbers)) > _UNIT:
+            raise ValueError(f"{address}: a rotation is a quaternion of length 1: w, x, y, z.")
+        self._write(now, self._root, numbers)
+        self._came = f"{joints} of {joints} joints"
 
     def _hear_vmc(self, address: str, arguments: Sequence[object], facts: Facts, now: float) -> None:
         if self._vmc is None or self._vmc[0] is not facts:
             self._vmc = facts, VmcInput(facts.skeleton)
         if len(facts.skeleton) > MOST_JOINTS:
             raise ValueError(f"A live dancer has at most {MOST_JOINTS} joints, and this show's has more.")
-        if (whole := self._vmc[1].hear(address, arguments)) is not None:
-            self._writer.write(now, *whole)
+        vmc = self._vmc[1]
+        if (whole := vmc.hear(address, arguments)) is not None:
+            self._write(now, *whole)
+            self._came = f"{len(vmc.known)} of {vmc.bones} bones"
+
+    def _write(self, now: float, root: Sequence[float], rotations: Sequence[float]) -> None:
+        self._writer.write(now, root, rotations)
+        self._heard_at = now
+
+    def came(self, now: float) -> str:
+        """How much of the figure comes, like `17 of 17 bones`; empty: no live dancer is heard."""
+        return self._came if now - self._heard_at <= SILENT_S else ""
+
+    def missing(self, now: float) -> str:
+        """The same where bones of the body do not come, and which; empty: all do, or nobody is heard."""
+        names = self._vmc[1].missing if self._vmc is not None and self._came.endswith("bones") else []
+        if not names or not self.came(now):
+            return ""
+        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+        return f"{self._came} come, without {', '.join(names[:_MOST_NAMED])}{more}"
+
+    def words(self, now: float) -> str:
+        """A sentence about it, for the one that lets the show start from it."""
+        if missing := self.missing(now):
+            return f"Of the live dancer {missing}: the others stay with the phrase."
+        if came := self.came(now):
+            return f"Of the live dancer {came} come."
+        return "No live dancer is heard: the phrase plays on until its program sends."
 
     def close(self) -> None:
         """Release the file."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -10,13 +11,16 @@ from pythonosc.osc_message_builder import BuildError, OscMessageBuilder
 from pythonosc.parsing import osc_types
 
 Message = tuple[str | int | float, ...]  # an OSC address and its arguments
-MOST_MESSAGES = 64  # of a bundle; a desk that sends more at once sends several bundles
+MOST_MESSAGES = 1024  # of a bundle; programs of motion capture send all bones and faces in one
 DEEPEST_BUNDLE = 8
 BUNDLE = b"#bundle\0"  # how a bundle begins
+URGENT = ("/panic", "/blackout", "/stop", "/go")
 
 _HEAD_BYTES = 16  # of a bundle: BUNDLE, then the time tag
 _NUMBERS = {tag: struct.Struct(f">{packed}") for tag, packed in zip("ifhd", "ifqd", strict=True)}
-_CONSTANTS = {"T": True, "F": False, "N": None}
+_CONSTANTS = {"T": True, "F": False}
+_TRIGGERS = "IN"  # OSC's impulse and nil: a trigger, and no value
+_URGENT = re.compile(rb"(%s)(?=[\0\s,]|\Z)" % "|".join(URGENT).encode())
 _NO_OSC = "This is no OSC."
 
 
@@ -31,8 +35,9 @@ def messages_in(received: bytes) -> list[tuple[str, list[object]]]:
 
     Each step goes forward in the datagram, so its length bounds time and memory. (python-osc's parser turns
     for ever at an element of -4 bytes.) An argument of a type that no command takes, or that cannot be read,
-    is Unread, and the last one: /panic is heard whatever comes with it. Raises ValueError for what is no OSC,
-    and for bundles of more than MOST_MESSAGES or deeper than DEEPEST_BUNDLE.
+    is Unread, and the last one: /panic is heard whatever comes with it, and URGENT ones however they are
+    filled up. Raises ValueError for what is no OSC, and for bundles of more than MOST_MESSAGES or deeper than
+    DEEPEST_BUNDLE.
     """
     messages: list[tuple[str, list[object]]] = []
     for element in _elements(received, 0):
@@ -40,6 +45,12 @@ def messages_in(received: bytes) -> list[tuple[str, list[object]]]:
             raise ValueError(f"A bundle may hold at most {MOST_MESSAGES} messages. Split it.")
         messages.append(_message(element))
     return messages
+
+
+def urgent_address(received: bytes) -> bytes:
+    """Which of URGENT a datagram begins with, also one that no program of OSC has filled up; else empty."""
+    found = _URGENT.match(received)
+    return found[1] if found else b""
 
 
 def datagram(message: Message) -> bytes:
@@ -81,6 +92,9 @@ def _elements(packet: bytes, depth: int) -> Iterator[bytes]:
 
 
 def _message(packet: bytes) -> tuple[str, list[object]]:
+    if urgent := urgent_address(packet):
+        behind = packet[len(urgent) :].lstrip(b"\0\r\n ")
+        return urgent.decode(), list(_arguments(behind.ljust(4, b"\0") if behind else behind, 0))
     try:
         address, at = _text(packet, 0)
     except ValueError:
@@ -99,6 +113,8 @@ def _arguments(packet: bytes, at: int) -> Iterator[object]:
         if not tags.startswith(","):
             raise ValueError(_NO_OSC)
         for tag in tags[1:]:
+            if tag in _TRIGGERS:
+                continue
             if tag in _CONSTANTS:
                 yield _CONSTANTS[tag]
             else:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from appliance.sensor.transports.udp import bind_early
 from appliance.show_control.packet import Message, datagram
 
-LARGEST_DATAGRAM = 4096  # no command comes near; what is larger is none
+LARGEST_DATAGRAM = 65_507  # of UDP: programs of motion capture send a whole figure at once
 _SAY_EVERY_S = 60.0
 _WAITING_BYTES = 4 << 20  # or as much as net.core.rmem_max allows: what comes while this process does not run
 _SO_MEMINFO, _DROPS = 55, 8  # Linux, asm-generic/socket.h and linux/sock_diag.h: nine numbers, the last one
@@ -34,7 +34,7 @@ def open_port(host: str, port: int) -> socket.socket:
 class Port:
     """Takes over a bound socket. `senders`: addresses and networks that may command, beside this machine.
 
-    strangers: datagrams from any other sender. too_large: datagrams that are longer than any command.
+    strangers: datagrams from any other sender; newest_stranger: the address of the last one.
     """
 
     def __init__(self, bound: socket.socket, senders: Sequence[str] = ()) -> None:
@@ -45,8 +45,8 @@ class Port:
         self._networks = [ipaddress.IPv4Network(one, strict=False) for one in (*own, *senders)]
         self._known: dict[str, bool] = {}
         self.strangers = 0
-        self.too_large = 0
-        self._newest_stranger = ""
+        self.newest_stranger = ""
+        self._said = 0
         self._said_at = float("-inf")
 
     def fileno(self) -> int:
@@ -56,17 +56,14 @@ class Port:
     def take(self) -> tuple[bytes, Address] | None:
         """The oldest datagram, empty if it is dropped; None: none waits. Never blocks, never raises."""
         try:
-            received, sender = self._socket.recvfrom(LARGEST_DATAGRAM + 1)
+            received, sender = self._socket.recvfrom(LARGEST_DATAGRAM)
         except BlockingIOError:
             return None
         except OSError:  # the kernel reports that an earlier reply found no listener
             return b"", ("", 0)
         if not self._may_command(sender[0]):
             self.strangers += 1
-            self._newest_stranger = sender[0]
-            return b"", sender
-        if len(received) > LARGEST_DATAGRAM:
-            self.too_large += 1
+            self.newest_stranger = sender[0]
             return b"", sender
         return received, sender
 
@@ -82,11 +79,11 @@ class Port:
 
     def news(self, now: float) -> str:
         """A sentence about strangers, at most once a minute; else empty."""
-        if not self._newest_stranger or now < self._said_at + _SAY_EVERY_S:
+        if self.strangers == self._said or now < self._said_at + _SAY_EVERY_S:
             return ""
-        sender, self._newest_stranger, self._said_at = self._newest_stranger, "", now
+        self._said, self._said_at = self.strangers, now
         return (
-            f"{sender} sends commands and is not listed ({self.strangers} dropped so far). "
+            f"{self.newest_stranger} sends commands and is not listed ({self.strangers} dropped so far). "
             "Nothing is changed. To let them: `senders` under control in the box file."
         )
 

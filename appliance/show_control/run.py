@@ -18,6 +18,7 @@ from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.box.stop_signals import stop_signals
 from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.console_messages import ConsoleMessages, held_back
+from appliance.show_control.fallback import LIVE_DROPPED, SENDER_NOT_LISTED
 from appliance.show_control.heartbeat import Heartbeat
 from appliance.show_control.intake import Intake
 from appliance.show_control.key_file import KeyFile
@@ -32,6 +33,8 @@ from appliance.show_control.stage_observer import StageObserver
 
 _LONGEST_SLEEP_S = 0.25  # a restarted stage is found within this
 _AT_ONCE = 16  # datagrams; then answers, heartbeat and signals have their turn
+_LIVE_AT_ONCE = 64  # of a live dancer: a frame of most programs, 3 ms
+_SAY_EVERY_S = 60.0
 _REST_S = 0.002  # after as many: a flood leaves the processor to others
 
 
@@ -72,6 +75,7 @@ class ControlProcess:
                 self._poll.register(one.fileno(), select.POLLIN)
             self._closing = opened.pop_all()
         writer.write(show_state)
+        self._failures_said, self._failures_said_at = 0, float("-inf")
         self._news = ConsoleMessages(show_state)
         if words := held_back(show_state):
             say(f"Still from before: {words}")
@@ -96,14 +100,19 @@ class ControlProcess:
         while taken < _AT_ONCE and (found := self._intake.take()) is not None:
             taken += 1
             self.handler.handle_datagram(*found, self._monotonic())
+        for _ in range(_LIVE_AT_ONCE):
+            if (found := self._intake.take_live()) is None:
+                break
+            self.handler.handle_datagram(*found, self._monotonic())
         self._dispatch.exchange(self._monotonic())
         now = self._monotonic()
-        self.observer.note_dropped(self._intake.dropped + self.port.dropped(), now)
+        self._count(now)
         self.handler.follow_stage(now)
         self._health.publish_health(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)
-        for words in (self.port.news(now), self._news.look(self.handler.show_state, now)):
+        news = self.port.news(now), self._failures(now), self._news.look(self.handler.show_state, now)
+        for words in news:
             if words:
                 self._say(words)
         if taken == _AT_ONCE:
@@ -133,11 +142,8 @@ class ControlProcess:
 
     def conclusion(self) -> str:
         """How many commands were refused, in a sentence; empty when none was."""
-        refused = self.handler.refused + self.port.too_large
-        if not refused:
-            return ""
-        reason = self.handler.reason or "A datagram was too long for a command."
-        return f"Commands: {refused} refused, the last one: {reason}"
+        refused = self.handler.refused
+        return f"Commands: {refused} refused, the last one: {self.handler.reason}" if refused else ""
 
     def close(self) -> None:
         """Free the port and the show state, which stays in force."""

@@ -10,24 +10,25 @@ from appliance.box.made_motion import KeptNamesReader
 from appliance.box.process_health import COMMANDS_DROPPED, STAGE_HUNG, ProcessHealth
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
+from appliance.show_control.fallback import OF_CONTROL
 
 StageState = Literal["dancing", "stopped", "hung", "absent"]
 
 
 class StageObserver:
-    """The stage of a runtime folder, whether it is there or not."""
+    """The stage of a runtime folder, whether it is there or not. own: show control's own fallbacks."""
 
     def __init__(self, folder: Path) -> None:
         self._reader = FrameReader(folder)
         self._process_health = ProcessHealth(folder)
         self._kept = KeptNamesReader(folder)
-        self._fallbacks = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED))
+        self.own = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED, *OF_CONTROL))
 
     def state(self, now: float) -> StageState:
         """hung: the process lives, but no frame came for half a second; absent: no process, or none yet."""
         frames = self._reader.state(now)
         is_hung = frames == "stale" and self._reader.is_alive(now)
-        self._fallbacks.set(STAGE_HUNG.name, is_hung)
+        self.own.set(STAGE_HUNG.name, is_hung)
         if frames == "fresh":
             return "stopped" if self.health().get("state") == "stopped" else "dancing"
         return "hung" if is_hung else "absent"
@@ -49,13 +50,9 @@ class StageObserver:
         """Names of motions that were kept: /phrase calls them."""
         return self._kept.read()
 
-    def note_dropped(self, total: int, now: float) -> None:
-        """How many datagrams at the control port gave way, since it was opened."""
-        self._fallbacks.follow(COMMANDS_DROPPED.name, total, now)
-
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
         """Process and fallback, of all processes of the box, as far as they ever happened."""
-        own = [("control", one) for one in self._fallbacks.happened(now)]
+        own = [("control", one) for one in self.own.happened(now)]
         stage = fallen(self.health().get("fallbacks")) if self.state(now) != "absent" else ()
         return [*(("stage", one) for one in stage), *own, *self._process_health.fallbacks(now)]
 

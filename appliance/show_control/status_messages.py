@@ -47,10 +47,16 @@ class Status(NamedTuple):
     fallbacks: int
     liveliness: float
     seed: int
+    live: str = ""
 
 
 def status(
-    show_state: ShowState, observer: StageObserver, refused: int, strangers: int, now: float
+    show_state: ShowState,
+    observer: StageObserver,
+    refused: int,
+    strangers: int,
+    now: float,
+    live: str = "",
 ) -> Status:
     """The stage's last report, and what show control sees of a stage that hangs or is absent."""
     stage, health, facts = observer.state(now), observer.health(), observer.facts
@@ -82,6 +88,7 @@ def status(
         fallbacks=sum(one.active for _, one in observer.fallbacks(now)),
         liveliness=_known(health.get("liveliness")),
         seed=int(health.get("seed", -1)),
+        live=live,
     )
 
 

@@ -6,12 +6,19 @@ import math
 from collections.abc import Sequence
 
 from appliance.outputs.osc.humanoid import humanoid_bones
+from appliance.pose.possible import FARTHEST_M
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.t_pose import humanoid_rest
 
 PREFIX = "/VMC/Ext/"
 BONE, ROOT = f"{PREFIX}Bone/Pos", f"{PREFIX}Root/Pos"
 _HIPS = "Hips"
+_UNIT = 0.1  # a rotation this far from unit length is none
+_OF_BODY = frozenset(  # without these a figure is not whole; fingers, eyes and toes few programs send
+    ("Hips", "Spine", "Head", *(f"{side}{part}" for side in ("Left", "Right") for part in (
+        "UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot"
+    )))
+)  # fmt: skip
 
 Quaternion = tuple[float, float, float, float]  # w, x, y, z
 Vector = tuple[float, float, float]
@@ -23,12 +30,14 @@ class VmcInput:
 
     Unity's axes are left-handed: X is mirrored, so (x, y, z, w) becomes (w, x, -y, -z). Rotations count from
     a T-pose, whatever the skeleton's zero pose is, and are relative to the next bone above: joints between
-    two bones stay as in that T-pose, and so do those without a bone. Nothing in the protocol ends a frame: it
-    is whole when all bones of the frame before have come, or one of them comes again.
+    two bones stay as in that T-pose where the lower one comes. Bones that come neither in this frame nor in
+    the one before are unknown. Nothing in the protocol ends a frame: it is whole when all bones of the frame
+    before have come, or one of them comes again.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
         self._joint_of = humanoid_bones(skeleton.names)
+        self._bones_of = _bones_of_joints(skeleton, self._joint_of)
         rest = [_as_quaternion(turn) for turn in humanoid_rest(skeleton).tolist()]
         above = [rest[parent] if parent >= 0 else _UNTURNED for parent in skeleton.parents]
         self._from_above, self._rest = [_inverse(turn) for turn in above], rest
@@ -37,16 +46,42 @@ class VmcInput:
             self._turn(joint, _UNTURNED)
         self._root: tuple[Vector, Quaternion] = (0.0, 0.0, 0.0), _UNTURNED
         self._hips: tuple[Vector, Quaternion] = self._root
-        self._knows_hips = False
         self._came: set[str] = set()
         self._whole: set[str] = set()
 
+    @property
+    def bones(self) -> int:
+        """How many bones this figure has."""
+        return len(self._joint_of)
+
+    @property
+    def known(self) -> frozenset[str]:
+        """Bones of this figure that came in the last two frames."""
+        return frozenset(self._came | self._whole)
+
+    @property
+    def missing(self) -> list[str]:
+        """Bones of a body that this figure has and that did not come."""
+        return [bone for bone in self._joint_of if bone in _OF_BODY and bone not in self.known]
+
     def hear(self, address: str, arguments: Sequence[object]) -> tuple[Vector, list[float]] | None:
-        """One message; the hips' place in metres (not numbers: unknown) and all joints' w, x, y, z in the
-        skeleton's order once a frame is whole, else None. Raises ValueError with one clear sentence."""
+        """One message; the hips' place in metres and all joints' w, x, y, z in the skeleton's order once a
+        frame is whole, else None. What is unknown is not a number. Raises ValueError with one clear sentence.
+        """
         if address not in (BONE, ROOT):
             return None
-        name, place, turned = parsed(address, arguments)
+        name, place, rotation = parsed(address, arguments)
+        if address == BONE and name not in self._joint_of:
+            return None  # a name from outside never stays in memory
+        if (address == ROOT or name == _HIPS) and max(map(abs, place)) > FARTHEST_M:
+            raise ValueError(f"{address} {name}: no place is farther than {FARTHEST_M:g} m from the middle.")
+        if not any(rotation):
+            return None  # so some programs send what they do not track
+        length = math.hypot(*rotation)
+        if not abs(length - 1.0) < _UNIT:
+            raise ValueError(f"{address} {name}: a rotation has the length 1, and {length:.3g} came.")
+        w, x, y, z = (part / length for part in rotation)
+        turned = w, x, y, z
         if address == ROOT:
             self._root = place, turned
             return None
@@ -60,7 +95,7 @@ class VmcInput:
 
     def _take(self, name: str, place: Vector, turned: Quaternion) -> None:
         if name == _HIPS:
-            self._hips, self._knows_hips = (place, turned), True
+            self._hips = place, turned
         elif (joint := self._joint_of.get(name)) is not None:
             self._turn(joint, turned)
 
@@ -74,7 +109,24 @@ class VmcInput:
         self._turn(self._joint_of[_HIPS], _multiplied(root_turned, hips_turned))
         reach = _rotated(root_turned, hips)
         place = (root[0] + reach[0], root[1] + reach[1], root[2] + reach[2])
-        return place if self._knows_hips else (math.nan,) * 3, list(self._rotations)
+        rotations, known = list(self._rotations), self.known
+        for joint, bones in enumerate(self._bones_of):
+            if known.isdisjoint(bones):
+                rotations[4 * joint : 4 * joint + 4] = [math.nan] * 4
+        return place if _HIPS in known else (math.nan,) * 3, rotations
+
+
+def _bones_of_joints(skeleton: Skeleton, joint_of: dict[str, int]) -> list[frozenset[str]]:
+    """For each joint the bones that say how it turns: its own, else the next ones below it."""
+    bone_of = {joint: bone for bone, joint in joint_of.items()}
+    found: list[frozenset[str]] = [frozenset()] * len(skeleton)
+    for joint in reversed(range(len(skeleton))):
+        if joint in bone_of:
+            found[joint] = frozenset((bone_of[joint],))
+        parent = skeleton.parents[joint]
+        if parent >= 0:
+            found[parent] |= found[joint]
+    return found
 
 
 def parsed(address: str, arguments: Sequence[object]) -> tuple[str, Vector, Quaternion]:

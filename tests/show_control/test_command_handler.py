@@ -103,7 +103,7 @@ def test_how_alive_and_which_dance_is_declared(folder: Path, stage: StageDouble,
     assert asker.ask("/seed", 2**31 - 1) == ["/reply", "/seed", 1, words]
     assert declared(folder, "seed") == ("", 2.0**31 - 1)
     stage.tell(liveliness=0.75, seed=5)
-    assert asker.ask("/status")[-2:] == [0.75, 5]
+    assert asker.ask("/status")[-3:] == [0.75, 5, ""]
 
 
 def test_hands_are_declared_by_name_or_number(folder: Path, stage: StageDouble, asker: Asker) -> None:

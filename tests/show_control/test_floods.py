@@ -11,6 +11,7 @@ from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from appliance.show_control import order_dispatch
+from appliance.show_control.packet import MOST_MESSAGES
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble
 from tests.show_control.in_force import declared, show_state
 
@@ -31,11 +32,23 @@ def test_a_bundle_full_of_questions_is_answered_once(stage: StageDouble, asker: 
     assert asker.ask("/ping") == ["/pong"]
 
 
+def test_a_desk_may_send_all_its_levers_at_once(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    builder = OscBundleBuilder(IMMEDIATELY)
+    for lever in range(70):
+        message = OscMessageBuilder("/master")
+        message.add_arg(lever / 70)
+        builder.add_content(message.build())
+    asker.socket.send(builder.build().dgram)
+    heard = [asker.hear() for _ in range(70)]
+    assert all(message is not None and message[:3] == ["/reply", "/master", 1] for message in heard)
+    assert show_state(folder).master == pytest.approx(69 / 70)
+
+
 def test_a_bundle_that_is_too_long_is_refused_as_one(folder: Path, stage: StageDouble, asker: Asker) -> None:
-    asker.socket.send(bundle("/player/start", 150))
+    asker.socket.send(bundle("/player/start", MOST_MESSAGES + 1))
     heard = asker.hear()
     assert heard is not None
-    assert "at most 64 messages" in heard[3]
+    assert f"at most {MOST_MESSAGES} messages" in heard[3]
     assert asker.ask("/ping") == ["/pong"]
     assert show_state(folder).generation == 0
 

@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 from appliance.outputs.shared_frame import FrameWriter
-from appliance.show_control.intake import URGENT
 from appliance.show_control.intake import WAITING as DATAGRAMS_WAITING
-from appliance.show_control.packet import messages_in
-from appliance.show_control.port import LARGEST_DATAGRAM, open_port
+from appliance.show_control.packet import URGENT, messages_in
+from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
 from appliance.show_control.settings import Settings
 from tests.show_control.doubles import HOST, Asker, Clock, facts
@@ -26,7 +25,8 @@ NOISE = {
     "pings": message("/ping"),
     "orders": message("/player/jump", 1.0),
     "no OSC": b"\xff" * 40,
-    "too large": message("/look", "x" * LARGEST_DATAGRAM),
+    "very large": message("/look", "x" * 9000),
+    "a live dancer": message("/VMC/Ext/Bone/Pos", "Hips", *[0.0] * 7),
     "bundles": bundle(*[message("/status"), message("/ping")] * 30),
     "an urgent name that is an argument": message("/look", "/go"),
 }

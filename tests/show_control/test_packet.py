@@ -21,7 +21,14 @@ from pythonosc.osc_packet import OscPacket
 
 from appliance.outputs.osc.template import osc_string
 from appliance.show_control.command import command
-from appliance.show_control.packet import DEEPEST_BUNDLE, MOST_MESSAGES, Unread, messages_in
+from appliance.show_control.packet import (
+    DEEPEST_BUNDLE,
+    MOST_MESSAGES,
+    URGENT,
+    Unread,
+    messages_in,
+    urgent_address,
+)
 from tests.show_control.doubles import Asker, control_process
 from tests.show_control.fuzz import bundle, message
 
@@ -96,7 +103,7 @@ def test_bundles_are_as_deep_and_as_long_as_the_bounds_allow() -> None:
     with pytest.raises(ValueError, match="no OSC"):
         messages_in(bundle(nest))
     assert len(messages_in(bundle(*[message("/go")] * MOST_MESSAGES))) == MOST_MESSAGES
-    with pytest.raises(ValueError, match="at most 64 messages"):
+    with pytest.raises(ValueError, match=f"at most {MOST_MESSAGES} messages"):
         messages_in(bundle(bundle(*[message("/go")] * MOST_MESSAGES), message("/go")))
 
 
@@ -118,7 +125,7 @@ _VALUES = {
     "s": _TEXTS,
     "T": any_.just(True),
     "F": any_.just(False),
-    "N": any_.none(),
+    "N": any_.none(),  # a trigger
 }
 _ARGUMENTS = any_.sampled_from(sorted(_VALUES)).flatmap(lambda tag: any_.tuples(any_.just(tag), _VALUES[tag]))
 
@@ -136,7 +143,10 @@ def test_what_is_well_formed_is_read_as_python_osc_reads_it(
     for builder in builders:
         packet.add_content(builder.build())
     received = packet.build().dgram if is_bundle else builders[0].build().dgram
-    expected = [(one.message.address, one.message.params) for one in OscPacket(received).messages]
+    expected = [
+        (one.message.address, [value for value in one.message.params if value is not None])
+        for one in OscPacket(received).messages
+    ]
     assert messages_in(received) == expected
 
 
@@ -145,7 +155,9 @@ def test_what_is_well_formed_is_read_as_python_osc_reads_it(
     [
         (b"", []),
         (b",\0\0\0", []),
-        (b",I\0\0", [Unread("I")]),
+        (b",I\0\0", []),
+        (b",N\0\0", []),
+        (b",IiN\0\0\0\0" + struct.pack(">i", 1), [1]),
         (b",c\0\0\0\0\0A", [Unread("c")]),
         (b",fi\0" + struct.pack(">f", 0.5), [0.5, Unread()]),
         (b",f\0\0\x3f", [0.5]),  # the last zeros left out
@@ -170,11 +182,38 @@ def test_an_argument_that_cannot_be_read_is_marked_and_panic_is_panic_whatever_i
 
 
 @pytest.mark.parametrize("address", ["/cue", "/sensors/neutral", "/go", "/stop"])
-@pytest.mark.parametrize("tag", "IcbrmtX")
+@pytest.mark.parametrize("tag", "cbrmtX")
 def test_a_command_that_was_not_read_whole_is_refused_by_its_type(address: str, tag: str) -> None:
     [(address, arguments)] = messages_in(osc_string(address) + osc_string(f",{tag}") + bytes(8))
     with pytest.raises(ValueError, match=f"^{address} came with an argument of the OSC type {tag}: nothing"):
         command(address, arguments)
+
+
+@pytest.mark.parametrize("tag", "IN")
+@pytest.mark.parametrize("address", ["/go", "/cue", "/motion/again", "/sensors/list"])
+def test_a_trigger_is_the_command_without_a_value(address: str, tag: str) -> None:
+    """OSC's impulse, as ossia score sends it, and nil, as MadMapper does."""
+    [(address, arguments)] = messages_in(osc_string(address) + osc_string(f",{tag}"))
+    assert command(address, arguments).values == () and command(address, arguments).text == ""
+
+
+@pytest.mark.parametrize("address", URGENT)
+@pytest.mark.parametrize("behind", [b"", b"\0", b"\0\0\0\0\0", b"\n", b"\r\n", b"\0,\0", b",", b"\0,I\0"])
+def test_what_is_urgent_is_heard_however_it_is_filled_up(address: str, behind: bytes) -> None:
+    assert messages_in(address.encode() + behind) == [(address, [])]
+
+
+@pytest.mark.parametrize("zeros", range(1, 9))
+def test_what_is_urgent_has_its_arguments_wherever_its_address_ends(zeros: int) -> None:
+    received = b"/blackout" + bytes(zeros) + b",i\0\0" + struct.pack(">i", 1)
+    assert messages_in(received) == [("/blackout", [1])]
+
+
+@pytest.mark.parametrize("received", [b"/panicked\0\0\0", b"/gold\0\0\0", b"/stop/it\0\0\0\0"])
+def test_what_only_begins_like_it_is_another_address(received: bytes) -> None:
+    assert urgent_address(received) == b""
+    [(address, _)] = messages_in(received)
+    assert address == received.rstrip(b"\0").decode()
 
 
 def test_a_symbol_is_a_text() -> None:
@@ -183,7 +222,7 @@ def test_a_symbol_is_a_text() -> None:
 
 
 @pytest.mark.parametrize(
-    "received", [b"", b"/", b"/go", b"go\0\0", b"/\xff\0\0", b"\0\0\0\0", BUNDLE[:-1], BUNDLE[:8]]
+    "received", [b"", b"/", b"/cue", b"go\0\0", b"/\xff\0\0", b"\0\0\0\0", BUNDLE[:-1], BUNDLE[:8]]
 )
 def test_what_has_no_address_is_no_osc(received: bytes) -> None:
     with pytest.raises(ValueError, match=r"This is no OSC\."):

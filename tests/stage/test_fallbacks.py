@@ -22,6 +22,7 @@ from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, SerialConfig
 from appliance.show.osc import OscConfig
 from appliance.show.show import load_show
+from appliance.show_control.fallback import OF_CONTROL
 from appliance.sound.fallback import OF_THE_SOUND
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
@@ -200,7 +201,8 @@ def test_not_realtime(stage: Watch) -> None:
 
 
 def resumed(**changes: Any) -> Resumption:
-    return cast(Resumption, SimpleNamespace(**{"restarts": 0, "power_cuts": 0, "complaint": ""} | changes))
+    usual: dict[str, Any] = {"restarts": 0, "power_cuts": 0, "complaint": "", "dropped": False}
+    return cast(Resumption, SimpleNamespace(**usual | changes))
 
 
 BEGINNINGS: dict[str, tuple[Fallback, Callable[[Watch], None]]] = {
@@ -209,6 +211,10 @@ BEGINNINGS: dict[str, tuple[Fallback, Callable[[Watch], None]]] = {
     "place": (
         rows.PLACE_NOT_NOTED,
         lambda stage: stage.note_start(1.0, resumed(complaint="Full."), "", True),
+    ),
+    "a wrong place": (
+        rows.PLACE_DROPPED,
+        lambda stage: stage.note_start(1.0, resumed(dropped=True), "", True),
     ),
     "frames": (rows.NOT_SHARED, lambda stage: stage.note_start(1.0, resumed(), "Full.", True)),
     "journal": (rows.NOT_RECORDED, lambda stage: stage.note_start(1.0, resumed(), "", False)),
@@ -274,6 +280,7 @@ EVERY = {
         *OF_THE_GENERATOR,
         *OF_THE_SOUND,
         *OF_THE_COMPANY,
+        *OF_CONTROL,
     )
 }
 
