@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from appliance.pose import quaternion
+from appliance.studio.evaluation.coverage import RecordedMotion
 from appliance.studio.evaluation.critic import area_under_curve
 from appliance.studio.evaluation.field_metrics import foot_skate_ratio, jerk, physical_foot_contact
 from appliance.studio.evaluation.limbs import limbs_of, spread
@@ -19,7 +20,6 @@ from appliance.studio.evaluation.motion_features import (
     kinetic_features,
 )
 from appliance.studio.evaluation.nearest import without_heading
-from appliance.studio.evaluation.repertoire import Repertoire
 from tests.studio.dancers import ARM, danced, motions
 from tests.studio.puppets import NAMES
 from tests.studio.tiny import moving
@@ -131,7 +131,7 @@ def test_matching_dances_what_was_recorded_with_the_hand_put_in() -> None:
 
 def test_coverage_is_the_share_that_is_danced() -> None:
     poses = danced(motions(20.0, 21)).poses[:, PLACES]
-    repertoire = Repertoire([poses])
-    assert repertoire.coverage(poses) > 0.95 and repertoire.recall(poses) > 0.95
-    assert 0.3 < repertoire.coverage(poses[:500]) < 0.8
-    assert repertoire.coverage(poses[:1].repeat(50, axis=0)) < 0.1
+    recorded = RecordedMotion([poses])
+    assert recorded.coverage(poses) > 0.95 and recorded.recall(poses) > 0.95
+    assert 0.3 < recorded.coverage(poses[:500]) < 0.8
+    assert recorded.coverage(poses[:1].repeat(50, axis=0)) < 0.1

@@ -95,7 +95,7 @@ class Comparison:
             **self._limbs(level, joint),
             **self._with_hands(joint, level, hands),
             **(self._space_of_phrase if kind == "phrase" else self._space(dances)),
-            **self._repertoire(joint, level),
+            **self._coverage(joint, level),
         }
         for name, ratio in RATIOS.items():
             own = self._space_of_phrase[name]
@@ -178,19 +178,19 @@ class Comparison:
             "pfc": _mean(contacts),
         }
 
-    def _repertoire(self, joint: str, dances: Sequence[Array]) -> dict[str, float]:
-        repertoire, together = self._recorded.repertoire, np.concatenate([dance[::EVERY] for dance in dances])
+    def _coverage(self, joint: str, dances: Sequence[Array]) -> dict[str, float]:
+        recorded, together = self._recorded.motion, np.concatenate([dance[::EVERY] for dance in dances])
         reference = self.measurements[0].reference
         far = [reference.nearest(dance[::EVERY]).mean() for dance in dances]
         own = [
             one.phrase_far[::2][: len(dance[::EVERY])].mean()
             for one, dance in zip(self.measurements, dances, strict=True)
         ]
-        degrees, memorisation = repertoire.nearest_moments(dances, EVERY, self.joints.index(joint))
+        degrees, memorisation = recorded.nearest_moments(dances, EVERY, self.joints.index(joint))
         return {
             "plausibility": _mean([a / b if b > 0 else float("nan") for a, b in zip(far, own, strict=True)]),
-            "coverage": repertoire.coverage(together),
-            "recall": repertoire.recall(together),
+            "coverage": recorded.coverage(together),
+            "recall": recorded.recall(together),
             "nearest_moment": degrees,
             "memorisation": memorisation,
         }

@@ -115,26 +115,18 @@ def _reservations(seen: Seen) -> list[tuple[str, str]]:
         found.append(("foreign", "it does nothing that the dancer did with that joint"))
     if _above(seen.roughness, ROUGHNESS):
         found.append(("trembles", f"it trembles (roughness {seen.roughness:.1f}, the dancer's is 1)"))
-    speeds = _known(seen.energy)
-    calm = {name: value for name, value in speeds.items() if value < CALM}
-    if calm:
-        worst = min(calm, key=lambda name: calm[name])
-        found.append(("average", f"{_stands(worst)} ({calm[worst]:.2f} of the dancer's speed)"))
-    narrow = {name: value for name, value in _known(seen.spread).items() if value < NARROW}
-    if narrow:
-        worst = min(narrow, key=lambda name: narrow[name])
-        named = "it" if worst == "whole" else LIMBS[worst]
-        ends = "s" if worst in ("whole", *SINGULAR) else ""
-        found.append(
-            ("average", f"{named} stay{ends} near the average pose ({narrow[worst]:.2f} of the spread)")
-        )
-    quick = {name: value for name, value in speeds.items() if value > RESTLESS}
-    if quick:
-        worst = max(quick, key=lambda name: quick[name])
-        named, verb = (
-            ("it", "is") if worst == "whole" else (LIMBS[worst], "is" if worst in SINGULAR else "are")
-        )
-        found.append(("trembles", f"{named} {verb} restless ({quick[worst]:.2f} of the dancer's speed)"))
+    speeds, spread = _known(seen.energy), _known(seen.spread)
+    slowest, narrowest = (min(each, key=each.__getitem__, default="") for each in (speeds, spread))
+    quickest = max(speeds, key=speeds.__getitem__, default="")
+    if slowest and speeds[slowest] < CALM:
+        does = "comes nearly to rest" if slowest == "whole" else _of(slowest, "nearly stands", "nearly stand")
+        found.append(("average", f"{_limb(slowest)} {does} ({speeds[slowest]:.2f} of the dancer's speed)"))
+    if narrowest and spread[narrowest] < NARROW:
+        stays = f"{_limb(narrowest)} {_of(narrowest, 'stays', 'stay')} near the average pose"
+        found.append(("average", f"{stays} ({spread[narrowest]:.2f} of the spread)"))
+    if quickest and speeds[quickest] > RESTLESS:
+        restless = f"{_limb(quickest)} {_of(quickest, 'is', 'are')} restless"
+        found.append(("trembles", f"{restless} ({speeds[quickest]:.2f} of the dancer's speed)"))
     if _above(seen.free_energy, RESTLESS):
         found.append(("trembles", f"without a hand it is restless ({seen.free_energy:.2f} of the speed)"))
     if _above(seen.off_hand, OFF_HAND):
@@ -191,10 +183,13 @@ def _known(figures: Mapping[str, float | None]) -> dict[str, float]:
     return limbs or {name: value for name, value in known.items() if name == "whole"}
 
 
-def _stands(limb: str) -> str:
-    if limb == "whole":
-        return "it comes nearly to rest"
-    return f"{LIMBS[limb]} nearly stand{'s' if limb in SINGULAR else ''}"
+def _limb(name: str) -> str:
+    return LIMBS.get(name, "it")
+
+
+def _of(limb: str, one: str, several: str) -> str:
+    """The verb that goes with a limb."""
+    return one if limb in ("whole", *SINGULAR) else several
 
 
 def _above(value: float | None, limit: float) -> bool:

@@ -11,6 +11,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.evaluation.coupling import coupling
+from appliance.studio.evaluation.coverage import RecordedMotion
 from appliance.studio.evaluation.matching import MotionMatching
 from appliance.studio.evaluation.motion_features import (
     Clips,
@@ -20,7 +21,6 @@ from appliance.studio.evaluation.motion_features import (
     kinetic_features,
 )
 from appliance.studio.evaluation.nearest import without_heading
-from appliance.studio.evaluation.repertoire import Repertoire
 
 COUPLED_TICKS, COUPLED_LEAST, COUPLED_MOST = 1200, 400, 16  # stretches whose coupling is measured
 
@@ -49,8 +49,8 @@ class Recorded:
             return None
 
     @cached_property
-    def repertoire(self) -> Repertoire:
-        return Repertoire(self._stretches)
+    def motion(self) -> RecordedMotion:
+        return RecordedMotion(self._stretches)
 
     @cached_property
     def clips(self) -> tuple[Clips, Clips | None]:

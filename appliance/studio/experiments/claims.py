@@ -7,8 +7,9 @@ how much it does. Where a null network passes too, a verdict says nothing of wha
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from appliance.studio.experiments import claim_figures as measures
 from appliance.studio.experiments.claim_figures import OWN_POSE, PAUSE_SHARE
@@ -109,7 +110,7 @@ def claims(trials: Sequence[Trial]) -> list[Claim]:
             "degrees from the excerpt after one pass; the same as a share of the way from the excerpt to the "
             "dancer's mean pose",
             (Bound("degrees", "degrees", 3.0), Bound("way_to_mean", "share of the way to the mean", 0.2)),
-            {one.excerpt.name: measures.faithfulness(one, 1) for one in trials},
+            _each(partial(measures.faithfulness, passes=1), trials),
             trials,
             rightly=RIGHTLY,
         ),
@@ -118,7 +119,7 @@ def claims(trials: Sequence[Trial]) -> list[Claim]:
             "A static excerpt stays as it is, at ten passes as well.",
             "the same after ten passes; the other excerpts for comparison",
             (Bound("degrees", "degrees", 5.0), Bound("way_to_mean", "share of the way to the mean", 0.33)),
-            {one.excerpt.name: measures.faithfulness(one, 10) for one in trials},
+            _each(partial(measures.faithfulness, passes=10), trials),
             still,
             rightly=RIGHTLY,
         ),
@@ -138,7 +139,7 @@ def claims(trials: Sequence[Trial]) -> list[Claim]:
                 Bound("jumps", "jumps", 0.5, at_least=True),
                 Bound("own_poses", "own poses", 0.5, at_least=True),
             ),
-            {one.excerpt.name: measures.intermittency(one) for one in moving},
+            _each(measures.intermittency, moving),
             moving,
         ),
         _claim(
@@ -151,7 +152,7 @@ def claims(trials: Sequence[Trial]) -> list[Claim]:
                 Bound("10/10", "at 10/10", 3.0),
                 Bound("10/5", "at 10/5", 6.0, at_least=True),
             ),
-            {one.excerpt.name: measures.holding(one) for one in trials},
+            _each(measures.holding, trials),
             trials,
         ),
         _claim(
@@ -167,7 +168,7 @@ def claims(trials: Sequence[Trial]) -> list[Claim]:
                 Bound("growth", "growth", 3.0, at_least=True),
                 Bound("correlation", "correlation", 0.3, at_least=True),
             ),
-            {one.excerpt.name: measures.influence(one) for one in trials},
+            _each(measures.influence, trials),
             trials,
         ),
         _claim(
@@ -181,7 +182,7 @@ def claims(trials: Sequence[Trial]) -> list[Claim]:
                 Bound("faster", "faster", 1.5, at_least=True),
                 Bound("larger", "larger", 1.1, at_least=True),
             ),
-            {one.excerpt.name: measures.pace(one) for one in trials},
+            _each(measures.pace, trials),
             trials,
         ),
         _claim(
@@ -196,6 +197,13 @@ def claims(trials: Sequence[Trial]) -> list[Claim]:
             trials,
         ),
     ]
+
+
+def _each(
+    measure: Callable[[Trial], Mapping[str, float]], trials: Sequence[Trial]
+) -> dict[str, Mapping[str, float]]:
+    """Figures by excerpt."""
+    return {one.excerpt.name: measure(one) for one in trials}
 
 
 def _claim(

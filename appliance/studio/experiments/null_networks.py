@@ -7,6 +7,7 @@ one where all are interactive.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,7 +25,7 @@ LATENT = 32  # of the untrained network
 SPREAD_DEGREES = 20.0  # of its output about the mean pose: as far as a dancer's joints go
 
 
-class NullNetwork:
+class NullNetwork(ABC):
     """A coder of windows without a network. joints: names; mean (M, 4): the dancer's mean pose, heading
     removed.
     """
@@ -60,9 +61,9 @@ class NullNetwork:
                 level = self.code(level)
         return _turned(level, facing).astype(np.float32), np.zeros((len(windows), 1), np.float32)
 
+    @abstractmethod
     def code(self, level: Poses) -> Poses:
         """One pass: windows (B, 8, M, 4) that face ahead -> the same, as a new array."""
-        raise NotImplementedError
 
     def hold(self, level: Poses, targets: Poses, weights: Poses) -> Poses:
         """Held joints (B, 8, H, 4) overwritten by their targets with weights (H,)."""

@@ -22,7 +22,7 @@ APART_TICKS = 100  # moments of one stretch that count as different ones
 ROWS = 64
 
 
-class Repertoire:
+class RecordedMotion:
     """The recorded stretches (T, M, 4) of a dancer: poses for coverage, half seconds for memorisation."""
 
     def __init__(self, stretches: Sequence[Array]) -> None:
