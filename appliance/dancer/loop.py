@@ -61,8 +61,11 @@ class Loop:
     After frame length - 1 the motion goes on at frame `fade`, placed by `step` (where the excerpt's end
     stands from its start; nothing for a closed loop). Frame `length` is frame `fade` seen from the end.
     poses (length + 1, J, 4) float32; track (length + 1, C) float32: the root's position in metres, then
-    columns that are only carried along; start_s: where in the phrase the excerpt begins.
+    columns that are only carried along; start_s: where in the phrase the excerpt begins. turns_home: entered
+    at another heading, it turns back to its own, which faces the audience.
     """
+
+    turns_home = False
 
     def __init__(self, poses: FloatArray, track: FloatArray, fade: int, start_s: float = 0.0) -> None:
         """poses (N, J, 4) without sign jumps, track (N, C); they are copied."""

@@ -11,6 +11,10 @@ from appliance.dancer.loop import Loop, Placement
 from appliance.dancer.phrase import AT, FPS, X, Z
 from appliance.dancer.slerp import FloatArray, Slerp
 
+TURN_HOME = math.radians(30.0) / FPS  # a tick, at most: half a turn in six seconds, in which feet step along
+_HOME_S = 1.0  # time constant of the end of that turn
+_AT_HOME = math.radians(0.1)
+
 
 @dataclass
 class ReadingHead:
@@ -43,6 +47,17 @@ class ReadingHead:
             self.placement = self.placement.after(loop.step.inverse)
         elif self.position < 0:
             self.position = 0.0
+        if loop.turns_home and self.placement.yaw:
+            self._turn_home()
+
+    def _turn_home(self) -> None:
+        """A tick of the turn, about where the root stands, that ends with the loop's own heading."""
+        x, z, _ = self.standing
+        missing = -math.remainder(self.placement.yaw, math.tau)
+        turn = max(-TURN_HOME, min(TURN_HOME, missing / (_HOME_S * FPS)))
+        if abs(missing) < _AT_HOME:
+            turn = -self.placement.yaw
+        self.placement = Placement.bringing((x, z, 0.0), (x, z, turn)).after(self.placement)
 
 
 class Reader:

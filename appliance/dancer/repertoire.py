@@ -15,7 +15,7 @@ from appliance.dancer.phrase import FPS, NUMBER, SHARED, Phrase, PhraseError
 from appliance.dancer.reading_head import ReadingHead
 from appliance.pose.recording import Recording
 from appliance.show.config_error import did_you_mean
-from appliance.show.sources import GRANULAR, IMPROVISE, MAIN
+from appliance.show.sources import GRANULAR, IMPROVISE, MAIN, PATH
 
 FIRST_MADE = 1000  # numbers of loops that were made ahead; phrases have lower ones
 _MADE_KEPT = 6  # of the newest: a crossfade and the window know four at most
@@ -35,7 +35,7 @@ class Made(NamedTuple):
 
     def begin_after(self, here: Loop, position: float) -> float:
         """The frame with which it begins after this frame of a loop: in step, where it goes on from there."""
-        first = -self.loop.start_s * FPS
+        first = max(0.0, -self.loop.start_s * FPS)
         if self.after is None or round(float(here.track[0, NUMBER])) != self.after[0]:
             return first
         ahead = (here.start_s - self.after[1]) * FPS + position
@@ -87,6 +87,7 @@ class Repertoire:
             own = kind.get("points") or kind["source"] in (GRANULAR, IMPROVISE)
             phrase = "" if own else str(kind["phrase"])
             after = (int(values["after"]), float(values["from_s"])) if "after" in values else None
+            loop.turns_home = kind["source"] in (GRANULAR, PATH)
             name, number = str(values.get("name") or values["source"]), int(values["number"])
         except (AttributeError, LookupError, TypeError) as error:
             raise ValueError(f"It was made by no sound recipe ({error}).") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +10,14 @@ import numpy as np
 import pytest
 
 from appliance.dancer.grounding import survey
-from appliance.dancer.loop import Loop, Placement
+from appliance.dancer.loop import Loop, Placement, yaws
 from appliance.dancer.material.cyclic import Cycle, bridged, even_starts, hann_mean
 from appliance.dancer.material.maker import Maker
 from appliance.dancer.material.material_file import Material, read_material, recipe_text, write_material
 from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import Phrase
+from appliance.dancer.reading_head import TURN_HOME
 from appliance.pose import quaternion
 from tests.bundles import FIGURE, MOVING, swaying_phrase
 from tests.sources import write_motion_network
@@ -187,3 +189,41 @@ def test_playback_goes_over_to_what_was_made_in_step_and_back(maker: Maker, phra
     assert motion.phrase == "main" and motion.made is None
     with pytest.raises(ValueError, match="another floor"):
         motion.enter(recipe_text(VARY), Loop.made(phrase.poses, phrase.track[:, :5], Placement(), 0.0), 0.2)
+
+
+@pytest.mark.parametrize("heading", [math.pi, -2.5, 1.0])
+@pytest.mark.parametrize(
+    "recipe", [WALK, EXCERPTS, PATH, PATH | {"points": [0.2, 0.8]}, {"source": "kept", "of": WALK}]
+)
+def test_what_takes_over_with_the_back_to_the_house_turns_to_it(
+    maker: Maker, recipe: dict[str, Any], heading: float
+) -> None:
+    recording = swaying_phrase()
+    motion = Playback(recording, floor=survey(recording))
+    motion.start_at("main", motion.excerpt_s, 0.0, 1.0, (0.4, -0.3, heading))
+    recipe = {"number": 1002, "name": "x", "seed": 1, **recipe}
+    loop = maker.make(recipe)
+    motion.enter(recipe_text(recipe), loop, 0.5)
+    for _ in range(40):
+        motion.advance()
+    turned, stood = [], []
+    for _ in range(600):
+        x, z, facing = motion.standing
+        turned.append(facing)
+        stood.append((x, z))
+        motion.advance()
+    own = max(float(np.abs(np.diff(np.unwrap(yaws(loop.poses[:, 0].astype(float))))).max()), 1e-3)
+    assert np.abs(np.diff(np.unwrap(turned))).max() < TURN_HOME + 1.5 * own
+    end = np.exp(1j * np.array(turned[-250:])).mean()
+    assert abs(np.angle(end)) < math.radians(15)
+    assert np.ptp(stood, axis=0).max() < 0.3
+
+
+def test_a_variation_keeps_the_heading_of_its_phrase(maker: Maker) -> None:
+    recording = swaying_phrase()
+    motion = Playback(recording, floor=survey(recording))
+    motion.start_at("main", motion.excerpt_s, 0.0, 1.0, (0.0, 0.0, 2.0))
+    motion.enter(recipe_text(VARY), maker.make(VARY | {"sigma": 0.0}), 0.5)
+    for _ in range(500):
+        motion.advance()
+    assert motion.standing[2] == pytest.approx(2.0, abs=0.3)
