@@ -63,6 +63,7 @@ class Lights:
         self._foreign: int | None = None
         self._was_lost = True
         self._troubles: dict[str, str] = {}
+        self._remarks: set[str] = set()
 
     def log_setup(self) -> None:
         """Log which fixtures are lit by which wires, and what stays dark."""
@@ -146,8 +147,12 @@ class Lights:
             if trouble != self._troubles.get(name, ""):
                 self._say(trouble or f"{name} is well again.")
             self._troubles[name] = trouble
-        troubles = " ".join(filter(None, self._troubles.values()))
-        self._fallbacks.set(DMX_AWAY.name, troubles)
+            if (remark := universe.wire.remark) and remark not in self._remarks:
+                self._remarks.add(remark)
+                self._say(remark)
+        self._fallbacks.parts = self._troubles
+        self._fallbacks.concern(DMX_AWAY.name, [name for name, trouble in self._troubles.items() if trouble])
+        self._fallbacks.set(DMX_AWAY.name, " ".join(filter(None, self._troubles.values())))
 
 
 def rig_problems(show: Show, box: BoxConfig) -> list[Problem]:

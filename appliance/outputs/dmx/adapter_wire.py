@@ -68,6 +68,11 @@ class AdapterWire:
             "It is tried again every 2 seconds: plug it in, or check device and serial in the box file."
         )
 
+    @property
+    def remark(self) -> str:
+        """Nothing: a cable works or does not."""
+        return ""
+
     def send_universe(self, levels: bytes | bytearray, now: float) -> None:
         """Hand one universe to the thread; never waits for the device."""
         with self._changed:

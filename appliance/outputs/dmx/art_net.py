@@ -8,6 +8,7 @@ from appliance.outputs.datagram_sender import DatagramPath
 from appliance.outputs.dmx.network_wire import NetworkWire
 from appliance.show.dmx import DmxConfig
 
+PORT = 6454  # at both ends: some nodes take nothing from another one
 _ID = b"Art-Net\0"
 _OP_DMX = 0x5000
 _PROTOCOL_VERSION = 14
@@ -44,7 +45,7 @@ class ArtNetWire(NetworkWire):
         host = config.host or "127.0.0.1"
         super().__init__(
             f"Art-Net {host}, universe {config.number_on_wire}",
-            DatagramPath(host, config.udp_port, config.interface, config.broadcast),
+            DatagramPath(host, config.udp_port, config.interface, config.broadcast, source_port=PORT),
             "Check the node's power, its network cable, and its address in the box file.",
         )
         self._packets = ArtDmx(config.number_on_wire, config.channels)

@@ -18,3 +18,17 @@ class NetworkWire(DatagramSender):
         if self.is_open or not self.last_error:
             return None
         return f"{self.name}: {self.last_error}. Its lights do not follow; the show goes on. {self._cure}"
+
+    @property
+    def remark(self) -> str:
+        """That it leaves from another port than its protocol asks for; "" where all is as it should be."""
+        wanted, own = self._path.source_port, self._socket
+        if wanted is None or own is None:
+            return ""
+        host, port = own.getsockname()
+        if port == wanted or host == self._path.host:
+            return ""
+        return (
+            f"{self.name}: another program on this machine has the UDP port {wanted}, so it leaves from "
+            f"{port}. Most nodes take that; for one that stays dark, end the other program."
+        )

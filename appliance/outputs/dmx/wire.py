@@ -22,6 +22,10 @@ class Wire(Protocol):
     def trouble(self) -> str | None:
         """What happened, what the audience sees, what to do; None while all is well."""
 
+    @property
+    def remark(self) -> str:
+        """What else is worth a word while the wire works; "" for nothing."""
+
     def send_universe(self, levels: bytes | bytearray, now: float) -> None:
         """Send one universe, 512 levels; `now` in monotonic seconds. The levels are copied."""
 

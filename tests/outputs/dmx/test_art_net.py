@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import socket
+
 import pytest
 
-from appliance.outputs.dmx.art_net import ArtDmx, ArtNetWire
+from appliance.outputs.dmx.art_net import PORT, ArtDmx, ArtNetWire
 from hw_sim.dmx.artnet import ArtNetReceiver, MalformedArtNetError, decode
 from hw_sim.peers import free_ports
 from tests.outputs.dmx.conftest import config, universe
+from tests.system.namespace import Cable, Namespace, why_not
+
+WHY_NOT = why_not()
 
 
 def test_a_universe_arrives_as_it_was_sent() -> None:
@@ -88,6 +93,64 @@ def test_a_node_that_goes_and_comes_back() -> None:
     assert wire.is_open
     assert wire.trouble is None
     wire.close()
+
+
+@pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))
+@pytest.mark.parametrize("is_broadcast", [False, True])
+def test_it_leaves_from_the_port_of_art_net_and_several_universes_share_it(is_broadcast: bool) -> None:
+    """Some nodes take nothing from another port."""
+    with Namespace("box") as box, Namespace("node") as node:
+        Cable(box, "10.77.0.1/24", node, "10.77.0.2/24")
+        with node.entered():
+            receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        with receiver:
+            receiver.bind(("", PORT))
+            receiver.settimeout(10.0)
+            host = {"host": "10.77.0.255", "broadcast": True} if is_broadcast else {"host": "10.77.0.2"}
+            with box.entered():
+                wires = [ArtNetWire(config("artnet", universe=number, **host)) for number in (1, 2)]
+                for wire in wires:
+                    wire.send_universe(universe(), 0.0)
+            senders = {
+                decode(packet).port_address: sender for packet, sender in map(receiver.recvfrom, (600,) * 2)
+            }
+            assert senders == dict.fromkeys((1, 2), ("10.77.0.1", PORT))
+            assert [wire.remark for wire in wires] == ["", ""]
+        for wire in wires:
+            wire.close()
+
+
+@pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))
+def test_where_another_program_has_the_port_it_leaves_from_another_and_says_so() -> None:
+    with Namespace("box") as box, Namespace("node") as node:
+        Cable(box, "10.77.0.1/24", node, "10.77.0.2/24")
+        with node.entered():
+            receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        with box.entered():
+            other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        with receiver, other:
+            receiver.bind(("", PORT))
+            receiver.settimeout(10.0)
+            other.bind(("", PORT))
+            wire = ArtNetWire(config("artnet", host="10.77.0.2"))
+            assert wire.remark == ""
+            with box.entered():
+                wire.send_universe(universe(), 0.0)
+            packet, (_, port) = receiver.recvfrom(600)
+            assert decode(packet).levels == universe() and port != PORT
+            assert "another program on this machine has the UDP port 6454" in wire.remark
+            assert wire.trouble is None
+            wire.close()
+
+
+def test_on_this_machine_it_leaves_the_port_to_the_program_that_listens() -> None:
+    with ArtNetReceiver() as node:
+        wire = ArtNetWire(config("artnet", port=node.port))
+        wire.send_universe(universe(), 0.0)
+        assert node.poll(1.0)[0][1].levels == universe()
+        assert wire._socket is not None and wire._socket.getsockname()[1] != PORT
+        assert wire.remark == ""
+        wire.close()
 
 
 def test_an_interface_that_this_machine_does_not_have() -> None:
