@@ -23,6 +23,16 @@ class Unit(StrEnum):
     mm = "mm"
 
 
+Animation = Annotated[
+    str | None,
+    typer.Option(help="Which animation of a .glb, by name or number from 0. Default: the longest."),
+]
+Skin = Annotated[
+    str | None,
+    typer.Option(help="Which skin of a .glb, by name or number from 0. Default: all of one figure."),
+]
+
+
 class Up(StrEnum):
     """The vertical axis."""
 
@@ -35,22 +45,25 @@ def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A recording: .bvh, .glb, .npz or .csv.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The file; its ending says the format.")],
     fps: Annotated[float | None, typer.Option(min=1.0, max=1000.0, help="Another rate.")] = None,
+    animation: Animation = None,
+    skin: Skin = None,
     *,
     reading: ReadingOptions,
 ) -> None:
     """Turn a recording into another format: .bvh, .glb (Blender, three.js, TouchDesigner), .npz, .csv.
 
     The dance stays the same: the same joints, the same rotations, metres (BVH: centimetres); files in other
-    units or with Z up come out in metres, Y up, and a message says so. A .glb has a
-    body around the skeleton, so that it can be looked at as it is.
+    units, with Z up or with the dancer's back to the audience come out in metres, Y up and to the front, and
+    a message says so. A .glb has a body around the skeleton, so that it can be looked at as it is.
     """
-    from appliance.exchange.formats import read_as_told, require_known_ending, write_recording
+    from appliance.exchange.formats import read_as_told, require_known_ending
+    from appliance.exchange.glb_reading import Choice
 
     require_known_ending(out)
-    recording = _told(source, *read_as_told(source, reading))
+    recording = _told(source, *read_as_told(source, reading, Choice(skin, animation)))
     if fps is not None:
         recording = recording.resampled(fps)
-    write_recording(out, recording)
+    _write(out, recording)
     joints, rate = len(recording.skeleton), recording.fps
     print(f"{out}: {recording.seconds:.1f} s, {len(recording)} poses at {rate:g} a second, {joints} joints.")
 
@@ -63,6 +76,8 @@ def retarget(
         typer.Option(callback=named_show, help="The other skeleton: a recording of it, or a show folder."),
     ],
     out: Annotated[Path, typer.Option(help="The file; its ending says the format.")],
+    animation: Animation = None,
+    skin: Skin = None,
     *,
     reading: ReadingOptions,
 ) -> None:
@@ -72,13 +87,14 @@ def retarget(
     over the floor follows the legs' length, and the soles are on the floor.
     """
     from appliance.exchange.exchange_error import ExchangeError
-    from appliance.exchange.formats import read_as_told, require_known_ending, write_recording
+    from appliance.exchange.formats import read_as_told, require_known_ending
+    from appliance.exchange.glb_reading import Choice
     from appliance.exchange.retargeting import retarget as put_on
     from appliance.pose.body_facts import with_stance
     from appliance.pose.bvh import read_bvh
 
     require_known_ending(out)
-    dance = _told(phrase, *read_as_told(phrase, reading))
+    dance = _told(phrase, *read_as_told(phrase, reading, Choice(skin, animation)))
     if to.is_dir():  # a show's skeleton is in the stage's frame already
         other = with_stance(read_bvh(to / "skeleton.bvh"))
     else:
@@ -89,10 +105,18 @@ def retarget(
         raise ExchangeError(
             out, f"{error} Nothing was written. Rename joints; see bunraku inspect."
         ) from error
-    write_recording(out, found)
+    _write(out, found)
     print(
         f"{out}: {found.seconds:.1f} s of {phrase.name} with the {len(found.skeleton)} joints of {to.name}."
     )
+
+
+def _write(out: Path, recording: Recording) -> None:
+    """Write it; joints' names that a file cannot carry are said."""
+    from appliance.exchange.formats import write_recording
+
+    if changed := write_recording(out, recording):
+        print(f"{out.name}: joints' names changed, as no file can carry them: {changed}.", file=sys.stderr)
 
 
 def _told(file: Path, recording: Recording, guesses: list[Guess]) -> Recording:
@@ -111,7 +135,10 @@ def import_(
     like: Annotated[
         Path | None, typer.Option(help="BVH with the skeleton that the points belong to, by their names.")
     ] = None,
-    fps: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Frames a second of the points.")] = 50.0,
+    fps: Annotated[
+        float | None,
+        typer.Option(min=1.0, max=1000.0, help="Frames a second. Default: by a column of times, else 50."),
+    ] = None,
     unit: Annotated[
         Unit | None, typer.Option(help="Unit of the points. Default: guessed from the size.")
     ] = None,
@@ -126,18 +153,18 @@ def import_(
     """Turn positions of points or joints into a recording: a skeleton is fitted to them and follows them.
 
     A bone is as long as the usual distance between its points. The hierarchy comes from the names (LeftArm,
-    l_wrist, RightKnee ...), from parents in --names, or from --like. A missing point is NaN or an empty
-    field. At the end it says how far the figure is from the points, in centimetres.
+    l_wrist, RightKnee ...), from parents in --names, or from --like. A missing point is NaN, an empty field,
+    or 0, 0, 0 for a while. At the end it says how far the figure is from the points, in centimetres.
     """
     from appliance.cli.pictures import RecordedDance, draw_dance
-    from appliance.exchange.formats import require_known_ending, write_recording
+    from appliance.exchange.formats import require_known_ending
     from appliance.exchange.importing import PointsOptions, import_points
     from appliance.stage.stage_error import StageError
 
     require_known_ending(out)
     options = PointsOptions(names, like, fps, unit.value if unit else None, up.value, gap)
     imported = import_points(points, options, print)
-    write_recording(out, imported.recording)
+    _write(out, imported.recording)
     for line in imported.report():
         print(line)
     print(f"{out}: {imported.recording.seconds:.1f} s, {len(imported.recording.skeleton)} joints.")

@@ -11,6 +11,7 @@ import numpy as np
 
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.pose import quaternion
+from appliance.pose.kept_rows import KeptRows
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
@@ -65,11 +66,13 @@ def checked_recording(
     roots: Array,
     fps: float,
     translations: Array | None = None,
-    first_line: int = 0,
+    rows: KeptRows | None = None,
+    notes: Sequence[str] = (),
 ) -> Recording:
-    """A recording of these arrays. first_line: the line of the first frame, in a text.
+    """A recording of these arrays. rows: of the file, where some are lost already; notes: what else to say.
 
-    Raises ExchangeError, with the frame, where shapes differ or values are no rotations.
+    Frames whose values are no rotations or places are lost, and the notes say which. Raises ExchangeError
+    where shapes differ or no frame is left.
     """
     joints = len(skeleton)
     if poses.ndim != 3 or poses.shape[1:] != (joints, 4) or roots.shape != (len(poses), 3):
@@ -84,6 +87,8 @@ def checked_recording(
         raise ExchangeError(path, "There are no frames. Export the recording again.")
     if not (math.isfinite(fps) and 0.0 < fps <= 10_000.0):
         raise ExchangeError(path, f"{fps:g} frames a second is no rate.")
+    count = range(len(poses))
+    rows = rows or KeptRows("frame", [*count], [*count])
     lengths = np.linalg.norm(poses, axis=-1)
     sound = np.isfinite(roots).all(axis=1) & (np.abs(lengths - 1.0) < UNIT_TOLERANCE).all(axis=1)
     if translations is not None:
@@ -92,14 +97,16 @@ def checked_recording(
         frame = int(np.argmin(sound))
         wrong = np.flatnonzero(~(np.abs(lengths[frame] - 1.0) < UNIT_TOLERANCE))
         what = f"the rotation of '{skeleton.names[wrong[0]]}' is no unit quaternion" if len(wrong) else ""
-        raise ExchangeError(
-            path,
-            f"Frame {frame}: {what or 'a position is not finite'}. Rotations are w, x, y, z of length 1.",
-            first_line + frame if first_line else 0,
-        )
-    turned = quaternion.continuous(quaternion.normalize(poses.astype(np.float64)))
-    moved = None if translations is None else translations.astype(np.float64)
-    return Recording(skeleton, turned, roots.astype(np.float64), fps, moved)
+        why = f"{what or 'a position is not finite'}. Rotations are w, x, y, z of length 1."
+        if not sound.any():
+            line = rows.places[frame] if rows.unit == "line" else 0
+            raise ExchangeError(path, f"Frame {rows.numbers[frame]}: {why}", line)
+        rows = rows.without(np.flatnonzero(~sound).tolist(), what or "a position is not finite")
+    moved = None if translations is None else translations[sound].astype(np.float64)
+    turned = quaternion.continuous(quaternion.normalize(poses[sound].astype(np.float64)))
+    said = (*notes, *rows.notes())
+    kept = Recording(skeleton, turned, roots[sound].astype(np.float64), fps, moved, said)
+    return kept.spread(np.array(rows.numbers))
 
 
 def facts_of(skeleton: Skeleton, fps: float) -> dict[str, Any]:

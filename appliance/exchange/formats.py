@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.exchange.glb_reading import read_glb
+from appliance.exchange.glb_reading import WHOLE, Choice, read_glb
 from appliance.exchange.glb_writing import write_glb
 from appliance.exchange.tables import read_csv, read_npz, write_csv, write_npz
 from appliance.pose.bvh import write_bvh
-from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, read_upright
+from appliance.pose.plain_names import changed_names, plain_names
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, brought_in, read_upright
 from appliance.pose.recording import Recording
 from appliance.pose.stage_frame import Guess
 
@@ -19,29 +21,43 @@ _WRITERS: dict[str, Callable[[Path, Recording], None]] = {
     ".npz": write_npz,
     ".csv": write_csv,
 }
-_READERS: dict[str, Callable[[Path], Recording]] = {".glb": read_glb, ".npz": read_npz, ".csv": read_csv}
+_METRE = 1.0  # of all formats but BVH
 ENDINGS = (".bvh", *_WRITERS)
 
 
-def read_as_told(path: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> tuple[Recording, list[Guess]]:
-    """All of a recording, and what was changed. reading: of a BVH file; the others are in metres, Y up.
+def read_as_told(
+    path: Path, reading: ReadingOptions = AS_THE_FILES_SAY, choice: Choice = WHOLE
+) -> tuple[Recording, list[Guess]]:
+    """All of a recording in the stage's frame, and what was lost or changed.
 
-    Raises ExchangeError or BvhError, which name the file.
+    choice: of a file with several skins or animations. Raises ExchangeError or BvhError, which name the file.
     """
     ending = _ending(path)
+    if choice != WHOLE and ending != ".glb":
+        raise ExchangeError(path, "Only a .glb has skins and animations: leave --skin and --animation out.")
+    true_fps = reading.fps_of(path.stem)
     try:
         if ending == ".bvh":
             return read_upright(path, reading)
-        return _READERS[ending](path), []
+        if ending == ".glb":
+            recording = read_glb(path, true_fps, choice)
+        else:
+            recording = (read_npz if ending == ".npz" else read_csv)(path, true_fps)
     except OSError as error:
         raise ExchangeError(path, f"The file cannot be read ({error.strerror or error}).") from error
+    return brought_in(path, recording, reading.reading_of(path.stem), _METRE)
 
 
-def write_recording(path: Path, recording: Recording) -> None:
-    """Write a recording whole, or leave what was there. Raises ExchangeError."""
+def write_recording(path: Path, recording: Recording) -> str:
+    """Write a recording whole, or leave what was there; joints' names that it changed, in words.
+
+    Raises ExchangeError.
+    """
     ending = _ending(path)
     if not len(recording):
         raise ExchangeError(path, "The recording has no frames: nothing was written.")
+    names = recording.skeleton.names
+    recording = replace(recording, skeleton=replace(recording.skeleton, names=plain_names(names)))
     beside = path.with_name(f".{path.stem}.part{ending}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -57,6 +73,7 @@ def write_recording(path: Path, recording: Recording) -> None:
         raise ExchangeError(
             path, f"The file cannot be written ({error.strerror or error}). Name another place."
         ) from error
+    return changed_names(names)
 
 
 def require_known_ending(path: Path) -> None:

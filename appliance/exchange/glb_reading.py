@@ -1,7 +1,8 @@
-"""Binary glTF as a recording: the joints of its skin, and its first animation at an even rate."""
+"""Binary glTF as a recording: the joints of its skins, and one of its animations at an even rate."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,22 +14,37 @@ from appliance.exchange.figure_facts import MAX_VALUES, checked_recording, check
 from appliance.exchange.glb_file import GlbFile
 from appliance.pose import quaternion
 from appliance.pose.bvh import STRETCH_M
+from appliance.pose.counted import counted
+from appliance.pose.plain_names import changed_names, plain_names
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 
 _DAMAGED = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError)
 _STILL_SCALE = 1e-3  # a joint that is scaled by less is not scaled
+_PROP = 0.5  # of the joints of the largest skeleton: a smaller one is no second dancer
+_SHOWN = 8
 _WHOLE_RATE = 1e-5  # a rate this near to a whole number is that number: times are stored in single precision
 
 
-def read_glb(path: Path) -> Recording:
-    """The dance of the first skin in the first animation; nodes above the root joint move the root.
+class Choice(NamedTuple):
+    """Which skin and which animation, by name or number; None: the whole figure, the longest animation."""
 
-    Without a skin the animated nodes are the joints. Raises ExchangeError or OSError.
+    skin: str | None = None
+    animation: str | None = None
+
+
+WHOLE = Choice()
+
+
+def read_glb(path: Path, true_fps: float | None = None, choice: Choice = WHOLE) -> Recording:
+    """The dance of all skins of one skeleton; nodes above the root joint move the root.
+
+    true_fps: in place of the file's rate. Without a skin the animated nodes are the joints. The recording's
+    notes say what was left out. Raises ExchangeError or OSError.
     """
     file = GlbFile(path)
     try:
-        return _Scene(file).recording()
+        return _Scene(file, choice).recording(true_fps)
     except ExchangeError:
         raise
     except _DAMAGED as error:
@@ -43,20 +59,29 @@ class _Track(NamedTuple):
     interpolation: str
 
 
-class _Scene:
-    """The nodes of a file, their parents, and what the animation does to them."""
+_Tracks = dict[tuple[int, str], _Track]
 
-    def __init__(self, file: GlbFile) -> None:
+
+class _Scene:
+    """The nodes of a file, their parents, and what the chosen animation does to the chosen joints."""
+
+    def __init__(self, file: GlbFile, choice: Choice) -> None:
         self._file = file
-        self._nodes: list[dict[str, Any]] = file.document.get("nodes", [])
+        self._notes: list[str] = []
+        self._nodes: list[dict[str, Any]] = [_with_parts(node) for node in file.document.get("nodes", [])]
         self._parent = [-1] * len(self._nodes)
         for number, node in enumerate(self._nodes):
             for child in node.get("children", []):
                 self._parent[child] = number
-        self._tracks = self._read_tracks()
-        self._joints = self._find_joints()
+        skins = file.document.get("skins", [])
+        if choice.skin is not None and not skins:
+            raise ExchangeError(file.path, "There is no skin in it: leave --skin out.")
+        joints = self._skinned(skins, choice.skin) if skins else set()
+        above = {node for joint in joints for node in self._chain(joint)}
+        self._tracks = self._animation(above, choice.animation)
+        self._joints = self._ordered(joints or {node for node, _ in self._tracks}, bool(skins))
 
-    def recording(self) -> Recording:
+    def recording(self, true_fps: float | None) -> Recording:
         """The dance."""
         path, joints = self._file.path, self._joints
         times, fps = self._times()
@@ -64,34 +89,150 @@ class _Scene:
             raise ExchangeError(path, f"It holds more than {MAX_VALUES} numbers. Cut the recording.")
         rows = {joint: row for row, joint in enumerate(joints)}
         parents = [rows.get(self._parent[joint], -1) for joint in joints]
-        names = [str(self._nodes[joint].get("name", f"joint{row}")) for row, joint in enumerate(joints)]
-        poses = np.stack([self._rotation(joint, times) for joint in joints], axis=1)
-        places = np.stack([self._vector("translation", joint, times) for joint in joints], axis=1)
-        scale = self._carry(poses, places, times)
-        offsets = scale * places[0]
-        ends = [
-            (rows[joint], (scale * np.array(self._nodes[child].get("translation", (0, 0, 0)))).tolist())
-            for joint in joints
-            for child in self._nodes[joint].get("children", [])
-            if self._is_end(child)
-        ]
-        skeleton = checked_skeleton(path, names, parents, offsets, ends)
-        moving = scale * places
-        moving[:, 0] = 0.0
-        stretches = bool(np.ptp(moving, axis=0).max(initial=0.0) > STRETCH_M)
-        return checked_recording(path, skeleton, poses, places[:, 0], fps, moving if stretches else None)
+        given = [str(self._nodes[joint].get("name", f"joint{row}")) for row, joint in enumerate(joints)]
+        names = plain_names(given)
+        if changed := changed_names(given):
+            self._notes.append(f"names changed: {changed}")
+        poses, places, ends = self._figure(times, parents)
+        skeleton = checked_skeleton(path, names, parents, places[0], ends)
+        roots = places[:, 0].copy()
+        places[:, 0] = 0.0
+        stretches = bool(np.ptp(places, axis=0).max(initial=0.0) > STRETCH_M)
+        moved = places if stretches else None
+        return checked_recording(path, skeleton, poses, roots, true_fps or fps, moved, notes=self._notes)
+
+    def _figure(
+        self, times: Array, parents: Sequence[int]
+    ) -> tuple[Array, Array, list[tuple[int, list[float]]]]:
+        """Local rotations (N, J, 4), places (N, J, 3) from the parent in its frame, the root's in the room,
+        and the ends of bones.
+
+        Every joint is where all nodes above put it, whatever these scale or mirror; its own frame is its axes
+        without their lengths, right-handed.
+        """
+        linear: dict[int, Array] = {}
+        at: dict[int, Array] = {}
+        for node in (*self._chain(self._joints[0])[:0:-1], *self._joints):
+            own, place = self._axes(node, times), self._vector("translation", node, times)
+            parent = self._parent[node]
+            if parent in linear:
+                own, place = linear[parent] @ own, at[parent] + (linear[parent] @ place[..., None])[..., 0]
+            linear[node], at[node] = own, place
+        frames = {joint: self._frame(joint, linear[joint]) for joint in self._joints}
+        poses = np.empty((len(times), len(parents), 4))
+        places = np.empty((len(times), len(parents), 3))
+        ends = []
+        for row, (joint, parent) in enumerate(zip(self._joints, parents, strict=True)):
+            back = np.eye(3)[None] if parent < 0 else np.swapaxes(frames[self._joints[parent]], 1, 2)
+            start = np.zeros((1, 3)) if parent < 0 else at[self._joints[parent]]
+            poses[:, row] = quaternion.from_matrix(back @ frames[joint])
+            places[:, row] = (back @ (at[joint] - start)[..., None])[..., 0]
+            for child in filter(self._is_end, self._nodes[joint].get("children", [])):
+                end = frames[joint][0].T @ linear[joint][0] @ self._vector("translation", child, times)[0]
+                ends.append((row, end.tolist()))
+        return poses, places, ends
+
+    def _frame(self, joint: int, linear: Array) -> Array:
+        """(N, 3, 3): a joint's axes without their lengths, at right angles, right-handed."""
+        x, y = linear[..., 0], linear[..., 1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+            y = y - x * np.sum(x * y, axis=-1, keepdims=True)
+            y = y / np.linalg.norm(y, axis=-1, keepdims=True)
+        if (np.isfinite(linear).all(axis=(-2, -1)) & ~np.isfinite(y).all(axis=-1)).any():
+            name = self._nodes[joint].get("name", joint)
+            raise ExchangeError(self._file.path, f"Joint '{name}' is scaled to nothing. Apply scales first.")
+        return np.stack([x, y, np.cross(x, y)], axis=-1)
 
     def _is_end(self, node: int) -> bool:
         bare = not {"children", "mesh", "camera"} & set(self._nodes[node])
         return bare and node not in self._joints and (node, "rotation") not in self._tracks
 
-    def _read_tracks(self) -> dict[tuple[int, str], _Track]:
+    def _skinned(self, skins: Sequence[dict[str, Any]], wanted: str | None) -> set[int]:
+        """The joints of the skin that is wanted; else of all skins whose joints hang from each other."""
+        worn = {node["skin"]: node.get("name") for node in self._nodes if "skin" in node}
+        names = [str(skin.get("name") or worn.get(number) or number) for number, skin in enumerate(skins)]
+        if wanted is not None:
+            return set(skins[self._named(wanted, names, "skin")]["joints"])
+        figures: list[tuple[set[int], list[str]]] = []
+        for name, skin in zip(names, skins, strict=True):
+            joints, called = set(skin["joints"]), [name]
+            for other in [one for one in figures if self._hang_together(one[0], joints)]:
+                figures.remove(other)
+                joints, called = joints | other[0], [*other[1], *called]
+            figures.append((joints, called))
+        figures.sort(key=lambda figure: -len(figure[0]))
+        others = [f"{', '.join(called)} ({counted(len(joints), 'joint')})" for joints, called in figures]
+        if len(figures) > 1 and len(figures[1][0]) >= _PROP * len(figures[0][0]):
+            raise ExchangeError(
+                self._file.path,
+                f"{len(figures)} skeletons are in it, of the skins {'; '.join(others[:_SHOWN])}. Choose one: "
+                f"--skin '{figures[0][1][-1]}'.",
+            )
+        if others[1:]:
+            left_out = "; ".join(others[1 : _SHOWN + 1])
+            self._notes.append(f"skin {others[0]} read, left out: {left_out} (otherwise: --skin NAME)")
+        return figures[0][0]
+
+    def _hang_together(self, some: set[int], others: set[int]) -> bool:
+        return any(
+            not below.isdisjoint(self._chain(joint))
+            for above, below in ((some, others), (others, some))
+            for joint in above
+        )
+
+    def _named(self, wanted: str, names: Sequence[str], what: str) -> int:
+        """The number of the thing of this name, else of this number. Raises ExchangeError."""
+        folded = [name.casefold() for name in names]
+        if wanted.casefold() in folded:
+            return folded.index(wanted.casefold())
+        if wanted.isdecimal() and int(wanted) < len(names):
+            return int(wanted)
+        known = ", ".join(f"'{name}'" for name in names[:_SHOWN])
+        raise ExchangeError(self._file.path, f"It has no {what} '{wanted}'. It has: {known}.")
+
+    def _animation(self, nodes: set[int], wanted: str | None) -> _Tracks:
+        """The tracks of the animation that is wanted, else of the longest that moves one of these nodes.
+
+        No nodes: any will do.
+        """
         animations = self._file.document.get("animations", [])
         if not animations:
             raise ExchangeError(self._file.path, "There is no animation in it: export the dance with it.")
-        tracks: dict[tuple[int, str], _Track] = {}
-        for channel in animations[0]["channels"]:
-            target, sampler = channel["target"], animations[0]["samplers"][channel["sampler"]]
+        names = [str(one.get("name") or number) for number, one in enumerate(animations)]
+        if wanted is not None:
+            return self._read_tracks(animations[self._named(wanted, names, "animation")])
+        found: list[tuple[float, int, _Tracks]] = []
+        damage: Exception | None = None
+        for number, animation in enumerate(animations):
+            try:
+                tracks = self._read_tracks(animation)
+            except _DAMAGED as error:
+                damage = damage or error
+                continue
+            moving = [track.times for (node, _), track in tracks.items() if not nodes or node in nodes]
+            if moving:
+                seconds = max(float(t[-1]) for t in moving) - min(float(t[0]) for t in moving)
+                found.append((seconds, number, tracks))
+        if not found:
+            if damage is not None:
+                raise damage
+            raise ExchangeError(self._file.path, "The animation does not move the figure.")
+        seconds, chosen, tracks = max(found, key=lambda one: (one[0], len(one[2]), -one[1]))
+        if len(animations) > 1:
+            lengths = {number: f" ({length:.1f} s)" for length, number, _ in found}
+            others = [f"'{n}'{lengths.get(k, '')}" for k, n in enumerate(names) if k != chosen]
+            more = f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
+            self._notes.append(
+                f"animation '{names[chosen]}' ({seconds:.1f} s) read, left out: {', '.join(others[:_SHOWN])}"
+                f"{more} (otherwise: --animation NAME)"
+            )
+        return tracks
+
+    def _read_tracks(self, animation: dict[str, Any]) -> _Tracks:
+        tracks: _Tracks = {}
+        for channel in animation["channels"]:
+            target, sampler = channel["target"], animation["samplers"][channel["sampler"]]
             if "node" not in target or target["path"] not in ("rotation", "translation", "scale"):
                 continue
             kind = sampler.get("interpolation", "LINEAR")
@@ -103,25 +244,43 @@ class _Scene:
             tracks[target["node"], target["path"]] = _Track(times, values, kind)
         return tracks
 
-    def _find_joints(self) -> list[int]:
-        """The joints, each parent before its children; all hang below the first one."""
-        skins = self._file.document.get("skins", [])
-        chosen = set(skins[0]["joints"] if skins else [node for node, _ in self._tracks])
-        for joint in tuple(chosen):  # a node between two joints is one too
+    def _ordered(self, chosen: set[int], skinned: bool) -> list[int]:
+        """The joints, each parent before its children; all hang below the first one.
+
+        A node between two joints is one too, and so is the node that carries several root bones of a skin.
+        """
+        for joint in tuple(chosen):
             above = self._chain(joint)
             highest = max((place for place, node in enumerate(above) if node in chosen), default=0)
             chosen.update(above[: highest + 1])
         tops = [joint for joint in sorted(chosen) if self._parent[joint] not in chosen]
-        if len(tops) != 1:
+        chains = [self._chain(top) for top in tops]
+        shared = [node for node in chains[0] if skinned and all(node in chain for chain in chains)]
+        for chain in chains if shared else ():
+            chosen.update(chain[: chain.index(shared[0]) + 1])
+        tops = shared[:1] or sorted(tops, key=lambda top: -len(self._below(top, chosen)))
+        sizes = [len(self._below(top, chosen)) for top in tops]
+        named = [
+            f"'{self._nodes[top].get('name', top)}' ({counted(n, 'joint')})"
+            for top, n in zip(tops, sizes, strict=True)
+        ]
+        if len(tops) > 1 and sizes[1] >= _PROP * sizes[0]:
             raise ExchangeError(
-                self._file.path, f"{len(tops)} skeletons are in it; one is needed. Export one figure alone."
+                self._file.path, f"{len(tops)} skeletons are in it: {', '.join(named[:_SHOWN])}. Export one."
             )
-        ordered = [tops[0]]
-        for joint in ordered:
-            ordered += [child for child in self._nodes[joint].get("children", []) if child in chosen]
+        if named[1:]:
+            self._notes.append(f"{named[0]} read, left out: {', '.join(named[1 : _SHOWN + 1])}")
+        ordered = self._below(tops[0], chosen)
         by_number = sorted(ordered)
         parents_first = all(self._parent[j] < j for j in by_number[1:]) and by_number[0] == tops[0]
         return by_number if parents_first else ordered
+
+    def _below(self, top: int, chosen: set[int]) -> list[int]:
+        """A node and those of the chosen ones below it, level by level."""
+        ordered = [top]
+        for joint in ordered:
+            ordered += [child for child in self._nodes[joint].get("children", []) if child in chosen]
+        return ordered
 
     def _chain(self, node: int) -> list[int]:
         """A node and those above it. Raises ValueError where they form a ring."""
@@ -134,7 +293,8 @@ class _Scene:
 
     def _times(self) -> tuple[Array, float]:
         """Even times at the rate of the densest track, and that rate."""
-        tracks = [track for (node, _), track in self._tracks.items() if node in self._joints]
+        moving = {*self._joints, *self._chain(self._joints[0])}
+        tracks = [track for (node, _), track in self._tracks.items() if node in moving]
         if not tracks:
             raise ExchangeError(self._file.path, "The animation does not move the figure.")
         densest = max(tracks, key=lambda track: len(track.times)).times
@@ -151,51 +311,40 @@ class _Scene:
         return first + np.arange(round((last - first) * fps) + 1) / fps, fps
 
     def _vector(self, path: str, node: int, times: Array) -> Array:
-        """translation or scale (N, 3)."""
-        still = self._nodes[node].get(path, (1, 1, 1) if path == "scale" else (0, 0, 0))
+        """translation or scale: (N, 3), of one frame where it does not change."""
         track = self._tracks.get((node, path))
         if track is None:
-            if "matrix" in self._nodes[node]:
-                raise ValueError("a node has a matrix; export with translation and rotation")
-            return np.tile(np.array(still, dtype=np.float64), (len(times), 1))
+            still = self._nodes[node].get(path, (1, 1, 1) if path == "scale" else (0, 0, 0))
+            return np.array(still, dtype=np.float64).reshape(1, 3)
         before, share = _between(track, times)
         after = np.minimum(before + 1, len(track.times) - 1)
         mixed: Array = track.values[before] + share[:, None] * (track.values[after] - track.values[before])
         return mixed
 
-    def _rotation(self, node: int, times: Array) -> Array:
-        """(N, 4), w first."""
+    def _axes(self, node: int, times: Array) -> Array:
+        """(N, 3, 3): where a node's own axes point and how long they are; of one frame where it is still."""
         track = self._tracks.get((node, "rotation"))
         if track is None:
-            still = np.roll(np.array(self._nodes[node].get("rotation", (0, 0, 0, 1)), dtype=np.float64), 1)
-            return np.tile(still, (len(times), 1))
-        values = np.roll(track.values, 1, axis=-1)
-        before, share = _between(track, times)
-        after = np.minimum(before + 1, len(track.times) - 1)
-        return quaternion.slerp(
-            quaternion.normalize(values[before]), quaternion.normalize(values[after]), share
-        )
+            still = np.array(self._nodes[node].get("rotation", (0, 0, 0, 1)), dtype=np.float64)
+            turn: Array = np.roll(still, 1).reshape(1, 4)
+        else:
+            values = quaternion.normalize(np.roll(track.values, 1, axis=-1))
+            before, share = _between(track, times)
+            turn = quaternion.slerp(values[before], values[np.minimum(before + 1, len(values) - 1)], share)
+        axes: Array = quaternion.to_matrix(quaternion.normalize(turn))
+        return axes * self._vector("scale", node, times)[:, None, :]
 
-    def _carry(self, poses: Array, places: Array, times: Array) -> float:
-        """Turn and move the root (in place) as the nodes above it do; how much these scale the figure."""
-        for joint in self._joints:
-            if np.abs(self._vector("scale", joint, times) - 1.0).max() > _STILL_SCALE:
-                name = self._nodes[joint].get("name", joint)
-                raise ExchangeError(
-                    self._file.path, f"Joint '{name}' is scaled. Apply scales before the export."
-                )
-        whole = 1.0
-        for node in self._chain(self._joints[0])[1:]:
-            scales = self._vector("scale", node, times)
-            factor = float(scales[0, 0])
-            if np.abs(scales - factor).max() > _STILL_SCALE * abs(factor) or factor <= 0:
-                raise ExchangeError(self._file.path, "The figure is scaled unevenly. Apply scales first.")
-            turn = self._rotation(node, times)
-            poses[:, 0] = quaternion.multiply(turn, poses[:, 0])
-            moved = quaternion.rotate(turn, factor * places[:, 0])
-            places[:, 0] = moved + self._vector("translation", node, times)
-            whole *= factor
-        return whole
+
+def _with_parts(node: dict[str, Any]) -> dict[str, Any]:
+    """A node with translation, rotation and scale in place of a matrix (glTF 2.0, 3.5.2)."""
+    if "matrix" not in node:
+        return node
+    matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T  # it is written column by column
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.linalg.det(matrix[:3, :3]) < 0:
+        scale[0] = -scale[0]  # a mirror
+    turn = quaternion.from_matrix(matrix[:3, :3] / np.where(scale, scale, 1.0))
+    return node | {"translation": matrix[:3, 3], "rotation": np.roll(turn, -1), "scale": scale}
 
 
 def _between(track: _Track, times: Array) -> tuple[NDArray[np.intp], Array]:

@@ -10,24 +10,32 @@ import numpy as np
 
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.fitting import Gap, fit_skeleton, gaps_of, like, pose_frames
-from appliance.exchange.points_file import UNITS, guess_unit, read_names, read_points, with_y_up
+from appliance.exchange.points_file import UNITS, figure_size, guess_unit, read_names, read_points, with_y_up
 from appliance.exchange.topology import directions_at_rest, parents_by_name
 from appliance.pose.bvh import read_bvh
+from appliance.pose.kept_rows import place_words
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.pose.roles import places_of
 from appliance.pose.skeleton import Skeleton
 
+USUAL_FPS = 50.0
 _SHOWN_GAPS = 10
+_FAR = 0.05  # of the figure's size: a point does not come so far in a frame
+_ROOT = ("spine", 0, 0)  # chain, side and place of the hips
 _FEW_FRAMES = 2
 
 
 @dataclass(frozen=True)
 class PointsOptions:
-    """names: file; model: BVH whose skeleton the points belong to; unit: None to guess; up: 'y' or 'z'."""
+    """names: file; model: BVH whose skeleton the points belong to; up: 'y' or 'z'.
+
+    None: fps as the file's times say, else 50; unit by the size of the figure.
+    """
 
     names: Path | None = None
     model: Path | None = None
-    fps: float = 50.0
+    fps: float | None = None
     unit: str | None = None
     up: str = "y"
     longest_gap_s: float = 0.5
@@ -57,22 +65,59 @@ def _figures(errors: Array) -> str:
 def import_points(source: Path, options: PointsOptions, say: Callable[[str], None]) -> Imported:
     """Read points, fit a skeleton, find its poses. Raises ExchangeError or BvhError."""
     listed = None if options.names is None else read_names(options.names)
-    names, read = read_points(source, listed)
+    names, read, told_fps, notes = read_points(source, listed)
+    for note in notes:
+        say(f"{source.name}: {note}.")
+    fps = options.fps or told_fps or USUAL_FPS
+    if options.fps is None:
+        why = "by the column of times" if told_fps else "as nothing else is given"
+        say(f"Rate: {fps:g} frames a second, {why}. If that is wrong: --fps.")
+    given = None if listed is None or listed.parents is None else listed.parents
+    read = _with_zeros_as_gaps(names, given, read, say)
+    _require_seen(source, names, read)
     unit = options.unit or guess_unit(read)
     if options.unit is None:
         say(f"Unit: {unit}, by the size of the figure. If that is wrong: --unit {' | '.join(UNITS)}.")
     points = with_y_up(UNITS[unit] * read, options.up)
-    _require_seen(source, names, points)
-    say(f"Points: {len(names)}, frames: {len(points)}, {len(points) / options.fps:.1f} s.")
+    say(f"Points: {len(names)}, frames: {len(points)}, {len(points) / fps:.1f} s.")
     if options.model is not None:
-        skeleton, points = _as_model(source, options.model, names, points)
+        skeleton, points = _as_model(source, options.model, names, points, say)
     else:
-        given = None if listed is None or listed.parents is None else listed.parents
         skeleton, points = _fitted(source, names, given, points)
-    recording, too_long = pose_frames(skeleton, points, options.fps, options.longest_gap_s)
-    _say_gaps(gaps_of(points), too_long, skeleton.names, options, say)
+    recording, too_long = pose_frames(skeleton, points, fps, options.longest_gap_s)
+    _say_gaps(gaps_of(points), too_long, skeleton.names, fps, say)
     places, _ = skeleton.forward_kinematics(recording.poses, recording.roots)
     return Imported(recording, np.linalg.norm(places - points, axis=-1))
+
+
+def _with_zeros_as_gaps(
+    names: Sequence[str], parents: Sequence[str] | None, points: Array, say: Callable[[str], None]
+) -> Array:
+    """Points (N, P, 3) where one that is exactly 0, 0, 0 for a while is a gap: it was not seen.
+
+    A point that is there always is the origin of the others if it is the root; any other was never seen. A
+    point that begins or arrives there, and not from afar, stays.
+    """
+    zero = (points == 0.0).all(axis=2)
+    if not zero.any():
+        return points
+    size, places, found = figure_size(points), places_of(names), points.copy()
+    for joint in np.flatnonzero(zero.any(axis=0)).tolist():
+        always = bool(zero[:, joint].all())
+        place = places[joint]
+        root = parents[joint] == "" if parents is not None else place is not None and place[:3] == _ROOT
+        if always and root:
+            continue
+        lone = points.copy()[:, [joint]]
+        lone[zero[:, joint]] = np.nan
+        for gap in [one for one in gaps_of(lone) if zero[one.first : one.last + 1, joint].any()]:
+            around = lone[[k for k in (gap.first - 1, gap.last + 1) if 0 <= k < len(lone)], 0]
+            if always or np.linalg.norm(around, axis=-1).max() > _FAR * size:
+                found[gap.first : gap.last + 1, joint] = np.nan
+                if not always:
+                    frames = place_words(range(gap.first, gap.last + 1), "frame")
+                    say(f"{names[joint]} is 0, 0, 0 in {frames}: taken as not seen.")
+    return found
 
 
 def _require_seen(source: Path, names: Sequence[str], points: Array) -> None:
@@ -82,8 +127,13 @@ def _require_seen(source: Path, names: Sequence[str], points: Array) -> None:
         raise ExchangeError(source, f"{', '.join(never)}: never seen. Leave the point out, of the names too.")
 
 
-def _as_model(source: Path, model: Path, names: Sequence[str], points: Array) -> tuple[Skeleton, Array]:
-    figure = read_bvh(model).skeleton
+def _as_model(
+    source: Path, model: Path, names: Sequence[str], points: Array, say: Callable[[str], None]
+) -> tuple[Skeleton, Array]:
+    figure = read_bvh(model, true_fps=USUAL_FPS).skeleton  # its dance is not asked for
+    others = [name for name in names if name not in figure.names]
+    if others:
+        say(f"Points that are no joints of {model.name} left out: {', '.join(others)}.")
     missing = [name for name in figure.names if name not in names]
     if missing:
         raise ExchangeError(
@@ -138,17 +188,22 @@ def _say_gaps(
     gaps: Sequence[Gap],
     too_long: Sequence[Gap],
     names: Sequence[str],
-    options: PointsOptions,
+    fps: float,
     say: Callable[[str], None],
 ) -> None:
-    if len(gaps) > len(too_long):
-        short = [gap.last - gap.first + 1 for gap in gaps if gap not in too_long]
-        say(f"Gaps: {len(short)} of up to {max(short) / options.fps:.2f} s, crossed in straight lines.")
+    def words(gap: Gap) -> str:
+        return f"{names[gap.joint]} in {place_words(range(gap.first, gap.last + 1), 'frame')}"
+
+    short = [gap for gap in gaps if gap not in too_long]
+    if short:
+        longest = max(gap.last - gap.first + 1 for gap in short) / fps
+        more = f" and {len(short) - _SHOWN_GAPS} more" if len(short) > _SHOWN_GAPS else ""
+        shown = ", ".join(words(gap) for gap in short[:_SHOWN_GAPS])
+        say(f"Gaps: {len(short)} of up to {longest:.2f} s, crossed in straight lines: {shown}{more}.")
     for gap in too_long[:_SHOWN_GAPS]:
-        seconds = (gap.last - gap.first + 1) / options.fps
-        begin = gap.first / options.fps
+        seconds = (gap.last - gap.first + 1) / fps
         say(
-            f"{names[gap.joint]} was not seen for {seconds:.2f} s from {begin:.2f} s on: its bone turns "
+            f"{words(gap)} was not seen for {seconds:.2f} s, from {gap.first / fps:.2f} s on: its bone turns "
             "evenly from the pose before to the pose after. Look whether that can be danced."
         )
     if len(too_long) > _SHOWN_GAPS:

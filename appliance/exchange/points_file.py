@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import dataclass
-from io import TextIOWrapper
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.figure_facts import MAX_VALUES
-from appliance.exchange.tables import read_rows
-from appliance.pose.foreign_file import content, opened
+from appliance.exchange.tables import read_rows, separator_of
+from appliance.pose.foreign_file import content, encoding_of, opened, opened_text
 from appliance.pose.quaternion import Array
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _LARGEST_NAMES = 1 << 20
 _TALLEST = {"m": 4.0, "cm": 400.0}  # a dancer with raised arms, with room for children and giants
-_TIMES = ("time", "frame")
+_TIMES = {"time": 1.0, "times": 1.0, "seconds": 1.0, "timestamp": 1.0, "t": 1.0, "timeseconds": 1.0}
+_TIMES |= {"timems": 1e-3, "milliseconds": 1e-3, "ms": 1e-3}  # titles of columns of times, in seconds
+_COUNTS = ("", "frame", "frames", "frameno", "framenumber", "subframe", "index", "unnamed0", "no", "n")
+_COORDINATE = re.compile(r"(?P<point>.*?)[._:\- ]?(?P<axis>[xyz])", re.IGNORECASE)
+_FASTEST_FPS = 1000.0
 
 
 @dataclass(frozen=True)
@@ -35,11 +40,12 @@ def read_names(path: Path) -> Names:
     '#' begins a comment. Raises ExchangeError with the line.
     """
     try:
-        text = content(path, _LARGEST_NAMES).decode("utf-8-sig")
+        data = content(path, _LARGEST_NAMES)
     except OSError as error:
         raise ExchangeError(path, f"The names cannot be read ({error.strerror}).") from error
-    except UnicodeDecodeError as error:
-        raise ExchangeError(path, "This is not text. Write a name on each line.") from error
+    text = data.decode(encoding_of(data), "replace")
+    if "\0" in text:
+        raise ExchangeError(path, "This is not text. Write a name on each line.")
     names: list[str] = []
     parents: list[str] = []
     given = 0
@@ -64,31 +70,36 @@ def read_names(path: Path) -> Names:
     return Names(tuple(names), tuple(parents) if given else None)
 
 
-def read_points(path: Path, names: Names | None) -> tuple[tuple[str, ...], Array]:
-    """The names, and the points (N, P, 3) in the file's units and axes; not a number where one is missing.
+class Points(NamedTuple):
+    """Points (N, P, 3) in a file's units and axes, not a number where one is missing; frames a second where
+    its times say them; what was lost or left out, in words."""
 
-    Raises ExchangeError with the line.
-    """
+    names: tuple[str, ...]
+    places: Array
+    fps: float | None
+    notes: tuple[str, ...]
+
+
+def read_points(path: Path, names: Names | None) -> Points:
+    """The points of a file; names: in place of the file's. Raises ExchangeError with the line."""
+    ending, notes = path.suffix.casefold(), list[str]()
     try:
-        if path.suffix.lower() == ".npy":
-            points = _read_npy(path)
-        elif path.suffix.lower() == ".csv":
-            found, points = _read_csv(path)
-            names = names or (None if found is None else Names(found, None))
+        if ending == ".npy":
+            found, places, fps = None, _read_npy(path), None
+        elif ending == ".csv":
+            found, places, fps, notes = _read_csv(path, names is None)
         else:
             raise ExchangeError(path, f"The ending '{path.suffix}' is no format of points: .npy or .csv.")
     except OSError as error:
         raise ExchangeError(path, f"The points cannot be read ({error.strerror}).") from error
-    if names is None:
+    called = names.names if names is not None else found
+    if called is None:
         raise ExchangeError(path, "Nothing says which point is which. Give a list: --names FILE.")
-    if points.shape[1] != len(names.names):
+    if places.shape[1] != len(called):
         raise ExchangeError(
-            path, f"It has {points.shape[1]} points, but {len(names.names)} names are given. Correct one."
+            path, f"It has {places.shape[1]} points, but {len(called)} names are given. Correct one."
         )
-    if np.isinf(points).any():
-        frame = int(np.argwhere(np.isinf(points))[0][0])
-        raise ExchangeError(path, f"Frame {frame}: a position is infinite. Write NaN for a missing point.")
-    return names.names, points
+    return Points(called, np.where(np.isinf(places), np.nan, places), fps, tuple(notes))
 
 
 def _read_npy(path: Path) -> Array:
@@ -111,47 +122,96 @@ def _read_npy(path: Path) -> Array:
     return numbers
 
 
-def _read_csv(path: Path) -> tuple[tuple[str, ...] | None, Array]:
-    """The names where the first line has them, as NAME.x NAME.y NAME.z; the points."""
-    with TextIOWrapper(opened(path), encoding="utf-8-sig", errors="replace") as file:
-        head = next(csv.reader([file.readline(1 << 20)]), [])
+def _read_csv(
+    path: Path, names_wanted: bool
+) -> tuple[tuple[str, ...] | None, Array, float | None, list[str]]:
+    """The names where the first line has them, as NAME.x NAME.y NAME.z; the points, their rate, notes."""
+    with opened_text(path) as file:
+        first, line = 1, file.readline(1 << 20)
+        while line and (not line.strip() or line.startswith("#")):
+            first, line = first + 1, file.readline(1 << 20)
+        separator = separator_of(line)
+        head = [word.strip() for word in next(csv.reader([line], delimiter=separator), [])]
         titled = not all(_is_value(word) for word in head)
         if not titled:
             file.seek(0)
-        rows = read_rows(path, file, len(head), 1 + titled, gaps=True)
-    columns = [word.strip() for word in head]
-    while titled and columns and columns[0].casefold() in _TIMES:
-        columns, rows = columns[1:], rows[:, 1:]
-    if rows.shape[1] % 3 or not rows.shape[1]:
+        values, rows = read_rows(path, file, separator, len(head), first + 1 if titled else 1)
+    notes = rows.notes()
+    whole: Array = np.full((rows.numbers[-1] - rows.numbers[0] + 1, len(head)), np.nan)
+    whole[np.array(rows.numbers) - rows.numbers[0]] = values  # a row that is lost is a gap of all points
+    fps, columns = None, [*head]
+    while columns and (kind := _no_place(columns, whole, titled)):
+        fps = fps or (_rate(whole[:, 0], kind) if kind > 0 else None)
+        columns, whole = columns[1:], whole[:, 1:]
+    if not titled and len(columns) < len(head):
+        notes.append("the first column, which rises evenly, taken for the number of the frame or its time")
+    if len(columns) % 3 or not columns:
         raise ExchangeError(
-            path, f"{rows.shape[1]} columns of positions are no multiple of three (x, y, z of each point).", 1
+            path,
+            f"{len(columns)} columns of positions are no multiple of three (x, y, z of each point).",
+            first,
         )
-    names = None
+    seen = np.flatnonzero(~np.isnan(whole).all(axis=1))
+    if not len(seen):
+        raise ExchangeError(path, "No row has a position.", first)
+    names = _names_in(path, columns, first) if titled and names_wanted else None
+    return names, whole[seen[0] : seen[-1] + 1].reshape(-1, len(columns) // 3, 3), fps, notes
+
+
+def _no_place(columns: list[str], values: Array, titled: bool) -> float:
+    """0 if the first column is a position; seconds in its unit for one of times, -1 for one that counts."""
     if titled:
-        for first in range(0, len(columns), 3):
-            triple = columns[first : first + 3]
-            stems = {column[:-2] for column in triple}
-            if len(stems) != 1 or [column[-1:].casefold() for column in triple] != ["x", "y", "z"]:
-                raise ExchangeError(
-                    path, f"Columns {', '.join(triple)} are not NAME.x, NAME.y, NAME.z of one point.", 1
-                )
-        names = tuple(column[:-2] for column in columns[::3])
-        if len(set(names)) != len(names):
-            raise ExchangeError(path, "Two points have the same name.", 1)
-    return names, rows.reshape(len(rows), -1, 3)
+        word = "".join(letter for letter in columns[0].casefold() if letter.isalnum())
+        return _TIMES.get(word, -1.0 if word in _COUNTS else 0.0)
+    steps = np.diff(values[:, 0])
+    even = len(steps) > 1 and bool((steps > 0).all() and np.ptp(steps) < 0.01 * steps.mean())
+    return -1.0 if even and len(columns) % 3 == 1 else 0.0
+
+
+def _rate(times: Array, unit_s: float) -> float | None:
+    """Frames a second by a column of times; None where it does not say one."""
+    steps = np.diff(times)
+    step = float(np.median(steps[np.isfinite(steps)])) * unit_s if np.isfinite(steps).any() else 0.0
+    fps = 1.0 / step if step > 1.0 / (2 * _FASTEST_FPS) else 0.0
+    near = round(fps)
+    return None if fps < 1.0 else float(near) if abs(fps - near) < 0.01 * near else fps
+
+
+def _names_in(path: Path, columns: list[str], line: int) -> tuple[str, ...]:
+    names: list[str] = []
+    for first in range(0, len(columns), 3):
+        triple = columns[first : first + 3]
+        found = [_COORDINATE.fullmatch(column) for column in triple]
+        points = {match["point"] for match in found if match}
+        axes = "".join(match["axis"] for match in found if match).casefold()
+        if len(points) != 1 or axes != "xyz" or "" in points:
+            raise ExchangeError(
+                path, f"Columns {', '.join(triple)} are not NAME.x, NAME.y, NAME.z of one point.", line
+            )
+        names += points
+    if len(set(names)) != len(names):
+        raise ExchangeError(path, "Two points have the same name.", line)
+    return tuple(names)
 
 
 def _is_value(word: str) -> bool:
     try:
-        float(word.strip() or "nan")
+        float(word.replace(",", ".", 1) or "nan")
     except ValueError:
         return False
     return True
 
 
+def figure_size(points: Array) -> float:
+    """The usual size (median) of what is seen of a figure, in the units of its points (N, P, 3)."""
+    whole = np.where(np.isnan(points).any(axis=2, keepdims=True), np.nan, points)
+    seen = whole[~np.isnan(whole).all(axis=(1, 2))]
+    return float(np.median(np.linalg.norm(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=-1)))
+
+
 def guess_unit(points: Array) -> str:
     """The unit in which these points (N, P, 3) are those of a person."""
-    size = float(np.nanmedian(np.linalg.norm(np.nanmax(points, axis=1) - np.nanmin(points, axis=1), axis=-1)))
+    size = figure_size(points)
     return next((unit for unit, tallest in _TALLEST.items() if size < tallest), "mm")
 
 

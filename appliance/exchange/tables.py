@@ -15,12 +15,15 @@ import numpy as np
 
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.figure_facts import MAX_VALUES, checked_recording, checked_skeleton, facts_of
-from appliance.pose.foreign_file import opened, plain_json
+from appliance.pose.foreign_file import opened, opened_text, plain_json
+from appliance.pose.kept_rows import KeptRows
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 
 MARK = "# bunraku recording: "  # the first line of a CSV: the skeleton and the rate as JSON
 _LONGEST_LINE = 1 << 20
+_SHOWN = 6
+_NONE = ("", "na", "n/a", "#n/a", "nan", "null", "none", "-", "--", ".")  # fields without a value
 _NEEDED = ("poses", "roots", "fps", "names", "parents", "offsets")
 
 
@@ -43,8 +46,8 @@ def write_npz(path: Path, recording: Recording) -> None:
     np.savez_compressed(path, **arrays)
 
 
-def read_npz(path: Path) -> Recording:
-    """A recording as `write_npz` writes it. Raises ExchangeError or OSError."""
+def read_npz(path: Path, true_fps: float | None = None) -> Recording:
+    """A recording as `write_npz` writes it; true_fps: in place of its rate. Raises ExchangeError, OSError."""
     try:
         with opened(path) as stream, zipfile.ZipFile(stream) as archive:
             if sum(member.file_size for member in archive.infolist()) > 2 * 8 * MAX_VALUES:
@@ -64,6 +67,8 @@ def read_npz(path: Path) -> Recording:
         MemoryError,
     ) as error:
         raise ExchangeError(path, f"This is no NPZ file of numbers ({error}).") from error
+    if true_fps is not None:
+        arrays["fps"] = np.float64(true_fps)
     missing = [name for name in _NEEDED if name not in arrays]
     if missing:
         raise ExchangeError(path, f"{', '.join(missing)} missing. An NPZ recording has {', '.join(_NEEDED)}.")
@@ -107,10 +112,15 @@ def write_csv(path: Path, recording: Recording) -> None:
         np.savetxt(file, table, fmt="%.10g", delimiter=",")
 
 
-def read_csv(path: Path) -> Recording:
-    """A recording as `write_csv` writes it. Raises ExchangeError with the line, or OSError."""
-    with TextIOWrapper(opened(path), encoding="utf-8-sig", errors="replace") as file:
+def read_csv(path: Path, true_fps: float | None = None) -> Recording:
+    """A recording as `write_csv` writes it, or as a spreadsheet saves that; true_fps: in place of its rate.
+
+    Columns are found by their names. Raises ExchangeError with the line, or OSError.
+    """
+    with opened_text(path) as file:
         head = file.readline(_LONGEST_LINE)
+        if head.startswith(f'"{MARK}'):  # a spreadsheet puts the field in quotes
+            head = next(csv.reader([head])).pop(0).rstrip(";,\t\n ")
         if not head.startswith(MARK):
             raise ExchangeError(
                 path,
@@ -123,42 +133,86 @@ def read_csv(path: Path) -> Recording:
             offsets = np.asarray(facts["offsets"], dtype=np.float64)
             names = [str(name) for name in facts["names"]]
             parents = [int(parent) for parent in facts["parents"]]
-            ends, fps = [(int(joint), offset) for joint, offset in facts["ends"]], float(facts["fps"])
+            ends = [(int(joint), offset) for joint, offset in facts["ends"]]
+            fps = true_fps or float(facts["fps"])
         except (ValueError, LookupError, TypeError) as error:
             raise ExchangeError(path, f"The skeleton in it cannot be read ({error}).", 1) from error
         skeleton = checked_skeleton(path, names, parents, offsets, ends, 1)
-        header = next(csv.reader([file.readline(_LONGEST_LINE)]), [])
-        plain, stretched = (_columns(names, each) for each in (False, True))
-        if header not in (plain, stretched):
-            wrong = next(
-                (c for c, e in zip(header, stretched, strict=False) if c != e), "too few or too many"
-            )
-            raise ExchangeError(path, f"The columns are not those of the skeleton ({wrong}).", 2)
-        table = read_rows(path, file, len(header), 3)
+        titles = file.readline(_LONGEST_LINE)
+        separator = separator_of(titles)
+        header = [title.strip() for title in next(csv.reader([titles], delimiter=separator), [])]
+        stretched = f"{names[0]}.tx" in header
+        wanted = _columns(names, stretched)[1:]
+        missing = [column for column in wanted if column not in header]
+        if missing:
+            raise ExchangeError(path, f"Columns of the skeleton are missing: {_some(missing)}.", 2)
+        values, rows = read_rows(path, file, separator, len(header), 3)
+    table = values[:, [header.index(column) for column in wanted]]
+    others = [column or "one without a title" for column in header if column not in (*wanted, "time")]
+    notes = [f"columns that are none of the skeleton left out: {_some(others)}"] if others else []
     count, joints = len(table), len(names)
-    poses = table[:, 4 : 4 + 4 * joints].reshape(count, joints, 4)
-    translations = table[:, 4 + 4 * joints :].reshape(count, joints, 3) if header == stretched else None
-    return checked_recording(path, skeleton, poses, table[:, 1:4], fps, translations, first_line=3)
+    poses = table[:, 3 : 3 + 4 * joints].reshape(count, joints, 4)
+    translations = table[:, 3 + 4 * joints :].reshape(count, joints, 3) if stretched else None
+    return checked_recording(path, skeleton, poses, table[:, :3], fps, translations, rows, notes)
 
 
-def read_rows(path: Path, file: TextIOWrapper, columns: int, first: int, gaps: bool = False) -> Array:
-    """Rows of numbers (N, columns) from line `first` on. gaps: an empty field becomes NaN.
+def _some(columns: Sequence[str]) -> str:
+    return ", ".join(columns[:_SHOWN]) + (f" and {len(columns) - _SHOWN} more" if columns[_SHOWN:] else "")
 
-    Raises ExchangeError with the line.
+
+def separator_of(line: str) -> str:
+    """What stands between the fields of a table: where there is a semicolon or a tab, a comma is a point."""
+    return next((mark for mark in (";", "\t", ",") if mark in line), ",")
+
+
+def read_rows(
+    path: Path, file: TextIOWrapper, separator: str, columns: int, first: int
+) -> tuple[Array, KeptRows]:
+    """Rows of numbers (N, columns) from line `first` on, NaN where a field is empty or says NA.
+
+    Decimal commas are read; empty lines and comments are no rows; rows with another number of fields, or with
+    words, are lost. Raises ExchangeError with the line where no row is left.
     """
-    rows: list[Array] = []
+    found: list[Array] = []
+    rows = KeptRows()
+    wrong: tuple[int, str] | None = None
     for line, text in enumerate(iter(lambda: file.readline(_LONGEST_LINE), ""), first):
-        words = text.strip().split(",")
-        if words == [""]:
-            raise ExchangeError(path, "This line is empty. Remove it.", line)
-        if len(words) != columns:
-            raise ExchangeError(path, f"This line has {len(words)} values, the others {columns}.", line)
+        if not text.strip(f'{separator} \r\n"') or text.startswith("#"):
+            continue
         try:
-            rows.append(np.array([word.strip() or "nan" for word in words] if gaps else words, np.float64))
+            found.append(_numbers(text, separator, columns))
+            rows.keep(line)
         except ValueError as error:
-            raise ExchangeError(path, f"{str(error).capitalize()}.", line) from error
-        if len(rows) * columns > MAX_VALUES:
+            wrong = wrong or (line, str(error))
+            rows.lose(line, str(error))
+        if rows.count * columns > MAX_VALUES:
             raise ExchangeError(path, f"It holds more than {MAX_VALUES} numbers. Cut it.", line)
-    if not rows:
-        raise ExchangeError(path, "There are no frames.", first)
-    return np.stack(rows)
+    if not found:
+        line, why = wrong or (first, "there are no frames")
+        raise ExchangeError(path, f"{why[0].upper()}{why[1:]}. Export the table again.", line)
+    return np.stack(found), rows
+
+
+def _numbers(text: str, separator: str, columns: int) -> Array:
+    """The numbers of a row. Raises ValueError, in words."""
+    words = (
+        text.strip().split(separator) if '"' not in text else next(csv.reader([text], delimiter=separator))
+    )
+    if len(words) != columns:
+        commas = len(words) == 2 * columns and separator == ","
+        hint = " (decimal commas? Save it with semicolons between the fields)" if commas else ""
+        raise ValueError(f"this line has {len(words)} values, the others {columns}{hint}")
+    try:
+        return np.array(words, np.float64)
+    except ValueError:
+        return np.array([_number(word.strip()) for word in words])
+
+
+def _number(word: str) -> float:
+    """A field, also with a decimal comma; NaN where it says that there is none. Raises ValueError."""
+    if word.casefold() in _NONE:
+        return np.nan
+    try:
+        return float(word.replace(",", ".", 1))
+    except ValueError:
+        raise ValueError(f"'{word[:40]}' is not a number") from None

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from appliance.pose.joint_names import CHAINS, place_of
+from appliance.pose.joint_names import CHAINS
 from appliance.pose.quaternion import Array
 from appliance.pose.roles import places_of
 
@@ -55,13 +55,13 @@ def directions_at_rest(names: Sequence[str], parents: Sequence[int]) -> Array | 
     None where a name says nothing.
     """
     found: Array = np.zeros((len(names), 3))
-    for joint, name in enumerate(names):
-        role = place_of(name)
+    places = places_of(names)
+    for joint, role in enumerate(places):
         if role is None:
             return None
         if parents[joint] < 0:
             continue
-        above = place_of(names[parents[joint]])
+        above = places[parents[joint]]
         x, y, z = _AT_REST.get(role.chain, _AT_REST["arm"])
         on_ankle = above is not None and (above.chain, above.place) == ("leg", _ANKLE)
         if role.chain == "leg" and (role.place >= _TOES or on_ankle):

@@ -1,4 +1,7 @@
-"""The text of a BVH file, hierarchy and rows of numbers: read in bounded memory, errors with the line."""
+"""The text of a BVH file, hierarchy and rows of numbers: read in bounded memory, errors with the line.
+
+A row that is no frame costs that row: the whole ones are kept, and a note says which were lost.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,19 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.pose.foreign_file import opened
+from appliance.pose.counted import counted
+from appliance.pose.foreign_file import opened_text
+from appliance.pose.kept_rows import KeptRows
 
 MAX_LINE = 1 << 17  # characters; the longest honest line is one frame of some hundred channels
 MAX_BLANK_LINES = 1000  # in a row; a file of line ends alone must not block
+MAX_SPOILT_ROWS = 1000  # in a row; behind so many no frame is looked for
 MAX_JOINTS = 1000
 MAX_VALUES = 50_000_000  # 400 MB: 50 minutes of 132 channels at 120 poses a second
 _STAGE_FPS = 50  # recordings are resampled to this rate: slow frames become many
+_SHORTEST_S, _LONGEST_S = 1e-4, 10.0  # between two frames
+_USUAL_FPS: tuple[float, ...] = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 180, 200, 240)
+_USUAL_FPS += (250, 300, 360, 480, 500, 960, 1000, 23.976, 29.97, 59.94, 119.88)
 _CHANNELS = {f"{axis}{kind}" for axis in "XYZ" for kind in ("position", "rotation")}
 
 
@@ -25,7 +34,7 @@ class BvhError(ValueError):
     """A BVH file that cannot be read: which file, which line, what is wrong."""
 
     def __init__(self, path: Path, line: int, message: str) -> None:
-        self.path, self.line = path, line
+        self.path, self.line, self.message = path, line, message
         super().__init__(f"{path}:{line}: {message}")
 
 
@@ -41,21 +50,42 @@ class BvhJoint:
 
 @dataclass(frozen=True)
 class BvhText:
-    """What a file says: joints with parents first, End Sites as (joint, offset), frames (N, channels)."""
+    """What a file says: joints with parents first, End Sites as (joint, offset), frames (N, channels).
+
+    numbers (N,): which frame of the recording each row is, rising; spoilt rows are missing. fps: as told, or
+    by the header; header_fps: None where that is no rate. notes: what was lost or read another way, in words.
+    """
 
     joints: list[BvhJoint]
     ends: list[tuple[int, tuple[float, float, float]]]
     frames: NDArray[np.float64]
+    numbers: NDArray[np.intp]
     fps: float
+    header_fps: float | None
+    notes: tuple[str, ...]
 
 
-def read_bvh_text(path: Path) -> BvhText:
-    """Read all of a file; raises BvhError or OSError."""
-    with TextIOWrapper(opened(path), encoding="utf-8-sig", errors="replace") as file:
+def read_bvh_text(path: Path, true_fps: float | None = None) -> BvhText:
+    """Read all of a file; true_fps: in place of the header's. Raises BvhError or OSError."""
+    with opened_text(path) as file:
         lines = _Lines(path, file)
         joints, ends = _read_hierarchy(lines)
-        frames, fps = _read_motion(lines, joints)
-    return BvhText(joints, ends, frames, fps)
+        width = sum(len(joint.channels) for joint in joints)
+        announced = _headed(lines, "Frames:")
+        announced_in = lines.number
+        header_fps, notes = _read_rate(lines, true_fps)
+        if not width:
+            lines.fail("no joint has a channel: nothing can move.")
+        fps = true_fps or header_fps
+        assert fps is not None  # or the header was refused
+        frames, rows = _read_rows(lines, width, int(MAX_VALUES / (width * max(1.0, _STAGE_FPS / fps))))
+    if _count(announced) != rows.count:
+        said = f"'{announced[:40]}'" if announced else "nothing"
+        there = f"{counted(rows.count, 'row')} {'is' if rows.count == 1 else 'are'} there"
+        notes.append(f"line {announced_in}: the header announces {said} as the number of frames, {there}")
+    if lines.decimal_commas:
+        notes.append("decimal commas read as points")
+    return BvhText(joints, ends, frames, np.array(rows.numbers), fps, header_fps, (*notes, *rows.notes()))
 
 
 class _Lines:
@@ -63,6 +93,8 @@ class _Lines:
 
     def __init__(self, path: Path, file: TextIOWrapper) -> None:
         self.path, self.number, self._file = path, 0, file
+        self.decimal_commas = False
+        self._again: list[str] = []
         self.bytes = os.fstat(file.fileno()).st_size
 
     def next(self, expected: str) -> list[str]:
@@ -74,6 +106,9 @@ class _Lines:
 
     def next_or_end(self) -> list[str]:
         """Words of the next line that has any; none at the end of the file."""
+        if self._again:
+            words, self._again = self._again, []
+            return words
         for _ in range(MAX_BLANK_LINES):
             line = self._file.readline(MAX_LINE)
             self.number += 1
@@ -85,6 +120,10 @@ class _Lines:
             self.fail(f"more than {MAX_BLANK_LINES} blank lines in a row: this is not a BVH file.")
         return words
 
+    def again(self, words: list[str]) -> None:
+        """The next line is this one once more."""
+        self._again = words
+
     def fail(self, message: str) -> NoReturn:
         raise BvhError(self.path, self.number, message)
 
@@ -92,8 +131,11 @@ class _Lines:
         try:
             values = np.array(words, dtype=np.float64)
         except ValueError:
-            bad = next(w for w in words if not _is_number(w))
-            self.fail(f"{what}: '{bad[:40]}' is not a number.")
+            points = [word.replace(",", ".", 1) for word in words]  # as programs in many countries write
+            bad = next((w for w, point in zip(words, points, strict=True) if not _is_number(point)), None)
+            if bad is not None:
+                self.fail(f"{what}: '{bad[:40]}' is not a number.")
+            values, self.decimal_commas = np.array(points, dtype=np.float64), True
         if not np.isfinite(values).all():
             self.fail(f"{what}: a value is not finite (NaN or infinite). Export the recording again.")
         return values
@@ -201,43 +243,75 @@ def _channels(lines: _Lines, words: list[str]) -> list[str]:
     return names
 
 
-def _read_motion(lines: _Lines, joints: list[BvhJoint]) -> tuple[NDArray[np.float64], float]:
-    count = _count(_headed(lines, "Frames:", "N"))
-    if count < 0:
-        lines.fail("'Frames: N' should stand here.")
-    if not count:
-        lines.fail("the file has no frames.")
-    seconds = _headed(lines, "Frame Time:", "S")
-    frame_time = float(lines.floats([seconds], "Frame Time")[0])
-    if not 1e-4 <= frame_time <= 10:
-        lines.fail(f"a frame time of {frame_time} s is not plausible (0.0001 to 10).")
-    width = sum(len(joint.channels) for joint in joints)
-    if not width:
-        lines.fail("no joint has a channel: nothing can move.")
-    if count * width * max(1.0, _STAGE_FPS * frame_time) > MAX_VALUES:
-        lines.fail(
-            f"{count} frames of {width} values ({count * frame_time:.0f} s) are too many to read. "
-            "Cut the recording into pieces."
-        )
-    return _read_frames(lines, count, width), 1 / frame_time
-
-
-def _headed(lines: _Lines, heading: str, what: str) -> str:
-    """The one word after a heading such as 'Frame Time:', in any case and spacing."""
+def _headed(lines: _Lines, heading: str) -> str:
+    """What follows a heading such as 'Frame Time:', in any case and spacing; '' where nothing does."""
     words = " ".join(lines.next(f"'{heading}'")).replace(":", ": ").split()
     expected = heading.upper().split()
-    if [w.upper() for w in words[:-1]] != expected:
-        lines.fail(f"'{heading} {what}' should stand here.")
-    return words[-1]
+    if [word.upper() for word in words[: len(expected)]] != expected:
+        lines.fail(f"'{heading}' should stand here.")
+    return " ".join(words[len(expected) :])
 
 
-def _read_frames(lines: _Lines, count: int, width: int) -> NDArray[np.float64]:
-    frames = np.empty((min(count, lines.bytes // (2 * width) + 1), width))  # a value is two bytes or more
-    for frame in range(count):
-        words = lines.next(f"frame {frame + 1} of {count}")
-        if len(words) != width:
-            lines.fail(f"frame {frame + 1} has {len(words)} values, the channels need {width}.")
-        frames[frame] = lines.floats(words, f"frame {frame + 1}")
-    if lines.next_or_end():
-        lines.fail(f"more lines follow than the {count} frames that the header announces.")
-    return frames
+def _read_rate(lines: _Lines, true_fps: float | None) -> tuple[float | None, list[str]]:
+    """Frames a second by the header, and how that was read; None for no rate where the true one is told."""
+    words = lines.next("'Frame Time:'")
+    lines.again(words)
+    if true_fps is not None and _is_number(words[0]):
+        return None, [f"line {lines.number}: no line says the frame time"]
+    said = _headed(lines, "Frame Time:")
+    time = float(said.replace(",", ".", 1)) if _is_number(said.replace(",", ".", 1)) else np.nan
+    guessed = _rate_that_is_no_time(time)
+    if guessed is not None:
+        words_for = f"line {lines.number}: a frame time of {said} read as {guessed:.5g} poses a second"
+        return guessed, [] if true_fps else [f"{words_for} (otherwise: --true-fps)"]
+    if _SHORTEST_S <= time <= _LONGEST_S:
+        return 1.0 / time, []
+    if true_fps is None:
+        lines.fail(
+            f"a frame time of '{said[:40]}' s is not plausible ({_SHORTEST_S:g} to {_LONGEST_S:g}). Give the "
+            "rate: --true-fps 60."
+        )
+    return None, []
+
+
+def _rate_that_is_no_time(time: float) -> float | None:
+    """Frames a second where a 'frame time' is them, or is in milliseconds; None for seconds and for anything
+    that may be either."""
+    if not time > 1.0:
+        return None
+    as_rate, as_ms = (min(_USUAL_FPS, key=lambda usual: abs(usual - fps)) for fps in (time, 1000.0 / time))
+    is_rate, is_ms = abs(as_rate - time) < 1e-3 * time, abs(as_ms * time / 1000.0 - 1.0) < 1e-3
+    return None if is_rate == is_ms else float(time if is_rate else as_ms)
+
+
+def _read_rows(lines: _Lines, width: int, most: int) -> tuple[NDArray[np.float64], KeptRows]:
+    """All whole rows up to the end. Raises BvhError where there is none, or for more than `most`."""
+    frames = np.empty((min(lines.bytes // (2 * width) + 1, most), width))  # a value is two bytes or more
+    rows = KeptRows()
+    first: BvhError | None = None
+    while True:
+        try:
+            words = lines.next_or_end()
+            if rows.lost_in_a_row > MAX_SPOILT_ROWS:
+                lines.fail(f"more than {MAX_SPOILT_ROWS} rows behind each other are no frames.")
+            if words and words[0].upper() == "HIERARCHY":
+                lines.fail("a second recording begins here. Save it in a file for itself.")
+        except BvhError as error:
+            first = first or error
+            rows.stopped = f"line {error.line}: {error.message.rstrip('.')}"
+            break
+        if not words:
+            break
+        if len(rows.numbers) == most:
+            lines.fail(f"more than {most} frames of {width} values are too many to read. Cut the recording.")
+        try:
+            if len(words) != width:
+                lines.fail(f"frame {rows.count + 1} has {len(words)} values, the channels need {width}.")
+            frames[len(rows.numbers)] = lines.floats(words, f"frame {rows.count + 1}")
+            rows.keep(lines.number)
+        except BvhError as error:
+            first = first or error
+            rows.lose(lines.number, error.message)
+    if not rows.numbers:
+        raise first or BvhError(lines.path, lines.number, "the file has no frames. Export it again.")
+    return frames[: len(rows.numbers)], rows

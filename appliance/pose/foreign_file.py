@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import codecs
 import errno
 import json
 import os
+import re
 import stat
-from io import BufferedReader
+from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import Any
 
 _LARGEST_KEPT = 1 << 22
+_SAMPLE = 1 << 18  # bytes at the start of a text that tell its encoding; they hold a skeleton's names
+_JAPANESE = re.compile("[\u3040-\u30ff\u4e00-\u9fff]{2,}")  # kana or kanji side by side
 
 
 class TooLargeError(OSError):
@@ -25,6 +29,31 @@ def opened(path: Path) -> BufferedReader:
     if not stat.S_ISREG(kind):
         raise OSError(errno.EINVAL, "it is no regular file", str(path))
     return os.fdopen(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb")
+
+
+def encoding_of(sample: bytes) -> str:
+    """The encoding of a text by its beginning: UTF-16 by its mark, UTF-8, Shift-JIS, else Latin.
+
+    A few damaged bytes do not change it. Shift-JIS needs Japanese words: an umlaut of a Latin encoding and
+    the letter behind it may make one kanji, hardly two.
+    """
+    if sample[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return "utf-16"
+    text = sample.rstrip(bytes(range(128, 256))).decode("utf-8", "replace")
+    damaged, letters = text.count("\ufffd"), sum(letter > "\x7f" for letter in text)
+    if damaged <= letters // 2:
+        return "utf-8-sig"
+    text = sample.decode("cp932", "replace")
+    japanese = sum(map(len, _JAPANESE.findall(text)))
+    return "cp932" if japanese > text.count("\ufffd") else "cp1252"
+
+
+def opened_text(path: Path) -> TextIOWrapper:
+    """A regular file as text in its own encoding; what is no letter in it is replaced. Raises OSError."""
+    stream = opened(path)
+    encoding = encoding_of(stream.read(_SAMPLE))
+    stream.seek(0)
+    return TextIOWrapper(stream, encoding=encoding, errors="replace")
 
 
 def content(path: Path, largest: int) -> bytes:

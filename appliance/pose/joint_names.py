@@ -1,55 +1,71 @@
 """The table of joint names: which place of a human figure a name means, in the words of the usual systems.
 
 Rokoko, Xsens, Captury, OptiTrack, Mixamo, MotionBuilder, Unreal, Unity and VRM, Vicon, SMPL, Kinect, CMU
-(BVH, ASF), Daz and Blender. Every guess about a joint's meaning in this house looks here.
+(BVH, ASF), Daz, Blender, mocopi, Biovision, iPi, Second Life, Roblox, Maya's rigs and MMD (Japanese). Every
+guess about a joint's meaning in this house looks here.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+import unicodedata
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 # Words for a joint, in the order in which it lies on its chain; letter case and punctuation do not count, a
 # number at the end is the joint's number.
 CHAINS: dict[str, tuple[tuple[str, ...], ...]] = {
     "spine": (
-        ("hips", "hip", "pelvis", "root", "hipmaster", "hipsmaster"),
-        ("abdomen", "abdomenlower", "abdomenupper", "ab", "lowerback", "waist", "l5"),
-        ("spine", "back", "upperback", "l3"),
-        ("torso", "torsoa", "torsob", "torsoc", "chest", "chestlower", "thorax", "t12"),
-        ("upperchest", "chestupper", "sternum", "spineshoulder", "t8"),
-        ("neck", "lowerneck", "necklower", "upperneck", "neckupper"),
-        ("head", "skull"),
+        (
+            *(
+                "hips",
+                "hip",
+                "pelvis",
+                "root",
+                "hipmaster",
+                "hipsmaster",
+                "spinebase",
+                "midhip",
+                "lowertorso",
+            ),
+            *("全ての親", "センター", "グルーブ", "腰"),
+        ),
+        ("abdomen", "abdomenlower", "abdomenupper", "ab", "lowerback", "waist", "l5", "下半身"),
+        ("spine", "back", "upperback", "l3", "lowerspine", "middlespine", "spinemid", "上半身"),
+        ("torso", "torsoa", "torsob", "torsoc", "chest", "chestlower", "thorax", "t12", "uppertorso", "胸"),
+        ("upperchest", "chestupper", "sternum", "spineshoulder", "upperspine", "t8"),
+        ("neck", "lowerneck", "necklower", "upperneck", "neckupper", "首"),
+        ("head", "skull", "頭"),
         ("headtop", "headend", "topofhead", "nose"),
     ),
     "arm": (
-        ("collar", "clavicle"),
-        ("shoulder",),
-        ("shldr", "shldrbend", "upperarm", "arm", "uparm", "uarm", "humerus"),
-        ("elbow", "forearm", "forearmbend", "lowerarm", "farm", "radius"),
-        ("wrist",),
-        ("hand",),
+        ("collar", "clavicle", "scapula"),
+        ("shoulder", "肩"),
+        ("shldr", "shldrbend", "upperarm", "arm", "uparm", "uarm", "humerus", "腕"),
+        ("elbow", "forearm", "forearmbend", "lowerarm", "lowarm", "larm", "farm", "radius", "ひじ", "肘"),
+        ("wrist", "手首"),
+        ("hand", "手"),
         ("handtip", "handend"),
     ),
     "leg": (
         ("buttock", "hipjoint"),
-        ("hip", "upleg", "upperleg", "thigh", "thighbend", "femur"),
-        ("knee", "leg", "shin", "calf", "lowerleg", "tibia"),
-        ("ankle",),
+        ("hip", "upleg", "upperleg", "thigh", "thighbend", "femur", "足", "もも", "太もも"),
+        ("knee", "leg", "shin", "calf", "lowerleg", "lowleg", "shank", "tibia", "ひざ", "膝", "すね"),
+        ("ankle", "足首"),
         ("foot",),
-        ("toe", "toebase", "ball", "toes"),
+        ("toe", "toebase", "ball", "toes", "つま先", "足先ex"),
         ("toeend", "toetip"),
     ),
-    "eye": (("eye",),),
+    "eye": (("eye", "目"),),
     **{
         words[0]: (words, tuple(f"{word}tip" for word in words))
         for words in (
-            ("thumb", "handthumb"),
-            ("index", "handindex"),
-            ("middle", "mid", "handmiddle"),
-            ("ring", "handring"),
-            ("pinky", "little", "handpinky"),
+            ("thumb", "handthumb", "親指"),
+            ("index", "handindex", "人指", "人差指", "人差し指"),
+            ("middle", "mid", "handmiddle", "中指"),
+            ("ring", "handring", "薬指"),
+            ("pinky", "little", "handpinky", "小指"),
             ("finger", "fingerbase"),
         )
     },
@@ -62,20 +78,23 @@ _PLACES = {
     for word in words
 }
 _IN_FRONT = re.compile(
-    r"^(.*[:|]|mixamorig\d*_?|bip\d*[ _]|j_bip_c_|j_bip_|character\d*[_ ]|skeleton[ _]?\d*[_ ]|joint_|jnt_|"
-    r"cc_base_|def[-_]|b_|valvebiped[._]|bip\d+_)+(?=.)",
+    r"^(.*[:|/\\]|mixamorig\d*_?|bip\d*[ _]|j_bip_c_|j_bip_|character\d*[_ ]|skeleton[ _]?\d*[_ ]|"
+    r"joint_|jnt_|cc_base_|def[-_]|org[-_]|b_|c_|valvebiped[._]|bip\d+_|(?-i:m(?=[A-Z])))+(?=.)",
     re.IGNORECASE,
 )
 _PHALANXES = {"metacarpal": "4", "proximal": "1", "intermediate": "2", "medial": "2", "distal": "3"}
 _FINGER = re.compile(rf"(?:finger(?P<finger>[1-5]))?(?P<phalanx>{'|'.join(_PHALANXES)})$")
-_BEHIND = re.compile(r"[_.\- ](jnt|joint|bone)$", re.IGNORECASE)
+_BEHIND = re.compile(r"[_.\- ](jnt|joint|bone|m)$", re.IGNORECASE)  # Maya's rigs: Spine1_M
 _SIDES = (  # where a name has its side, the most explicit first; the rest must be a word of the table
-    re.compile(r"^(?P<side>left|right)(?P<rest>.+)$"),
+    re.compile(r"^(?P<side>left|right|左|右)(?P<rest>.+)$"),
     re.compile(r"^(?P<rest>.+?)(?P<side>left|right)(?P<number>\d*)$"),
     re.compile(r"^(?P<rest>.+?)(?P<side>[lr])t(?P<number>\d*)$"),
     re.compile(r"^(?P<side>[lr])(?P<rest>.+)$"),
     re.compile(r"^(?P<rest>.+?)(?P<side>[lr])(?P<number>\d*)$"),
 )
+_LEFT = ("left", "l", "左")
+# Where a prefix may end: behind a mark, and where a word or a number meets a capital letter.
+_SEAM = re.compile(r"(?<=[_.:|/\\\- ])(?=.)|(?<=[a-z0-9])(?=[A-Z])")
 
 
 class Place(NamedTuple):
@@ -102,6 +121,17 @@ def place_of(name: str) -> Place | None:
     return None
 
 
+def shared_prefix(names: Sequence[str]) -> str:
+    """The longest beginning that at least half of the names have, up to a mark or a capital; '' without one.
+
+    A performer or a rig in front of its joints: Model_Hips, Actor01_LeftArm. What hangs from the rig
+    besides, such as props, has other beginnings.
+    """
+    counts = Counter(name[: seam.start()] for name in names for seam in _SEAM.finditer(name))
+    often = (prefix for prefix, count in counts.items() if count >= max(2, len(names) / 2))
+    return max(often, key=len, default="")
+
+
 def side_of(name: str) -> int:
     """1 for names of the left, -1 of the right, 0 for the middle and for names that do not say.
 
@@ -125,8 +155,8 @@ def _numbered(bone: re.Match[str]) -> str:
 
 
 def _without_frills(name: str) -> str:
-    """A name without what programs put before and behind it."""
-    return _BEHIND.sub("", _IN_FRONT.sub("", name))
+    """A name without what programs put before and behind it; wide letters and digits as the usual ones."""
+    return _BEHIND.sub("", _IN_FRONT.sub("", unicodedata.normalize("NFKC", name)))
 
 
 def _sided(folded: str) -> Iterator[tuple[int, str]]:
@@ -135,4 +165,4 @@ def _sided(folded: str) -> Iterator[tuple[int, str]]:
         found = pattern.match(folded)
         if found:
             parts = found.groupdict()
-            yield (1 if parts["side"].startswith("l") else -1), parts["rest"] + (parts.get("number") or "")
+            yield (1 if parts["side"] in _LEFT else -1), parts["rest"] + (parts.get("number") or "")

@@ -15,7 +15,7 @@ import typer
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import UnknownJointError
-from appliance.pose.stage_frame import FACINGS, UPS, Guess, Reading, in_stage_frame
+from appliance.pose.stage_frame import CENTIMETRE, FACINGS, UPS, Guess, Reading, in_stage_frame
 
 T = TypeVar("T")
 _GROUP = "How recordings are read; PATTERN=VALUE for some of several"
@@ -67,22 +67,26 @@ def first_fit(by_pattern: Mapping[str, Any], name: str) -> Any:
 
 
 def read_upright(path: Path, options: ReadingOptions = AS_THE_FILES_SAY) -> tuple[Recording, list[Guess]]:
-    """A BVH file in the stage's frame, and what was changed; the side that the dance faces is left as it is.
+    """A BVH file in the stage's frame, and what was lost or changed.
 
     Raises BvhError, also for a root that it does not have, or OSError.
     """
     recording = read_bvh(path, true_fps=options.fps_of(path.stem))
-    return brought_in(path, recording, options.reading_of(path.stem), turn_dance=False)
+    return brought_in(path, recording, options.reading_of(path.stem))
 
 
 def brought_in(
-    path: Path, recording: Recording, reading: Reading, *, turn_dance: bool = True
+    path: Path, recording: Recording, reading: Reading, unit_m: float = CENTIMETRE
 ) -> tuple[Recording, list[Guess]]:
-    """A recording of this file in the stage's frame. Raises BvhError for a root that it does not have."""
+    """A recording of this file in the stage's frame, and what was lost or changed.
+
+    unit_m: of the file's lengths, as it was read. Raises BvhError for a root that it does not have.
+    """
     try:
-        return in_stage_frame(recording, reading, turn_dance=turn_dance)
+        found, guesses = in_stage_frame(recording, reading, unit_m=unit_m)
     except UnknownJointError as error:
         raise BvhError(path, 1, f"{error} Give another --root.") from error
+    return found, [*(Guess(note, "") for note in recording.notes), *guesses]
 
 
 def reading_options(command: Callable[..., T]) -> Callable[..., T]:
@@ -91,8 +95,8 @@ def reading_options(command: Callable[..., T]) -> Callable[..., T]:
 
     @wraps(command)
     def run(*arguments: Any, **options: Any) -> T:
-        given = {name: options.pop(name) for name in _OPTIONS}
-        parsed = {name: _parsed(name, given[name] or []) for name in _OPTIONS if name != "all_frames"}
+        given = {name: options.pop(name) for name in OPTIONS}
+        parsed = {name: _parsed(name, given[name] or []) for name in OPTIONS if name != "all_frames"}
         return command(
             *arguments, **options, reading=ReadingOptions(**parsed, all_frames=given["all_frames"])
         )
@@ -100,7 +104,7 @@ def reading_options(command: Callable[..., T]) -> Callable[..., T]:
     kept = [parameter for name, parameter in own.parameters.items() if name != "reading"]
     added = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-        for name, (annotation, default) in _OPTIONS.items()
+        for name, (annotation, default) in OPTIONS.items()
     ]
     vars(run)["__signature__"] = own.replace(parameters=[*kept, *added])  # what inspect.signature looks at
     run.__annotations__ = {one.name: one.annotation for one in (*kept, *added)}
@@ -111,10 +115,10 @@ def _option(words: str, metavar: str) -> Any:
     return Annotated[list[str] | None, typer.Option(help=words, metavar=metavar, rich_help_panel=_GROUP)]
 
 
-_OPTIONS: dict[str, tuple[Any, Any]] = {
+OPTIONS: dict[str, tuple[Any, Any]] = {
     "metres_per_unit": (_option("Unit of lengths in metres: 0.0254 for inches.", "METRES"), None),
     "up": (_option("Vertical axis of the file: y or z.", "AXIS"), None),
-    "facing": (_option("Where the dancer faces once upright: z (the audience), -z, x, -x.", "AXIS"), None),
+    "facing": (_option("Where the dancer faces once upright: -z, x, -x; z: it is not turned.", "AXIS"), None),
     "true_fps": (_option("Poses a second, where the header is wrong: 'salsa_*=60'.", "FPS"), None),
     "root": (_option("Joint that carries the body; what is above it is left out.", "JOINT"), None),
     "all_frames": (

@@ -20,7 +20,8 @@ TPOSE_SETTLED_DEGREES = 10.0  # filters ring after the jump: 94, 27, 24, 17, 7, 
 class Recording:
     """poses (N, J, 4) local unit quaternions without sign jumps; roots (N, 3) metres; fps in poses a second.
 
-    translations (N, J, 3) metres only where bones change their length over time, else None.
+    translations (N, J, 3) metres only where bones change their length over time, else None. notes: what of
+    its file was left out or taken for something else than it says, and where, in words.
     """
 
     skeleton: Skeleton
@@ -28,6 +29,7 @@ class Recording:
     roots: Array
     fps: float
     translations: Array | None = None
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -51,6 +53,16 @@ class Recording:
             return replace(self, fps=fps)
         count = int(np.floor((len(self) - 1) * fps / self.fps + 1e-9)) + 1
         at = np.minimum(np.arange(count) * self.fps / fps, len(self) - 1)
+        return replace(self._between(at), fps=fps)
+
+    def spread(self, frames: NDArray[np.intp]) -> Recording:
+        """The same poses as frames of these rising numbers; the figure turns evenly over those between."""
+        if len(frames) < 2 or frames[-1] - frames[0] == len(frames) - 1:
+            return self
+        return self._between(np.interp(np.arange(frames[0], frames[-1] + 1), frames, np.arange(len(frames))))
+
+    def _between(self, at: NDArray[np.float64]) -> Recording:
+        """Poses at places among the frames: rotations by SLERP, positions straight between two."""
         before = np.minimum(at.astype(int), len(self) - 2)
         share = at - before
         poses = quaternion.slerp(self.poses[before], self.poses[before + 1], share[:, None])
@@ -60,12 +72,11 @@ class Recording:
             mixed: Array = (1 - weight) * values[before] + weight * values[before + 1]
             return mixed
 
-        return Recording(
-            self.skeleton,
-            quaternion.continuous(poses),
-            straight(self.roots),
-            fps,
-            None if self.translations is None else straight(self.translations),
+        return replace(
+            self,
+            poses=quaternion.continuous(poses),
+            roots=straight(self.roots),
+            translations=None if self.translations is None else straight(self.translations),
         )
 
     def _frames(self, chosen: NDArray[np.intp]) -> Recording:

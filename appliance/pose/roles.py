@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from appliance.pose.joint_names import Place, place_of
+from appliance.pose.joint_names import Place, place_of, shared_prefix
 
 MIDDLE = ("hips", "spine", "chest", "neck", "head")
 LIMBS = ("collar", "upper arm", "forearm", "hand", "thigh", "shin", "foot", "toe")
@@ -19,12 +19,9 @@ _HIPS, _WAIST, _SPINE, _CHEST, _UPPER_CHEST, _NECK, _HEAD = range(7)
 
 
 def places_of(names: Sequence[str]) -> list[Place | None]:
-    """For each joint its place on a figure, None for an unknown name; a prefix of all names is ignored."""
-    first, last = min(names, default=""), max(names, default="")
-    apart = (place for place, (a, b) in enumerate(zip(first, last, strict=False)) if a != b)
-    shared = first[: next(apart, 0)]
-    end = max((shared.rfind(mark) for mark in "_:. |-"), default=-1) + 1
-    return [place_of(name) or place_of(name[end:]) for name in names]
+    """For each joint its place on a figure, None for an unknown name; a prefix of most names is ignored."""
+    prefix = shared_prefix(names)
+    return [place_of(name) or place_of(name.removeprefix(prefix)) for name in names]
 
 
 def roles_of(names: Sequence[str]) -> dict[str, int]:

@@ -22,11 +22,13 @@ from appliance.pose.body_facts import (
 from appliance.pose.bones import span_m
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.pose.roles import places_of
 from appliance.pose.skeleton import Skeleton
 
 CENTIMETRE = 0.01  # unit of BVH files, unless no dancer has that size
 SMALLEST_M, LARGEST_M, USUAL_M = 1.2, 5.0, 2.3  # from a hand to a foot along the bones: child, giant, dancer
-UNITS = {"metres": 1.0, "decimetres": 0.1, "CMU's units": 0.0564, "inches": 0.0254, "millimetres": 0.001}
+UNITS = {"metres": 1.0, "decimetres": 0.1, "CMU's units": 0.0564, "inches": 0.0254, "centimetres": CENTIMETRE}
+UNITS["millimetres"] = 0.001
 STILL_DEGREES = 0.1
 STRETCH_M = 1e-6
 FAR_FROM_HIPS = 0.4  # of the hips' reach, a leg: a root further away is no part of the body
@@ -64,18 +66,17 @@ AS_GUESSED = Reading()
 
 
 def in_stage_frame(
-    recording: Recording, reading: Reading = AS_GUESSED, *, turn_dance: bool = True
+    recording: Recording, reading: Reading = AS_GUESSED, *, unit_m: float = CENTIMETRE
 ) -> tuple[Recording, list[Guess]]:
     """The recording in the stage's frame, and what was changed.
 
-    recording: as read from a file in centimetres; turn_dance: a dance that keeps its back to the audience is
-    turned, not only a zero pose that does. Raises UnknownJointError for a root that it does not have.
+    unit_m: of the file's lengths, as it was read. Raises UnknownJointError for a root that it does not have.
     """
     guesses = []
     if reading.metres_per_unit is None:
-        scale, words = _guessed_scale(recording.skeleton)
+        scale, words = _guessed_scale(recording.skeleton, unit_m)
     else:
-        scale, words = reading.metres_per_unit / CENTIMETRE, ""
+        scale, words = reading.metres_per_unit / unit_m, ""
     if scale != 1.0:
         recording = _scaled(recording, scale)
     if words:
@@ -90,7 +91,7 @@ def in_stage_frame(
     if (reading.up or ("z" if _is_z_up(recording) else "y")) == "z":
         guesses.append(Guess("turned from Z up to Y up", "" if reading.up else "--up y"))
         recording = _turned_upright(recording)
-    recording, words = _faced(recording, reading.facing, turn_dance)
+    recording, words = _faced(recording, reading.facing)
     if words:
         guesses.append(Guess(words, "" if reading.facing else "--facing z"))
     floor = floor_m(recording.skeleton, sampled_positions(recording)) if recording.skeleton.feet else 0.0
@@ -103,19 +104,18 @@ def in_stage_frame(
     return recording, guesses
 
 
-def _guessed_scale(skeleton: Skeleton) -> tuple[float, str]:
-    """Factor for lengths read as centimetres, and a note; 1 if the result is a dancer's size."""
+def _guessed_scale(skeleton: Skeleton, unit_m: float) -> tuple[float, str]:
+    """Factor for lengths read in this unit, and a note; 1 if the result is a dancer's size."""
     span = span_m(skeleton)
     if SMALLEST_M <= span <= LARGEST_M or not span:
         return 1.0, ""
-    sizes = {unit: span * metres / CENTIMETRE for unit, metres in UNITS.items()}
+    sizes = {unit: span * metres / unit_m for unit, metres in UNITS.items()}
     unit = min(sizes, key=lambda name: abs(np.log(sizes[name] / USUAL_M)))
     if not SMALLEST_M <= sizes[unit] <= LARGEST_M:
         return 1.0, ""
-    words = (
-        f"lengths read as {unit}: in centimetres there would be {100 * span:.2g} of them from hand to foot"
-    )
-    return UNITS[unit] / CENTIMETRE, words
+    usual = next(name for name, metres in UNITS.items() if metres == unit_m)
+    words = f"lengths read as {unit}: in {usual} there would be {span / unit_m:.2g} of them from hand to foot"
+    return UNITS[unit] / unit_m, words
 
 
 def _scaled(recording: Recording, scale: float) -> Recording:
@@ -141,14 +141,18 @@ def _root_of(recording: Recording) -> tuple[int, str]:
     apart = float(np.linalg.norm(positions[:, hips] - positions[:, 0], axis=-1).mean())
     if apart <= FAR_FROM_HIPS * skeleton.reaches[hips]:
         return 0, ""
-    return (
-        hips,
-        f"{skeleton.names[0]}, {apart:.2f} m from {skeleton.names[hips]}, left out: the hips are the root",
-    )
+    kept = {*skeleton.descendants(hips), *skeleton.ancestors(hips)}
+    others = [name for joint, name in enumerate(skeleton.names) if joint not in kept]
+    besides = f", with {', '.join(others)}" if others else ""
+    root, named = skeleton.names[0], skeleton.names[hips]
+    return hips, f"{root}, {apart:.2f} m from {named}, left out{besides}: the hips are the root"
 
 
 def _hangs_from_nothing(recording: Recording) -> bool:
-    """Whether the root is not part of the body: it never turns, and its only child does."""
+    """Whether the root is not part of the body: it never turns, and its only child, no spine, does."""
+    child = places_of(recording.skeleton.names[:2])[-1]
+    if child is not None and child.chain == "spine" and child.place:
+        return False
     q = recording.poses[:, :2]
     turned = np.degrees(quaternion.angle_between(q, q[:1])).max(axis=0)
     carried = [joint for joint, parent in enumerate(recording.skeleton.parents) if parent == 0]
@@ -200,7 +204,7 @@ def _turned_upright(recording: Recording) -> Recording:
     return _room_turned(recording, turn) if upright else _axes_turned(recording, turn)
 
 
-def _faced(recording: Recording, facing: str | None, turn_dance: bool) -> tuple[Recording, str]:
+def _faced(recording: Recording, facing: str | None) -> tuple[Recording, str]:
     """The recording with the front to +z, at rest and in the mean of the dance, and what was turned.
 
     Whole quarter turns, so that axes stay axes. facing: of the dance; None: guessed.
@@ -213,7 +217,7 @@ def _faced(recording: Recording, facing: str | None, turn_dance: bool) -> tuple[
         recording = _axes_turned(recording, _quarter_turn(-at_rest))
         words.append(f"the zero pose, which faces {_side(at_rest)}, turned to the audience")
         given = 0 if facing is None else (given - at_rest) % 4
-    if facing is None and turn_dance:
+    if facing is None:
         given = _quarters(fronts(skeleton, sampled_positions(recording)))
         if given:
             words.append(f"the dance, which mostly faces {_side(given)}, turned to the audience")

@@ -31,7 +31,7 @@ def inspect(
     options, and a show keeps those that it was trained with.
     """
     with clear_errors("inspect"):
-        from appliance.studio.data.catalogue import find_catalogue, recordings_in
+        from appliance.studio.data.catalogue import find_catalogue, left_out_of, recordings_in
         from appliance.studio.data.takes import load_take
         from appliance.studio.evaluation.masked import draw_masked
         from appliance.studio.inspection import inspect as look_at
@@ -40,6 +40,11 @@ def inspect(
         files = [
             file for given in recordings for file in (recordings_in(given) if given.is_dir() else [given])
         ]
+        for folder in filter(Path.is_dir, recordings):
+            if others := left_out_of(folder):
+                typer.echo(
+                    f"Left out of {folder}, as only its BVH files are read: {', '.join(others)}.", err=True
+                )
         if not files:
             raise StudioError(f"{recordings[0]} has no .bvh files. Give BVH recordings, or a folder of them.")
         found = [

@@ -19,13 +19,20 @@ from appliance.exchange.formats import ENDINGS, read_as_told, write_recording
 from appliance.exchange.glb_file import GlbBuffer, GlbFile
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
+from appliance.pose.plain_names import plain_names
+from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+from appliance.pose.stage_frame import in_stage_frame
 from tests.bundles import swaying_phrase
 from tests.command import Command
+from tests.pose.conventions import dance_of
+from tests.pose.test_bvh import HOSTILE
 from tests.studio.bodies import body, moved
 
 CLOSE_DEGREES = {".bvh": 1e-3, ".glb": 1e-3, ".npz": 1e-5, ".csv": 1e-4}
 CLOSE_M = {".bvh": 1e-6, ".glb": 1e-5, ".npz": 1e-12, ".csv": 1e-8}
+AS_IT_IS = ReadingOptions(facing={"*": "z"}, up={"*": "y"})
 FIGURES = {
     "22 joints": body(),
     "fingers": body("mixamorig:{side}{joint}", fingers=2),
@@ -90,7 +97,7 @@ def test_any_rotations_come_back(
     meant = Recording(figure, poses, chance.normal(size=(frames, 3)), fps)
     path = tmp_path_factory.mktemp("any") / f"dance{ending}"
     write_recording(path, meant)
-    found = read_as_told(path)[0]
+    found = read_as_told(path, AS_IT_IS)[0]
     # Euler angles with six digits: at gimbal lock they say less
     assert np.degrees(quaternion.angle_between(found.poses, meant.poses)).max() < 0.01
     assert found.fps == pytest.approx(fps, rel=1e-6)
@@ -111,7 +118,7 @@ def test_real_dances_come_back(recordings_dir: Path, tmp_path: Path) -> None:
     meant = read_bvh(path, true_fps=60, drop_tpose=True).excerpt(0.0, 5.0)
     for ending in ENDINGS:
         write_recording(tmp_path / f"dance{ending}", meant)
-        assert_same_dance(read_as_told(tmp_path / f"dance{ending}")[0], meant, ending)
+        assert_same_dance(read_as_told(tmp_path / f"dance{ending}", AS_IT_IS)[0], meant, ending)
 
 
 def test_the_command_as_it_is_installed(tmp_path: Path) -> None:
@@ -232,15 +239,119 @@ def test_damaged_files_are_refused_in_words(ending: str, tmp_path: Path, bunraku
     assert not (tmp_path / "out.bvh").exists() or ending == ".csv"
 
 
-def test_a_wrong_row_is_named_with_its_line(tmp_path: Path, bunraku: Command) -> None:
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "1,2",
+            "line 7: 1 row lost (this line has 2 values, the others 36), the figure turns evenly over it",
+        ),
+        ("x{row}", "'x0.08' is not a number"),
+        ("NA{row}", "is not a number"),
+        ("{row},7", "has 37 values"),
+    ],
+)
+def test_a_row_that_is_none_costs_that_row_and_is_named(text: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "dance.csv"
     write_recording(path, swaying_phrase())
     lines = path.read_text().splitlines()
-    for text, words in (("1,2", "has 2 values"), (lines[6].replace("0.1,", "x,", 1), ""), ("", "empty")):
-        path.write_text("\n".join([*lines[:6], text if text != lines[6] else "a" + text, *lines[7:]]))
-        said = bunraku("convert", path, tmp_path / "out.bvh", status=2).err
-        assert "dance.csv:7:" in said
-        assert words in said
+    lines[6] = text.format(row=lines[6])
+    path.write_text("\n".join(lines))
+    found, guesses = read_as_told(path)
+    assert len(found) == len(swaying_phrase())
+    assert words in guesses[0].sentence() and "line 7" in guesses[0].sentence()
+
+
+def test_a_table_without_one_whole_row_is_refused_with_its_line(tmp_path: Path, bunraku: Command) -> None:
+    path = tmp_path / "dance.csv"
+    write_recording(path, swaying_phrase())
+    path.write_text("\n".join([*path.read_text().splitlines()[:2], "1,2", "x"]))
+    said = bunraku("convert", path, tmp_path / "out.bvh", status=2).err
+    assert "dance.csv:3: This line has 2 values" in said
+
+
+@pytest.mark.parametrize("ending", [".npz", ".csv"])
+def test_frames_that_are_no_rotations_are_lost_and_named(ending: str, tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    poses = meant.poses.copy()
+    poses[10:12, 3], poses[-1, 0] = np.nan, 0.0
+    write_recording(tmp_path / f"dance{ending}", replace(meant, poses=poses))
+    found, guesses = read_as_told(tmp_path / f"dance{ending}")
+    assert len(found) == len(meant) - 1
+    place = "lines 13 to 14" if ending == ".csv" else "frames 10 to 11"
+    assert f"{place}: 2 " in guesses[0].words and "is no unit quaternion" in guesses[0].words
+    assert "1 " in guesses[1].words and "left out" in guesses[1].words
+    apart = np.degrees(quaternion.angle_between(found.poses, meant.poses[:-1]))
+    assert apart.max() < 3.0
+
+
+def in_a_spreadsheet(text: str, kind: str) -> str:
+    """As a spreadsheet saves the table."""
+    head, titles, *rows = text.splitlines()
+    if kind == "semicolons":
+        first = '"' + head.replace('"', '""') + '"' + ";" * titles.count(",")
+        return "\n".join(
+            [first, titles.replace(",", ";"), *(r.replace(",", ";").replace(".", ",") for r in rows)]
+        )
+    if kind == "index":
+        return "\n".join([head, f",{titles}", *(f"{number},{row}" for number, row in enumerate(rows))])
+    if kind == "another order":
+        turned = [",".join(reversed(row.split(","))) for row in (titles, *rows)]
+        return "\n".join([head, *turned])
+    return "\r\n".join([head, titles, *rows, "", "  ", ""])
+
+
+@pytest.mark.parametrize("kind", ["semicolons", "index", "another order", "blank last lines"])
+def test_what_spreadsheets_make_of_a_table_is_read(kind: str, tmp_path: Path) -> None:
+    meant, path = moved(body(), seconds=1.0), tmp_path / "dance.csv"
+    write_recording(path, meant)
+    path.write_text(in_a_spreadsheet(path.read_text(), kind))
+    found, guesses = read_as_told(path)
+    assert_same_dance(found, meant, ".csv")
+    assert [guess.words for guess in guesses] == (
+        ["columns that are none of the skeleton left out: one without a title"] if kind == "index" else []
+    )
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_true_rate_overrules_the_one_of_every_format(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"dance{ending}"
+    write_recording(path, swaying_phrase())
+    found, _ = read_as_told(path, ReadingOptions(true_fps={"*": 25.0}))
+    assert found.fps == 25.0 and len(found) == len(swaying_phrase())
+
+
+def test_the_true_rate_applies_before_a_table_s_own_is_judged(tmp_path: Path) -> None:
+    path = tmp_path / "dance.csv"
+    write_recording(path, swaying_phrase())
+    path.write_text(path.read_text().replace('"fps": 50.0', '"fps": 0', 1))
+    with pytest.raises(ExchangeError):
+        read_as_told(path)
+    assert read_as_told(path, ReadingOptions(true_fps={"*": 25.0}))[0].fps == 25.0
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_every_format_is_turned_to_the_audience_unless_asked(ending: str, tmp_path: Path) -> None:
+    meant, _ = in_stage_frame(dance_of("Mixamo", seconds=2.0))
+    half = quaternion.from_axis_angle([0.0, 1.0, 0.0], np.pi)
+    away = replace(meant, poses=meant.poses.copy(), roots=meant.roots * [-1.0, 1.0, -1.0])
+    away.poses[:, 0] = quaternion.multiply(half, meant.poses[:, 0])
+    write_recording(tmp_path / f"dance{ending}", away)
+    found, guesses = read_as_told(tmp_path / f"dance{ending}")
+    assert_same_dance(found, meant, ending)
+    assert "mostly faces -z, turned to the audience (otherwise: --facing z)" in guesses[-1].sentence()
+    assert_same_dance(read_as_told(tmp_path / f"dance{ending}", AS_IT_IS)[0], away, ending)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_whatever_joints_are_called_what_is_written_is_read_back(ending: str, tmp_path: Path) -> None:
+    count = len(HOSTILE)
+    skeleton = Skeleton(HOSTILE, (-1, *range(count - 1)), np.tile([0.0, 0.1, 0.0], (count, 1)))
+    poses = np.tile(quaternion.IDENTITY.astype(float), (3, count, 1))
+    changed = write_recording(tmp_path / f"dance{ending}", Recording(skeleton, poses, np.zeros((3, 3)), 50.0))
+    found, _ = read_as_told(tmp_path / f"dance{ending}", AS_IT_IS)
+    assert found.skeleton.names == plain_names(HOSTILE)
+    assert "'line\\nend' to 'line_end'" in changed and "左ひざ" not in changed
 
 
 def test_what_cannot_be_converted_is_said_before_any_work(tmp_path: Path, bunraku: Command) -> None:

@@ -239,7 +239,8 @@ def test_wrong_names_are_named_with_their_line(text: str, where: str, tmp_path: 
 @pytest.mark.parametrize(
     ("text", "where"),
     [
-        ("Hips.x,Hips.y,Hips.z\n1,2,3\n1,2\n", ":3: This line has 2 values"),
+        ("Hips.x,Hips.y,Hips.z\n1,2\n", ":2: This line has 2 values"),
+        ("Hips.x,Hips.y,Hips.z\n1,5,2,5,3,5\n", "decimal commas? Save it with semicolons"),
         ("Hips.x,Hips.y,Hips.z\n1,2,x\n", ":2: "),
         ("Hips.x,Hips.y\n1,2\n", "no multiple of three"),
         ("Hips.x,Head.y,Hips.z\n1,2,3\n", ":1: Columns"),
@@ -260,7 +261,7 @@ def test_wrong_shapes_and_unknown_names_end_with_what_to_do(tmp_path: Path, bunr
     for array, words in (
         (np.zeros((5, 2, 2)), "it must be (frames, points, 3)"),
         (np.zeros((5, 3, 3)), "3 points, but 2 names"),
-        (np.full((5, 2, 3), np.inf), "Frame 0: a position is infinite"),
+        (np.full((5, 2, 3), np.inf), "never seen"),
         (np.full((5, 2, 3), np.nan), "never seen"),
         (np.ones((5, 2, 3)), "Write the parent behind each name"),
         (np.array([["a"]]), "no numbers"),

@@ -10,6 +10,7 @@ import pytest
 
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
+from appliance.pose.plain_names import plain_names
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
@@ -162,6 +163,8 @@ def spellings() -> dict[str, bytes]:
         "braces on the line before": LEG.replace("hip\n{", "hip {").replace("Site\n    {", "Site {").encode(),
         "brace touching the name": LEG.replace("knee\n  {", "knee{").encode(),
         "no space after the colon": LEG.replace("Frames: 2", "Frames:2").replace("Time: ", "Time:").encode(),
+        "utf-16": LEG.encode("utf-16"),
+        "decimal commas": LEG.replace("0.02", "0,02").replace(" 5 10 ", " 5,0 10,00 ").encode(),
         "exponents": LEG.replace("10 91 5", "1e1 9.1E+1 +5.0").encode(),
     }
 
@@ -179,6 +182,97 @@ def test_every_spelling_of_the_same_file(tmp_path: Path, leg: Path, spelling: st
 def test_names_may_contain_spaces_and_any_script(leg: Path) -> None:
     leg.write_text(LEG.replace("JOINT knee", "JOINT 左 膝"), encoding="utf-8")
     assert read_bvh(leg).skeleton.names == ("hip", "左 膝")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp932"])
+def test_names_in_shift_jis_are_read_as_they_were_written(leg: Path, encoding: str) -> None:
+    leg.write_bytes(LEG.replace("hip", "センター").replace("knee", "左ひざ").encode(encoding))
+    assert read_bvh(leg).skeleton.names == ("センター", "左ひざ")
+
+
+def test_an_umlaut_of_a_latin_encoding_is_no_kanji(leg: Path) -> None:
+    leg.write_bytes(LEG.replace("hip", "Hüfte").replace("knee", "Schädel").encode("cp1252"))
+    assert read_bvh(leg).skeleton.names == ("Hüfte", "Schädel")
+
+
+def test_a_damaged_byte_does_not_change_the_encoding(leg: Path) -> None:
+    text = LEG.replace("hip", "センター").replace("knee", "左ひざ").encode()
+    leg.write_bytes(text.replace(b"10 91", b"10 \xff91"))
+    assert read_bvh(leg).skeleton.names == ("センター", "左ひざ")
+
+
+@pytest.mark.parametrize(
+    ("said", "fps"),
+    [("30", 30), ("29.97", 29.97), ("120", 120), ("16.6667", 60), ("8,33333", 120), ("20", 50), ("1", 1)],
+)
+def test_a_frame_time_that_is_a_rate_or_in_milliseconds_is_read_so_and_said(
+    leg: Path, said: str, fps: float
+) -> None:
+    recording = read_bvh(rewritten(leg, "Frame Time: 0.02", f"Frame Time: {said}"))
+    assert recording.fps == pytest.approx(fps, rel=1e-4)
+    assert ("--true-fps" in "".join(recording.notes)) == (fps != 1)
+
+
+@pytest.mark.parametrize("said", ["0", "-1", "nan", "soon", "11", "0,02", "", "30"])
+def test_the_true_rate_applies_before_the_header_s_is_judged(leg: Path, said: str) -> None:
+    assert read_bvh(rewritten(leg, "Frame Time: 0.02", f"Frame Time: {said}"), true_fps=60).fps == 60
+
+
+def test_the_true_rate_also_stands_for_a_line_that_is_missing(leg: Path) -> None:
+    assert len(read_bvh(rewritten(leg, "Frame Time: 0.02\n", ""), true_fps=60)) == 2
+
+
+SIX = ("CHANNELS 3 Zrotation", "CHANNELS 6 Xposition Yposition Zposition Zrotation")
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "offset_m"),
+    [
+        ("0 0 0", "0 0 0", (0.0, -0.4, 0.0)),  # never written
+        ("0 0 0", "1 -2 0", (0.0, -0.4, 0.0)),  # changes of the OFFSET
+        ("0 -41 0", "1 -39 0", (0.0, -0.41, 0.0)),  # in place of it
+    ],
+)
+def test_positions_near_zero_are_changes_of_the_offset(
+    leg: Path, first: str, second: str, offset_m: tuple[float, ...]
+) -> None:
+    rewritten(leg, *SIX)
+    rewritten(leg, "0 90 0 0 0 0 0 0 0", f"0 90 0 0 0 0 {first} 0 0 0")
+    rewritten(leg, "40 50 60", f"{second} 40 50 60")
+    recording = read_bvh(leg)
+    np.testing.assert_allclose(recording.skeleton.offsets[1], offset_m)
+    assert ("added to the OFFSETs" in "".join(recording.notes)) == (offset_m[1] == -0.4)
+    if second == "1 -2 0":
+        assert recording.translations is not None
+        np.testing.assert_allclose(recording.translations[1, 1], [0.01, -0.42, 0.0])
+
+
+HOSTILE = (
+    "line\nend",
+    "",
+    "{",
+    "}",
+    "a {",
+    "  two   words ",
+    "tab\tbed",
+    "\ud800",
+    "x" * 5000,
+    "a_{",
+    "",
+    "a _",
+)
+HOSTILE += ("a {", "NUL\0", "\u2028", "joint1", "左ひざ", "OFFSET", "End Site")
+
+
+def test_whatever_joints_are_called_what_is_written_is_read_back(tmp_path: Path) -> None:
+    count = len(HOSTILE)
+    skeleton = Skeleton(HOSTILE, (-1, *range(count - 1)), np.tile([0.0, 0.1, 0.0], (count, 1)))
+    poses = np.tile(quaternion.IDENTITY.astype(float), (3, count, 1))
+    write_bvh(tmp_path / "dance.bvh", Recording(skeleton, poses, np.zeros((3, 3)), 50.0))
+    back = read_bvh(tmp_path / "dance.bvh")
+    assert back.skeleton.names == plain_names(HOSTILE)
+    assert back.skeleton.names[-3:] == HOSTILE[-3:] and len(set(back.skeleton.names)) == count
+    assert plain_names(back.skeleton.names) == back.skeleton.names and not back.notes
 
 
 def a_dance(stretching: bool = False) -> Recording:

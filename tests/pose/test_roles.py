@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.pose.joint_names import place_of, side_of
 from appliance.pose.roles import LIMBS, missing_roles, roles_of
 from appliance.pose.skeleton import Skeleton
@@ -48,15 +49,89 @@ def test_the_two_sides_are_told_apart(convention: str) -> None:
         ("RightFinger5Medial", ("pinky", -1, 0, 2)),
         ("lShldrBend", ("arm", 1, 2, 0)),
         ("abdomenUpper", ("spine", 0, 1, 0)),
+        ("l_low_arm", ("arm", 1, 3, 0)),
+        ("RightLowLeg", ("leg", -1, 2, 0)),
+        ("torso_7", ("spine", 0, 3, 7)),
+        ("Armature/LeftFoot", ("leg", 1, 4, 0)),
+        ("Armature|Rig\\Hips", ("spine", 0, 0, 0)),
+        ("mKneeLeft", ("leg", 1, 2, 0)),
+        ("mHandIndex2Right", ("index", -1, 0, 2)),
+        ("Spine1_M", ("spine", 0, 2, 1)),
+        ("左ひじ", ("arm", 1, 3, 0)),
+        ("右人指２", ("index", -1, 0, 2)),
+        ("ひざ.L", ("leg", 1, 2, 0)),
+        ("上半身2", ("spine", 0, 2, 2)),
     ],
 )
 def test_prefixes_sides_and_numbers(name: str, place: tuple[str, int, int, int]) -> None:
     assert place_of(name) == place
 
 
-@pytest.mark.parametrize("name", ["upperarm_twist_01_l", "ik_foot_root", "Tail", "bone12", "", "left", "_"])
+@pytest.mark.parametrize(
+    "name", ["upperarm_twist_01_l", "ik_foot_root", "Tail", "bone12", "", "left", "_", "左足ＩＫ", "mouth"]
+)
 def test_a_name_that_is_not_in_the_table_means_nothing(name: str) -> None:
     assert place_of(name) is None
+
+
+MOCOPI = "root torso_1 torso_2 torso_3 torso_4 torso_5 torso_6 torso_7 neck_1 neck_2 head"
+MOCOPI += "".join(f" {s}_{w}" for s in "lr" for w in ("shoulder", "up_arm", "low_arm", "hand"))
+MOCOPI += "".join(f" {s}_{w}" for s in "lr" for w in ("up_leg", "low_leg", "foot", "toes"))
+BIOVISION = "Hips Chest Neck Head"
+for _side in ("Left", "Right"):
+    BIOVISION += "".join(
+        f" {_side}{w}" for w in ("Collar", "UpArm", "LowArm", "Hand", "UpLeg", "LowLeg", "Foot")
+    )
+SECOND_LIFE = "mPelvis mTorso mChest mNeck mHead mSkull"
+for _side in ("Left", "Right"):
+    words = ("Collar", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle", "Foot", "Toe")
+    SECOND_LIFE += "".join(f" m{w}{_side}" for w in words)
+MMD = "全ての親 センター グルーブ 腰 上半身 上半身2 首 頭 左目"
+for _side in "左右":
+    MMD += "".join(
+        f" {_side}{w}" for w in ("肩", "腕", "腕捩", "ひじ", "手首", "親指０", "足", "ひざ", "足首", "つま先")
+    )
+MMD += " 下半身 左足ＩＫ 右足ＩＫ"
+
+
+@pytest.mark.parametrize(
+    ("names", "some"),
+    [
+        (
+            MOCOPI,
+            {"hips": "root", "chest": "torso_7", "left forearm": "l_low_arm", "right shin": "r_low_leg"},
+        ),
+        (BIOVISION, {"left forearm": "LeftLowArm", "left collar": "LeftCollar", "right thigh": "RightUpLeg"}),
+        (SECOND_LIFE, {"hips": "mPelvis", "left upper arm": "mShoulderLeft", "right foot": "mAnkleRight"}),
+        (
+            MMD,
+            {
+                "hips": "腰",
+                "chest": "上半身2",
+                "left upper arm": "左腕",
+                "right thigh": "右足",
+                "left hand": "左手首",
+            },
+        ),
+    ],
+)
+def test_systems_of_one_s_own_naming(names: str, some: dict[str, str]) -> None:
+    called = names.split()
+    roles = roles_of(called)
+    assert missing_roles(roles) == []
+    assert {role: called[roles[role]] for role in some} == some
+    bones = humanoid_bones(called)
+    sides = [f"{side}{part}" for side in ("Left", "Right") for part in ("LowerArm", "LowerLeg", "Foot")]
+    assert {"Hips", "Head", *sides} <= set(bones)
+
+
+@pytest.mark.parametrize("prefix", ["Model_", "Actor01_", "Armature/", "Actor01", "my rig ", "Rig.001-"])
+def test_a_prefix_of_most_joints_is_ignored_though_others_hang_from_the_rig(prefix: str) -> None:
+    joints = skeleton_of("Mixamo").names
+    bare = [name.removeprefix("mixamorig:") for name in joints]
+    assert roles_of(["Reference", "ball", *(prefix + name for name in bare)]) == {
+        role: joint + 2 for role, joint in roles_of(bare).items()
+    }
 
 
 def test_a_performer_s_name_in_front_of_all_joints_is_ignored() -> None:

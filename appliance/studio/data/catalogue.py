@@ -17,6 +17,8 @@ from appliance.show.yaml_file import read_yaml
 
 CATALOGUES = Path(__file__).parent / "catalogues"
 ALWAYS = (0.0, 1e9)  # seconds
+OTHER_ENDINGS = (".glb", ".gltf", ".fbx", ".c3d", ".trc", ".asf", ".amc", ".vmd", ".npz", ".csv")
+SHOWN = 10
 READ_FROM_FILES = ("true_fps", "metres_per_unit", "up", "facing", "root")
 Rate = Annotated[float, Field(ge=1, le=1000)]
 Unit = Annotated[float, Field(gt=0, le=10)]
@@ -77,7 +79,24 @@ def recordings_in(folder: Path) -> list[Path]:
     """The BVH files of a folder, without the phrase and the skeleton of a show that was trained into it."""
     is_show = any((folder / name).exists() for name in ("show.yaml", "checkpoint.pt", "puppet.onnx"))
     own = {"phrase.bvh", "skeleton.bvh"} if is_show else set()
-    return sorted(file for file in folder.glob("*.bvh") if file.name not in own)
+    return [file for file in _files_in(folder) if _ending(file) == ".bvh" and file.name.casefold() not in own]
+
+
+def left_out_of(folder: Path) -> str:
+    """What else in a folder looks like recordings, by name ('': nothing): other formats, folders of BVH."""
+    inside = [f"{one.name}/" for one in sorted(folder.glob("*")) if one.is_dir() and recordings_in(one)]
+    names = [file.name for file in _files_in(folder) if _ending(file) in OTHER_ENDINGS] + inside
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return ", ".join(names[:SHOWN]) + more
+
+
+def _files_in(folder: Path) -> list[Path]:
+    """Without hidden ones: some systems put a '._take.bvh', which is no BVH file, beside each take.bvh."""
+    return sorted(one for one in folder.glob("*") if not one.name.startswith(".") and not one.is_dir())
+
+
+def _ending(file: Path) -> str:
+    return file.suffix.casefold()
 
 
 def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:

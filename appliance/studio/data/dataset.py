@@ -13,7 +13,13 @@ from appliance.pose import quaternion
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.capture_errors import find_capture_errors
-from appliance.studio.data.catalogue import Catalogue, find_catalogue, read_catalogue, recordings_in
+from appliance.studio.data.catalogue import (
+    Catalogue,
+    find_catalogue,
+    left_out_of,
+    read_catalogue,
+    recordings_in,
+)
 from appliance.studio.data.mirror import asymmetry, mirrored
 from appliance.studio.data.takes import (
     FPS,
@@ -58,6 +64,7 @@ class Dataset:
     training: tuple[Take, ...]
     held_out: tuple[Take, ...]
     catalogue: Catalogue = field(default_factory=Catalogue)  # how they were read
+    left_out: str = ""  # what else in their folder looks like recordings
 
     @property
     def takes(self) -> list[Take]:
@@ -115,7 +122,7 @@ def load_dataset(
             "Every frame is masked as a capture error: nothing is left to train on. "
             "Name sound files with --keep."
         )
-    return Dataset(skeleton, moving, training, held_out, catalogue)
+    return Dataset(skeleton, moving, training, held_out, catalogue, left_out_of(folder))
 
 
 def load_folder(folder: Path, reading: ReadingOptions) -> Dataset:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
-from appliance.pose.bvh import leading_tpose_frames, read_bvh
+from appliance.pose.bvh import leading_tpose_frames, recording_of
+from appliance.pose.bvh_text import read_bvh_text
 from appliance.pose.reading_options import brought_in
 from appliance.pose.recording import Recording
 from appliance.studio.data.capture_errors import (
@@ -91,9 +92,8 @@ def load_take(file: Path, catalogue: Catalogue, usual: Mapping[str, Pose] | None
 
 def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
     """A take in which nothing is masked, and its recording at the rate at which it was captured."""
-    header = read_bvh(file)
-    fps = catalogue.reading.fps_of(file.stem) or header.fps
-    recording = replace(header, fps=fps)
+    text = read_bvh_text(file, catalogue.reading.fps_of(file.stem))
+    recording = recording_of(text)
     if leading_tpose_frames(recording):
         recording = recording.without_first(TPOSE_FRAMES)
     if not len(recording):
@@ -103,7 +103,8 @@ def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
     sound = np.ones(len(resampled), dtype=bool)
     take = catalogue.take_of(file.stem)
     notes = tuple(guess.sentence() for guess in guesses)
-    return Take(file.stem, take, resampled, sound, header.fps, fps, notes=notes), recording
+    header_fps = text.header_fps or text.fps
+    return Take(file.stem, take, resampled, sound, header_fps, text.fps, notes=notes), recording
 
 
 def masked_take(take: Take, found: Sequence[CaptureError], catalogue: Catalogue) -> Take:

@@ -29,6 +29,7 @@ def findings(dataset: Dataset) -> list[str]:
     return [
         f"{counted(files, 'recording')} of {counted(performances, 'take')}, "
         f"{_minutes(takes):.1f} minutes, resampled to {FPS:g} poses a second.",
+        *([f"Only BVH files are read, left out: {dataset.left_out}."] if dataset.left_out else []),
         f"{len(moving)} of {len(names)} joints move: {', '.join(moving)}."
         + (f" The others never turn and stay as they are: {', '.join(still)}." if still else ""),
         *_body(dataset),
