@@ -9,6 +9,7 @@ Usage: install.sh [FOLDER]         install the release in FOLDER (left out: wher
        install.sh --list           the releases on this box; * is the one that dances
        install.sh --rollback       back to the release before
        install.sh --use VERSION    to a release that --list names
+       install.sh --data PARTITION     keep what must outlive power-off on this partition (/dev/sda1), as /data
        install.sh --uninstall      take bunraku off this box; shows, keys and the journal in /data/bunraku stay
        install.sh --uninstall --purge      these too
 
@@ -21,13 +22,17 @@ Usage: install.sh [FOLDER]         install the release in FOLDER (left out: wher
   --help                 this text
 
 For Debian 13 and Raspberry Pi OS (amd64, arm64), as root, with the stick that `make release` is copied to. The
-first time, on a machine that has no bunraku, with the script on the stick:
+first time, on a machine that has no bunraku, with the script on the stick, which such a machine does not mount itself:
+  sudo mkdir -p /media/bunraku && sudo mount -o ro /dev/disk/by-label/BUNRAKU /media/bunraku
   sudo bash /media/bunraku/bunraku/release/install.sh
 On a box that has a release already, with the box's own, for the one on a foreign stick could do anything:
   sudo bunraku-install
 
 A release is taken when it is signed with a key that the release on this box names. A machine without a release knows
 no key: it takes any signed release, says with which key, and keeps to the keys which that one names.
+
+What must outlive power-off (sensors' keys, shows, the journal) is kept in /data. Where that is in memory, nothing is
+installed: --data gives it a partition. It is needed before a read-only root is switched on.
 
 Nothing is switched before the new release lies whole on the disk and has danced for a moment out of
 sight. If it does not start then, the box goes back to the release before. Whenever the power fails, the box
@@ -63,7 +68,7 @@ stick=/media/bunraku/bunraku/release
 units=usr/lib/systemd/system
 users=system/usr/lib/sysusers.d/bunraku.conf
 root='' action=install source='' chosen='' purge=no fleeting=no part='' fresh=no
-head='' key='' unsigned=no older=no
+head='' key='' unsigned=no older=no partition=''
 
 read_options() {
     while [ $# -gt 0 ]; do
@@ -74,6 +79,11 @@ read_options() {
             shift
             ;;
         --list | --rollback | --uninstall) action=${1#--} ;;
+        --data)
+            [ $# -gt 1 ] || fail "--data needs a partition, like /dev/sda1: lsblk -f shows which there are."
+            action=data partition=$2
+            shift
+            ;;
         --use)
             [ $# -gt 1 ] || fail "--use needs a version: install.sh --list shows which there are."
             action=use chosen=$2
@@ -109,12 +119,29 @@ read_options() {
 forgets() { [ "$(stat -f -c %T "$root/opt")" = overlayfs ] && { [ -z "$root" ] || has_data; }; }
 has_data() { mountpoint --quiet "$root/data"; }
 
+# What is written to $1 is gone with the power: the file system in memory on which it lies, or nothing. An overlay keeps
+# it where its upper folder lies; under one over the root that is memory, as far as can be seen.
+memory_of() {
+    local where=$1 kind upper
+    while [ ! -e "$where" ]; do where=$(dirname "$where"); done
+    kind=$(stat -f -c %T "$where")
+    case $kind in
+    tmpfs | ramfs) echo "$kind" ;;
+    overlayfs)
+        where=$(stat -c %m "$where")
+        upper=$(sed -n "s|^[^ ]* $where overlay .*upperdir=\([^, ]*\).*|\1|p" "${BUNRAKU_MOUNTS:-/proc/mounts}" | tail -n 1)
+        if [[ $where = / || ! -d $upper ]]; then echo overlay; else memory_of "$upper"; fi
+        ;;
+    esac
+}
+
 # A root that does not run has no /proc of its own, and the packages ask it for the processor. What this machine's
 # environment says (where its libraries lie) means nothing in there.
 in_root() {
     # shellcheck disable=SC2016 # $0 and $@ belong to the inner shell
     if [ -z "$root" ]; then "$@"; else
         unshare --mount bash -c 'mount --rbind /proc "$0/proc" 2>/dev/null
+            [ -w "$0/dev/shm" ] || mount -t tmpfs -o mode=1777 tmpfs "$0/dev/shm" 2>/dev/null
             exec env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin chroot "$0" "$@"' "$root" "$@"
     fi
 }
@@ -238,11 +265,31 @@ check_machine() {
     python=$(fact "$head" python)
     in_root "/usr/bin/python$python" -c 'import venv' 2>/dev/null ||
         fail "Python $python is missing. Bunraku is made for Debian 13; there: apt-get install libpython3-stdlib"
+    check_shared_memory
     [[ $store = "$releases" ]] || check_data
+    check_lasts
     needs=$(fact "$head" needs-mb)
     have=$(df --output=avail -m "$store" | tail -n 1 | tr -d ' ')
     [ "$have" -ge "$needs" ] || fail "$have MB are free in $store, $needs MB are needed." \
         "Nothing was changed. Make room, or use a larger card."
+}
+
+# What a release needs while it is tried, and misses only minutes later.
+check_shared_memory() {
+    in_root sh -c 'touch /dev/shm/.bunraku-install && rm /dev/shm/.bunraku-install' 2>/dev/null ||
+        fail "$root/dev/shm is missing, or cannot be written: the release cannot be tried. Nothing was changed." \
+            "mkdir -p $root/dev/shm && mount -t tmpfs tmpfs $root/dev/shm"
+}
+
+# A box forgets nothing overnight: sensors' keys above all.
+check_lasts() {
+    local memory
+    if [[ -n $root || $fleeting = yes ]]; then return; fi
+    memory=$(memory_of /data)
+    [ -z "$memory" ] ||
+        fail "/data is in memory ($memory): sensors' keys, shows and the journal would be gone at power-off." \
+            "Nothing was changed. Give it a partition: --data /dev/sda1, and keep the overlay off it" \
+            "(overlayroot=tmpfs:recurse=0 in the kernel's command line). For a trial: --until-power-off"
 }
 
 check_data() {
@@ -385,6 +432,54 @@ install_release() {
     fi
     switch_or_go_back "$name"
     forget_old
+    if [ -z "$root" ] && ! forgets && ! has_data; then
+        say "/data lies on the system's own partition. Before you switch a read-only root on, give it one of its own," \
+            "or the box forgets its sensors each night: bunraku-install --data PARTITION (docs/touring.md)"
+    fi
+}
+
+# ---- a place that lasts
+
+# The partition becomes /data, with what is there now. Nothing is formatted: a wrong letter would cost a disk.
+use_partition() {
+    local kind uuid moved=no
+    [ -b "$partition" ] || fail "there is no partition '$partition': lsblk -f shows which there are. Nothing was changed."
+    kind=$(blkid -o value -s TYPE "$partition" || true) uuid=$(blkid -o value -s UUID "$partition" || true)
+    [[ $kind = ext4 && -n $uuid ]] ||
+        fail "$partition has ${kind:-no file system}, ext4 is needed. Nothing was changed." \
+            "If nothing on it is needed any more: mkfs.ext4 -L data $partition"
+    ! has_data || fail "/data has a partition already ($(findmnt -n -o SOURCE "$root/data")). Nothing was changed."
+    [[ -n $root || -z $(memory_of /etc/fstab) ]] ||
+        fail "what is written to /etc is gone at power-off: switch the read-only root off first (raspi-config)," \
+            "restart, and call this again. Nothing was changed."
+    ! grep -qE '^[^#]*[[:space:]]/data[[:space:]]' "$root/etc/fstab" 2>/dev/null ||
+        fail "$root/etc/fstab names /data already. Mend its line, then: mount /data. Nothing was changed."
+    mkdir -p "$root/data" "$root/mnt"
+    if runs_here; then systemctl stop bunraku.target 'bunraku-*' || true; fi
+    mount -t ext4 "$partition" "$root/mnt"
+    if [ -d "$root/data/bunraku" ] && [ ! -e "$root/mnt/bunraku" ]; then
+        cp -a "$root/data/." "$root/mnt/" || { umount "$root/mnt" && fail "$partition has no room for what is in /data."; }
+        moved=yes
+    fi
+    umount "$root/mnt"
+    echo "UUID=$uuid  /data  ext4  rw,noatime,nosuid,nodev,commit=5,errors=remount-ro,nofail  0  2" >>"$root/etc/fstab"
+    mount -t ext4 -o rw,noatime,nosuid,nodev "$partition" "$root/data"
+    check_written
+    if runs_here; then systemctl daemon-reload && systemctl start --no-block bunraku.target || true; fi
+    say "/data is on $partition from now on, and at each power-on$([ $moved = no ] || echo ', with what was in it')"
+}
+
+# Written, brought to the disk, and read again after the partition was taken away and put back.
+check_written() {
+    local word
+    word=$(head -c 16 /dev/urandom | od -An -tx1 | tr -d ' \n')
+    echo "$word" >"$root/data/.lasts"
+    sync "$root/data/.lasts"
+    umount "$root/data"
+    mount -t ext4 -o rw,noatime,nosuid,nodev "$partition" "$root/data"
+    [[ $(<"$root/data/.lasts") = "$word" && -z $(memory_of "$root/data") ]] ||
+        fail "$partition does not keep what is written to it. Take another one: /etc/fstab names this one now."
+    rm "$root/data/.lasts"
 }
 
 # ---- the switch
@@ -672,6 +767,7 @@ rollback() {
 
 uninstall() {
     local file
+    [[ -n $(current) || $purge = yes ]] || fail "no release is on this box. Nothing was changed."
     if forgets; then
         uninstall_kept
         return
@@ -713,6 +809,7 @@ main() {
     list) list ;;
     rollback) rollback ;;
     use) use "$chosen" ;;
+    data) use_partition ;;
     uninstall) uninstall ;;
     esac
     exit 0

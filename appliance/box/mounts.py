@@ -84,12 +84,23 @@ def in_memory(one: Mount, mounted: Sequence[Mount]) -> bool:
 
 def disk_of(folder: Path) -> str:
     """The disk of a folder by name, for people; "" where this system does not say. It never waits for it."""
-    try:
-        text = MOUNTINFO.read_text(errors="replace")
-    except OSError:
-        return ""
-    one = mount_of(folder.absolute(), mounts(text))
+    one = mount_of(folder.absolute(), mounts_here())
     return "" if one is None else one.name
+
+
+def memory_of(folder: Path) -> str:
+    """The file system by name where what is written to a folder is gone with the power; "" where it lasts."""
+    mounted = mounts_here()
+    one = mount_of(folder.absolute(), mounted)
+    return one.name if one is not None and in_memory(one, mounted) else ""
+
+
+def mounts_here() -> list[Mount]:
+    """As this process sees them; none where this system does not say."""
+    try:
+        return mounts(MOUNTINFO.read_text(errors="replace"))
+    except OSError:
+        return []
 
 
 def _plain(word: str) -> str:

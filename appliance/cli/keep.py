@@ -45,7 +45,7 @@ def keep(
             mirrored.append(MirroredProof(runtime, chosen))
         end_s = END_BESIDE_S if chosen is None else END_S
         processes = [MirrorProcess(one, runtime, end_s, speaker.say) for one in mirrored]
-        health = KeeperHealth(runtime)
+        health = KeeperHealth(runtime, config.state_folder if chosen is not None else None)
         notifier.ready("The journal and the place of the dance are kept.")
 
         def after_look(now: float) -> None:

@@ -32,4 +32,13 @@ CHOICE_NOT_KEPT = Fallback(
     "That a show has danced, or has not, cannot be kept on {about}. The audience sees nothing of it; the "
     "show is tried again after the next power-on. Free some room there, or check the disk.",
 )
-OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT, CHOICE_NOT_KEPT)
+KEPT_IN_MEMORY = Fallback(
+    "kept-in-memory",
+    "What this box keeps is in memory: sensors' keys, neutral poses, shows from sticks and the journal are "
+    "gone at power-off. The audience sees nothing of it tonight. Give /data a partition of its own: bunraku "
+    "doctor.",
+    "What this box keeps is in memory, on {about}: sensors' keys, neutral poses, shows from sticks and the "
+    "journal are gone at power-off. The audience sees nothing of it tonight. Give /data a partition of its "
+    "own: bunraku doctor.",
+)
+OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT, CHOICE_NOT_KEPT, KEPT_IN_MEMORY)

@@ -11,10 +11,10 @@ from contextlib import closing
 from pathlib import Path
 
 from appliance.box.fallback import Fallbacks
-from appliance.box.mounts import disk_of
+from appliance.box.mounts import disk_of, memory_of
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, RuntimeFolderError
-from appliance.keeper.fallback import OF_THE_KEEPER
+from appliance.keeper.fallback import KEPT_IN_MEMORY, OF_THE_KEEPER
 from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.mirror import LOOK_S, Mirror, Mirrored
 from appliance.keeper.mirror_process import MirrorProcess
@@ -32,9 +32,13 @@ _REST_S = 3.5  # and LAST_TURN_S: a person waits at a terminal
 class KeeperHealth:
     """What the keeper reports to the box's other processes."""
 
-    def __init__(self, runtime: Path) -> None:
+    def __init__(self, runtime: Path, lasting: Path | None = None) -> None:
+        """lasting: the folder that must outlive power-off; None: nobody counts on one."""
         self._fallbacks, self._named = Fallbacks(OF_THE_KEEPER), set[str]()
         self._health = ProcessHealthWriter(runtime, "keeper", self._fallbacks)
+        if lasting is not None and (memory := memory_of(lasting)):
+            self._fallbacks.concern(KEPT_IN_MEMORY.name, [memory])
+            self._fallbacks.set(KEPT_IN_MEMORY.name, True)
 
     def report(self, mirrors: Iterable[Mirror | MirrorProcess], now: float) -> None:
         """Call it often; monotonic seconds."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -170,6 +170,89 @@ def test_uninstalled_nothing_points_to_it_and_shows_stay_until_purged(box: BoxRo
     done = box.install("--uninstall", "--purge")
     assert done.returncode == 0, done.stderr
     assert not (box.path / "data/bunraku").exists()
+
+
+def test_a_root_without_shared_memory_is_refused_before_anything_is_unpacked(
+    box: BoxRoot, make_release: MakeRelease
+) -> None:
+    shutil.rmtree(box.path / "dev/shm")
+    done = box.install(make_release("1.1.0"))
+    assert done.returncode == 1
+    assert f"{box.path}/dev/shm is missing, or cannot be written" in done.stderr
+    assert "unpacking" not in done.stdout
+    (box.path / "dev/shm").mkdir()
+    _is_untouched(box)
+
+
+@pytest.fixture
+def partition(box: BoxRoot, tmp_path: Path) -> Iterator[str]:
+    """A disk with an ext4 file system, which is nowhere mounted afterwards."""
+    disk = tmp_path / "data.ext4"
+    with disk.open("wb") as made:
+        made.truncate(32 << 20)
+    subprocess.run(["mke2fs", "-q", "-t", "ext4", str(disk)], check=True)
+    found = subprocess.check_output(["losetup", "--find", "--show", str(disk)], text=True).strip()
+    yield found
+    while subprocess.run(["umount", str(box.path / "data")], capture_output=True).returncode == 0:
+        pass
+    subprocess.run(["losetup", "--detach", found], check=True)
+
+
+def test_data_gets_a_partition_that_keeps_what_was_there(box: BoxRoot, partition: str) -> None:
+    keys = box.path / "data/bunraku/keys/sensors.keys"
+    keys.parent.mkdir(parents=True)
+    keys.write_text("left-wrist: {}\n")
+    done = box.install("--data", partition)
+    assert done.returncode == 0, done.stderr
+    assert f"/data is on {partition} from now on" in done.stdout
+    assert keys.read_text() == "left-wrist: {}\n"
+    assert (box.path / "data").is_mount()
+    (line,) = [one for one in (box.path / "etc/fstab").read_text().splitlines() if "/data" in one]
+    assert line.startswith("UUID=") and "nofail" in line
+    again = box.install("--data", partition)
+    assert again.returncode == 1 and "has a partition already" in again.stderr
+
+
+def test_a_partition_is_never_formatted_nor_guessed(box: BoxRoot, partition: str) -> None:
+    before = (box.path / "etc/fstab").read_text() if (box.path / "etc/fstab").exists() else None
+    assert "there is no partition '/dev/nowhere'" in box.install("--data", "/dev/nowhere").stderr
+    subprocess.run(["dd", "if=/dev/zero", f"of={partition}", "bs=64k", "count=2", "status=none"], check=True)
+    done = box.install("--data", partition)
+    assert done.returncode == 1
+    assert "no file system, ext4 is needed. Nothing was changed." in done.stderr
+    assert f"mkfs.ext4 -L data {partition}" in done.stderr
+    assert ((box.path / "etc/fstab").read_text() if before is not None else None) == before
+
+
+@pytest.mark.parametrize(
+    ("mounted", "memory"),
+    [("tmpfs", "tmpfs"), ("overlay on tmpfs", "tmpfs"), ("overlay on a disk", ""), ("nothing", "")],
+)
+def test_a_place_in_memory_is_seen_for_what_it_is(tmp_path: Path, mounted: str, memory: str) -> None:
+    data, above = tmp_path / "data", tmp_path / "above"
+    for made in (data, above):
+        made.mkdir()
+    words = [f"source <(sed '/^main /d' {INSTALL})"]
+    if mounted in ("tmpfs", "overlay on tmpfs"):
+        words.append(f"mount -t tmpfs tmpfs {data if mounted == 'tmpfs' else above}")
+    if mounted.startswith("overlay"):
+        words.append(f"mkdir {above}/upper {above}/work")
+        words.append(
+            f"mount -t overlay -o lowerdir=/usr,upperdir={above}/upper,workdir={above}/work o {data}"
+        )
+    words.append(f"memory_of {data}/bunraku/keys")
+    done = subprocess.run(
+        ["unshare", "--mount", "bash", "-c", "; ".join(words)], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, memory), done.stderr
+
+
+@pytest.mark.parametrize(("memory", "status"), [("tmpfs", 1), ("", 0)])
+def test_nothing_is_installed_on_a_box_that_would_forget_its_sensors(memory: str, status: int) -> None:
+    words = f"source <(sed '/^main /d' {INSTALL}); memory_of() {{ echo {memory}; }}; check_lasts; exit 0"
+    done = subprocess.run(["bash", "-c", words], capture_output=True, text=True, check=False)
+    assert done.returncode == status
+    assert ("/data is in memory (tmpfs): sensors' keys" in done.stderr) == bool(status)
 
 
 def _is_untouched(box: BoxRoot) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from appliance.box.mounts import memory_of
 from appliance.cli.doctor.host_view import running_stage
 from appliance.cli.sensors.control_client import ControlClient, NoBoxError
 from appliance.release.installed_box import box_here
@@ -83,7 +84,18 @@ def edit_keys(box_keys: BoxKeys, change_it: Callable[[KeyEditing], None], words:
             change_it(change)
             change.commit()
     print(words)
+    if why := forgotten(box_keys.keys):
+        print(why)
     return reload_and_say(box_keys)
+
+
+def forgotten(keys: Path) -> str:
+    """That a key file is gone at power-off, a sentence; "" where it lasts."""
+    memory = memory_of(keys.parent)
+    return memory and (
+        f"{keys} is in memory, on {memory}: this change is gone at power-off, and the box is a stranger to "
+        "its sensors then. Give /data a partition of its own: bunraku doctor."
+    )
 
 
 def reload_and_say(box_keys: BoxKeys) -> int:

@@ -14,6 +14,7 @@ from appliance.cli.sensors.box_keys import (
     NOT_TAKEN,
     BoxKeys,
     clear_errors,
+    forgotten,
     people_console,
     reload_keys,
     require_folder,
@@ -139,7 +140,7 @@ def _axes(text: str | None) -> tuple[int, int] | None:
 def _hints(box_keys: BoxKeys, done: Provisioned, settings: Settings, device: str) -> list[str]:
     """What to do next, and what in the box file would keep the wearable out."""
     name, sensors = done.sensor.name, box_keys.box.sensors
-    hints = [""]
+    hints = [*filter(None, [forgotten(box_keys.keys)]), ""]
     if settings.network:
         hints.append(
             f"{name} is ready: unplug it, switch it on, and it looks for its box on '{settings.network}'."

@@ -13,7 +13,7 @@ import { initRig, showRig } from "./rig.js";
 import { initSensorChanges, showSensorChanges } from "./sensor_changes.js";
 import { showSensors } from "./sensors.js";
 import { initVenue } from "./venue.js";
-import { clock, hasWords, loadWords, number, words } from "./words.js";
+import { clock, hasWords, language, loadWords, number, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
 const STILL_PX = 14; // a thumb that scrolls moves farther between touch and release
@@ -56,8 +56,10 @@ function verdict() {
   setText(byId("verdict"), words(`verdict_${key}`, said));
 }
 
-// In the reader's language, and always by the name of the sensor, receiver, wire or disk that it is about.
+// In the reader's language, and always by the name of the sensor, receiver, wire or disk that it is about. What the
+// box itself says is English, and says most.
 function spoken({ name, about, words: said }) {
+  if (language === "en" && said) return said;
   if (about && hasWords(`named_${name}`)) return words(`named_${name}`, { about });
   const sentence = hasWords(`fallback_${name}`) ? words(`fallback_${name}`) : said ?? "";
   return about && !sentence.includes(about) ? `${about}: ${sentence}` : sentence;
