@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import ipaddress
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,10 +13,11 @@ from appliance.cli.preflight import LATE_TURN_S, candidate_problems, publish
 from appliance.release.adoption import Outcome, Places, adopt, read_choice
 from appliance.release.arrivals import BOX, Arrival, look
 from appliance.release.choice import CHOSEN, Choice
-from appliance.show.box import load_box
-from appliance.show.config_error import ConfigError
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.config_error import ConfigError, Problem
 from appliance.show.venue_keys import venue_keys
 from appliance.show.yaml_edit import with_value
+from appliance.show.yaml_file import MAX_BYTES
 from appliance.stage.stage_error import StageError
 
 FROM_PAGE = "page"  # the folder below /data/bunraku in which the page's box file arrives, as from a stick
@@ -24,15 +27,20 @@ _AT_ONCE, _LATER = 0.0, float("inf")
 
 
 class Change(NamedTuple):
-    """text: the whole file; values: (location, value) of keys to set in it; now: restart with it at once."""
+    """text: the whole file; values: (location, value) of keys to set in it; now: restart with it at once;
+    sure: what would shut people out, or let everybody in, was asked and answered.
+    """
 
     text: str
     values: list[tuple[list[str | int], Any]]
     now: bool = False
+    sure: bool = False
 
     def applied(self) -> str:
         """The text with the values. Raises ValueError."""
         text = self.text
+        if len(text.encode()) > MAX_BYTES:
+            raise ValueError(f"A box file has at most {MAX_BYTES // 1024} kB.")
         for location, value in self.values:
             text = with_value(text, tuple(location), value)
         return text
@@ -55,7 +63,8 @@ def told(box: Path | None, chosen: Path | None) -> dict[str, Any]:
 
 
 def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, Any]:
-    """Check and write it. For JSON: `problems` (nothing was written), else `words`: what counts from when.
+    """Check and write it. For JSON: `problems` (nothing was written), or `asks` (nor was it: questions to
+    answer with `sure`), else `words`: what counts from when.
 
     anew: all units have to start anew now. The page's process sees to it, once its browser has the answer.
     """
@@ -64,11 +73,13 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
         raise StageError("This box has no box file that could be changed.")
     try:
         text = wanted.applied()
-        problems = _problems(place, text)
+        config = _checked(place, text)
+    except ConfigError as error:
+        return {"problems": [_told(one) for one in error.problems]}
     except ValueError as error:
-        problems, text = [{"line": 0, "words": str(error)}], ""
-    if problems:
-        return {"problems": problems}
+        return {"problems": [{"line": 0, "words": str(error)}]}
+    if not wanted.sure and (asks := list(_questions(_before(place), config))):
+        return {"problems": [], "asks": asks}
     if chosen is not None:
         arrival = _places(chosen).data / FROM_PAGE
         arrival.mkdir(mode=0o700, exist_ok=True)
@@ -120,18 +131,51 @@ def _place(box: Path | None, chosen: Path | None) -> Path | None:
     return choice.data / FROM_PAGE / BOX
 
 
-def _problems(place: Path, text: str) -> list[dict[str, Any]]:
-    """What is wrong, with its line: read beside the file, for what it names is relative to its folder."""
+def _checked(place: Path, text: str) -> BoxConfig:
+    """Read beside the file, for what it names is relative to its folder. Raises ConfigError."""
     place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     beside = write_beside(place.with_name("checked.yaml"), text.encode(), private=True)
     try:
-        load_box(beside)
-    except ConfigError as error:
-        return [{"line": one.line, "words": f"{one.message} {one.cure}".strip()} for one in error.problems]
+        return load_box(beside)
     finally:
         with contextlib.suppress(OSError):
             beside.unlink()
-    return []
+
+
+def _told(one: Problem) -> dict[str, Any]:
+    return {"line": one.line, "words": f"{one.message} {one.cure}".strip()}
+
+
+def _before(place: Path) -> BoxConfig:
+    """What counts until now; a file that is broken has nothing to lose."""
+    try:
+        return load_box(place if place.exists() else None)
+    except ConfigError:
+        return BoxConfig()
+
+
+def _questions(before: BoxConfig, after: BoxConfig) -> Iterator[str]:
+    """What a change takes from people at the venue, or gives to everybody."""
+    if before.control is not None and after.control is None:
+        yield "control: null takes all commands away, PANIC and BLACKOUT of this page too."
+    if before.console is not None and after.console is None:
+        yield "console: null takes this page away: only a person at the box brings it back."
+    if before.console is not None and after.console is not None:
+        was, host = before.console.host, after.console.host
+        if _is_loopback(host) and not _is_loopback(was):
+            yield f"console: host: {host} leaves this page to the box's own screen."
+    for name, new, old in (
+        ("console", after.console, before.console),
+        ("stream", after.projector.stream, before.projector.stream),
+    ):
+        known = () if old is None else old.viewers
+        for network in () if new is None else new.viewers:
+            if network not in known and ipaddress.ip_network(network).prefixlen == 0:
+                yield f"{name}: viewers: {network} lets every device in that reaches the box."
+
+
+def _is_loopback(host: str) -> bool:
+    return ipaddress.ip_address(host).is_loopback
 
 
 def _places(chosen: Path) -> Places:

@@ -51,11 +51,13 @@ class Venue:
     async def _change(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
         values = await said(request, 2 * _LARGEST_FILE)
-        text, keys, now = values.get("text"), values.get("values", []), values.get("now", False)
-        if not isinstance(text, str) or not isinstance(now, bool) or not _are_values(keys):
+        text, keys = values.get("text"), values.get("values", [])
+        now, sure = values.get("now", False), values.get("sure", False)
+        switches = isinstance(now, bool) and isinstance(sure, bool)
+        if not isinstance(text, str) or not switches or not _are_values(keys):
             raise web.HTTPBadRequest(text="A change is a text, values of keys, and whether it counts now.")
-        wanted = json.dumps({"text": text, "values": keys, "now": now and self._is_installed})
-        return await self._done("box-file", "--change", said=wanted.encode())
+        wanted = {"text": text, "values": keys, "now": now and self._is_installed, "sure": sure}
+        return await self._done("box-file", "--change", said=json.dumps(wanted).encode())
 
     async def _dance_again(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)

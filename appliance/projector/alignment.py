@@ -14,6 +14,7 @@ import yaml
 
 from appliance.box.durable import write_whole
 from appliance.pose.foreign_file import TooLargeError, content
+from appliance.pose.foreign_yaml import plain_values
 from appliance.projector.corners import WHOLE, Corners, complaint
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
@@ -129,7 +130,7 @@ class AlignmentFile:
 
     def _load(self) -> Alignment:
         try:
-            return _read(yaml.safe_load(content(self.path, _LARGEST_FILE).decode()), self._from_box)
+            return _read(plain_values(content(self.path, _LARGEST_FILE).decode()), self._from_box)
         except (FileNotFoundError, NotADirectoryError):
             return self._from_box
         except (

@@ -80,8 +80,10 @@ class Shelf:
         """
         import yaml
 
+        from appliance.pose.foreign_yaml import plain_values
+
         built_in = yaml.safe_load(appliance_box(places))
-        said = yaml.safe_load(original.read_text(encoding="utf-8-sig")) or {}
+        said = plain_values(original.read_text(encoding="utf-8-sig")) or {}
         text = yaml.safe_dump(
             _over(said, built_in) | {"runtime": built_in["runtime"]}, sort_keys=False, allow_unicode=True
         )

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import yaml
 
 from appliance.box.durable import alone_in, put_in_place, write_beside
+from appliance.pose.foreign_yaml import composed
 from appliance.sensor.keys import (
     HEADER,
     KeyFileError,
@@ -148,7 +149,7 @@ class _Place(NamedTuple):
 
 
 def _places(text: str) -> dict[str, _Place]:
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    root = composed(text)
     assert isinstance(root, yaml.MappingNode)  # it was read before, and has sensors
     return {
         name.value: _Place(name.start_mark.index, name.end_mark.index, _end(value))

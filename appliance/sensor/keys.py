@@ -15,6 +15,7 @@ from pathlib import Path
 import yaml
 
 from appliance.pose.foreign_file import content
+from appliance.pose.foreign_yaml import composed
 from appliance.sensor.wire import KEY_BYTES
 
 HEADER = "# Sensors of this box and their secret keys. With this file anyone can move the puppet.\n"
@@ -66,7 +67,7 @@ def read_text(path: Path) -> str:
 def parse_keys(path: Path, text: str) -> dict[str, SensorKey]:
     """The sensors in the text of the key file `path`, by name. Raises KeyFileError with the line."""
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        root = composed(text)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         # The parser's own message may quote the file, and so a key: only its place is passed on.

@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 
 from appliance.box.record import Record, WholeFile
+from appliance.pose.foreign_yaml import plain_values
 from appliance.sensor.neutral import NeutralPose
 
 FILE_NAME = "sensors.memory"
@@ -81,7 +82,7 @@ def memory_text(neutral: Mapping[Worn, NeutralPose], profiles: Mapping[bytes, by
 def read_memory(text: bytes) -> tuple[dict[Worn, NeutralPose], dict[bytes, bytes]]:
     """Neutral poses, and calibrations (22 bytes) by IMU (16 bytes). Raises DamagedMemoryError."""
     try:
-        return _checked(yaml.load(text.decode(), _PlainLoader))
+        return _checked(plain_values(text.decode()))
     except (
         ValueError,
         TypeError,
@@ -92,15 +93,6 @@ def read_memory(text: bytes) -> tuple[dict[Worn, NeutralPose], dict[bytes, bytes
         yaml.YAMLError,
     ) as error:
         raise DamagedMemoryError(str(error)) from error
-
-
-class _PlainLoader(yaml.SafeLoader):
-    """Without aliases: the box writes none, and a few of them can stand for more than any memory holds."""
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            raise yaml.YAMLError("an alias")
-        return super().compose_node(parent, index)
 
 
 def _checked(values: Any) -> tuple[dict[Worn, NeutralPose], dict[bytes, bytes]]:

@@ -15,7 +15,17 @@ from appliance.show.dmx import DmxWires
 from appliance.show.osc import OscConfig, osc_misfits
 from appliance.show.posistagenet import PosiStageNetConfig, misfits
 from appliance.show.projector import ProjectorConfig
-from appliance.show.section import Ipv4, LocalFile, Section, key, part, refusal, refuse_repeats
+from appliance.show.section import (
+    Ipv4,
+    LocalFile,
+    LocalFolder,
+    Section,
+    SerialDevice,
+    key,
+    part,
+    refusal,
+    refuse_repeats,
+)
 from appliance.show.sound import SoundConfig
 from appliance.show.validation import validated
 from appliance.show.venue_lights import VenueLightsConfig
@@ -38,7 +48,7 @@ class UdpConfig(Section):
 class SerialConfig(Section):
     """A sensor on a cable."""
 
-    device: str = key("The serial device, like /dev/ttyACM0.", length=(1, 200))
+    device: SerialDevice = key("The serial device, like /dev/ttyACM0.", length=(1, 200))
     baud: int = key("Speed in baud.", 115200, within=(1200, 4_000_000))
 
 
@@ -96,7 +106,10 @@ class LimitsConfig(Section):
     """How much time the dance may take."""
 
     tick_budget_ms: float = key(
-        "What one tick of 20 ms may use; a show needing more is refused.", 10.0, within=(0.5, 18)
+        "What one tick of 20 ms may use. On stage a show that needs more runs with fewer iterations, and the "
+        "box says so; `bunraku check` refuses it.",
+        10.0,
+        within=(0.5, 18),
     )
     late_ms: float = key(
         "A frame that leaves later than this after its slot began counts as late.", 15.0, within=(1, 20)
@@ -113,7 +126,7 @@ class RealtimeConfig(Section):
 class JournalConfig(Section):
     """The flight recorder."""
 
-    folder: LocalFile | None = key(
+    folder: LocalFolder | None = key(
         "Folder, relative to the box file; made when missing; null: no journal.", None
     )
     minutes: float = key("How much it keeps before the oldest goes.", 30.0, within=(0.1, 1440))
@@ -123,7 +136,7 @@ class BoxConfig(Section):
     """box.yaml."""
 
     _file: YamlFile | None = PrivateAttr(default=None)
-    state: LocalFile | None = key(
+    state: LocalFolder | None = key(
         "Folder where the box keeps what it learns (neutral poses, sensors' calibrations), "
         "relative to the box file; made when missing; null: the key file's folder.",
         None,
@@ -135,7 +148,7 @@ class BoxConfig(Section):
     lights: VenueLightsConfig = part(VenueLightsConfig)
     projector: ProjectorConfig = part(ProjectorConfig)
     sound: SoundConfig | None = key("The sound card for a show's strings; null: none.", None)
-    runtime: LocalFile | None = key(
+    runtime: LocalFolder | None = key(
         "Folder where the box's processes meet, relative to the box file; a folder in memory. "
         "null: the one that systemd gives, else one of the user's own.",
         None,

@@ -8,15 +8,26 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+MOST_PROBLEMS = 30  # of one error: nobody reads more, and a file may have twenty thousand
+_LONGEST = 2000  # characters of a message
+_LONGEST_WORD = 60
+
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong. `line` counts from 1; 0 where a file as a whole is meant."""
+    """One thing that is wrong. `line` counts from 1; 0 where a file as a whole is meant.
+
+    Words of the file stay on the line of the message: what no printer prints is written as its code.
+    """
 
     file: Path
     line: int
     message: str
     cure: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("message", "cure"):
+            object.__setattr__(self, name, _printable(getattr(self, name)))
 
     def __str__(self) -> str:
         where = f"{self.file}:{self.line}" if self.line else str(self.file)
@@ -24,13 +35,19 @@ class Problem:
 
 
 class ConfigError(ValueError):
-    """A file that the box refuses: all its problems, in the order of their lines.
+    """A file that the box refuses: its problems in the order of their lines, the first MOST_PROBLEMS of them.
 
-    `file`, `line` and `message` are those of the first one.
+    `file`, `line` and `message` are those of the first one. more: problems that were not even looked at.
     """
 
-    def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems: tuple[Problem, ...] = tuple(sorted(problems, key=lambda p: (str(p.file), p.line)))
+    def __init__(self, problems: Iterable[Problem], more: int = 0) -> None:
+        found = sorted(problems, key=lambda p: (str(p.file), p.line))
+        if more := more + max(0, len(found) - MOST_PROBLEMS):
+            del found[MOST_PROBLEMS:]
+            last = found[-1]
+            words = f"{more} more {'things are' if more > 1 else 'thing is'} wrong below this line."
+            found.append(Problem(last.file, last.line, words, "Mend these first."))
+        self.problems: tuple[Problem, ...] = tuple(found)
         first = self.problems[0]
         self.file, self.line, self.message = first.file, first.line, first.message
         super().__init__("\n".join(map(str, self.problems)))
@@ -45,8 +62,20 @@ class NotAskedForError(ConfigError):
 def nearest(word: object, known: Sequence[str]) -> str | None:
     """The known word that was probably meant, whatever its case; None if nothing comes near."""
     folded = {name.casefold(): name for name in known}
-    near = difflib.get_close_matches(str(word).casefold(), folded, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(str(word)[:_LONGEST_WORD].casefold(), folded, n=1, cutoff=0.5)
     return folded[near[0]] if near else None
+
+
+def shortened(word: object) -> str:
+    """A word of a file as far as a message shows it."""
+    text = str(word)
+    return text if len(text) <= _LONGEST_WORD else f"{text[: _LONGEST_WORD - 3]}..."
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        text = "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
 def did_you_mean(word: object, known: Sequence[str]) -> str:

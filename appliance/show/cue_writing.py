@@ -7,6 +7,8 @@ from typing import Any
 
 import yaml
 
+from appliance.pose.foreign_yaml import composed
+
 _INDENT = "  "
 
 
@@ -16,7 +18,7 @@ def with_cue(text: str, cue: Mapping[str, Any]) -> str:
     written = yaml.safe_dump(
         dict(cue), default_flow_style=True, sort_keys=False, width=float("inf"), allow_unicode=True
     ).strip()
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    root = composed(text)
     if not isinstance(root, yaml.MappingNode) or root.flow_style:
         raise ValueError("this is no show.yaml")
     found = next((value for key, value in root.value if key.value == "cues"), None)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, model_validator
 
-from appliance.show.section import Ipv4, Section, key, refusal
+from appliance.show.section import Ipv4, Section, SerialDevice, key, refusal
 
 WireKind = Literal["artnet", "sacn", "usb-pro", "open-dmx", "udmx"]
 
@@ -75,7 +75,7 @@ class DmxConfig(Section):
     source_name: str = key("sacn: what consoles call this box.", "Bunraku", length=(1, 63))
     preview: bool = key("sacn: for visualisers only; lights should ignore it.", False)
     ttl: int = key("sacn: how many networks multicast may reach; 1: this one only.", 1, within=(1, 255))
-    device: str | None = key(
+    device: SerialDevice | None = key(
         "usb-pro, open-dmx: the serial device, like /dev/ttyUSB0.", None, length=(1, 200)
     )
     serial: str | None = key(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ipaddress
 import math
+import os
+import stat
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
@@ -14,6 +16,10 @@ from pydantic_core import PydanticCustomError
 from appliance.show.bundle import require_file
 from appliance.show.config_error import did_you_mean
 
+# Nothing that a box file names is here; a name that leads here would be read, or written over, as the box.
+_OF_THE_SYSTEM = ("/etc", "/proc", "/sys", "/dev", "/boot", "/usr", "/bin", "/sbin", "/lib")
+_BUT = ("/etc/bunraku", "/dev/shm", "/usr/local", "/usr/src")
+_MEMORY = 1  # major number of /dev/zero and the like
 MOST_PUPPETS = 4  # on one stage
 UNIT_TOLERANCE = 0.05  # how far from length 1 a hand-written quaternion may be before it is a typing error
 
@@ -168,7 +174,50 @@ def _in_the_skeleton(joint: str, info: ValidationInfo) -> str:
 
 def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
     directory = (info.context or {}).get("directory")
-    return path if directory is None else Path(directory, path.expanduser())
+    if directory is None:
+        return path
+    placed = Path(directory, path.expanduser())
+    try:
+        real = Path(os.path.realpath(placed))
+    except ValueError:
+        raise refusal(f"'{path}' is no name of a file: no name holds a zero.", "Check it.") from None
+    for system in _OF_THE_SYSTEM:
+        if real.is_relative_to(system) and not any(map(real.is_relative_to, _BUT)):
+            raise refusal(f"'{path}' belongs to the system.", "Name a place of the box, like `state`.")
+    return placed
+
+
+def _file_beside(path: Path, info: ValidationInfo) -> Path:
+    placed = _beside_the_file(path, info)
+    if _kind_of(placed) not in (None, stat.S_IFREG):
+        raise refusal(f"'{path}' is no file.", "Name a file, or none that is there yet.")
+    return placed
+
+
+def _folder_beside(path: Path, info: ValidationInfo) -> Path:
+    placed = _beside_the_file(path, info)
+    existing = next((one for one in (placed, *placed.parents) if _kind_of(one) is not None), placed)
+    if _kind_of(existing) not in (None, stat.S_IFDIR):
+        raise refusal(f"'{path}' is no folder.", "Name a folder; it is made where it is missing.")
+    return placed
+
+
+def _kind_of(path: Path) -> int | None:
+    """None: there is nothing, or nothing that can be looked at."""
+    try:
+        return stat.S_IFMT(path.stat().st_mode)
+    except (OSError, ValueError):  # no name holds a zero
+        return None
+
+
+def _serial_device(name: str) -> str:
+    try:
+        found = Path(name).stat()
+    except (OSError, ValueError):
+        return name  # it may be plugged in later
+    if not stat.S_ISCHR(found.st_mode) or os.major(found.st_rdev) == _MEMORY:
+        raise refusal(f"'{name}' is no serial device.", "Look for it: ls /dev/tty*, or /dev/serial/by-id.")
+    return name
 
 
 Orientation = Annotated[
@@ -181,4 +230,6 @@ Axis = Annotated[tuple[float, float, float], Field(strict=False), AfterValidator
 Joint = Annotated[str, AfterValidator(_in_the_skeleton)]
 Ipv4 = Annotated[str, AfterValidator(_ipv4)]
 BundleFile = Annotated[str, Field(min_length=1), AfterValidator(_inside_the_bundle)]
-LocalFile = Annotated[Path, Field(strict=False), AfterValidator(_beside_the_file)]
+LocalFile = Annotated[Path, Field(strict=False), AfterValidator(_file_beside)]
+LocalFolder = Annotated[Path, Field(strict=False), AfterValidator(_folder_beside)]
+SerialDevice = Annotated[str, AfterValidator(_serial_device)]

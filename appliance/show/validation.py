@@ -9,7 +9,14 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from appliance.show import describe
-from appliance.show.config_error import ConfigError, Problem, did_you_mean, nearest
+from appliance.show.config_error import (
+    MOST_PROBLEMS,
+    ConfigError,
+    Problem,
+    did_you_mean,
+    nearest,
+    shortened,
+)
 from appliance.show.section import Section
 from appliance.show.yaml_file import Location, YamlFile
 
@@ -21,7 +28,9 @@ def validated(model: type[AnySection], file: YamlFile, context: dict[str, Any]) 
     try:
         return model.model_validate(file.values, context=context)
     except ValidationError as error:
-        raise ConfigError(_problem(model, file, details) for details in error.errors()) from None
+        found = sorted(error.errors(), key=lambda details: file.line(tuple(details["loc"])))
+        first, more = found[:MOST_PROBLEMS], max(0, len(found) - MOST_PROBLEMS)
+        raise ConfigError([_problem(model, file, details) for details in first], more) from None
 
 
 def _problem(model: type[Section], file: YamlFile, error: ErrorDetails) -> Problem:
@@ -39,7 +48,9 @@ def _words(model: type[Section], location: Location, error: ErrorDetails) -> tup
     around = _section_at(model, location[:-1])
     if error["type"] == "extra_forbidden":
         where = f" in '{spoken(location[:-1])}'" if location[:-1] else ""
-        return f"Unknown key '{location[-1]}'{where}.", did_you_mean(location[-1], list(around.model_fields))
+        return f"Unknown key '{shortened(location[-1])}'{where}.", did_you_mean(
+            location[-1], list(around.model_fields)
+        )
     field, name = _field_at(model, location), spoken(location)
     if error["type"] == "missing" and isinstance(location[-1], int):
         wanted = describe.kind(field.annotation) if field else "long enough"
@@ -106,7 +117,8 @@ def spoken(location: Location) -> str:
     """('hands', 0, 'joint') as 'hands[0].joint'."""
     text = ""
     for step in location:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+        name = shortened(step)
+        text += f"[{step}]" if isinstance(step, int) else f".{name}" if text else name
     return text
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import yaml
 
+from appliance.pose.foreign_yaml import composed, is_shallow
 from appliance.show.yaml_file import Location
 
 
@@ -15,9 +16,11 @@ def with_value(text: str, location: Location, value: Any) -> str:
     Raises ValueError for a text that is no YAML, and for a place in a list that it lacks.
     """
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = composed(text)
     except yaml.YAMLError as error:
         raise ValueError(f"This is not YAML ({error}).") from error
+    if not is_shallow(value):
+        raise ValueError(f"The value for '{location[-1]}' is nested too deeply.")
     if node is None:
         return f"{text.rstrip()}\n{location[0]}: {_flow(_nested(location[1:], value))}\n".lstrip()
     key: yaml.Node | None = None

@@ -11,10 +11,10 @@ from typing import Any
 import yaml
 
 from appliance.pose.foreign_file import content, require_inside
-from appliance.show.config_error import ConfigError, Problem
+from appliance.pose.foreign_yaml import composed
+from appliance.show.config_error import ConfigError, Problem, shortened
 
 MAX_BYTES = 256 * 1024  # a long show file has some 2 kB
-_DEEPEST = 32
 _LARGEST_NUMBER = 1 << 63  # 60:60:... and 0xff... can have more digits than Python prints
 _BARE_COLOUR = re.compile(r"[:\[,]\s+#[0-9a-fA-F]{3}")
 _TIMESTAMP = "tag:yaml.org,2002:timestamp"
@@ -54,15 +54,13 @@ def read_yaml(path: Path, inside: Path | None = None) -> YamlFile:
     file = YamlFile(path)
     problems: list[Problem] = []
     try:
-        root = yaml.compose(text, Loader=_ShallowLoader)
+        root = composed(text)
         if root is not None:
             file.values = _Plain(file, problems).value(root, ())
     except yaml.MarkedYAMLError as error:
         raise _not_yaml(path, text, error) from None
     except yaml.YAMLError as error:
         raise _refused(path, 1, str(error).splitlines()[0]) from None
-    except RecursionError:
-        raise _refused(path, 1, "it is nested too deeply") from None
     if not problems and not isinstance(file.values, dict):
         problems.append(Problem(path, 1, "The file does not consist of keys.", "Write 'key: value' lines."))
     if problems:
@@ -111,20 +109,6 @@ def _refused(path: Path, line: int, why: str, cure: str = "") -> ConfigError:
     return ConfigError([Problem(path, line, f"This is not YAML: {why}.", cure)])
 
 
-class _ShallowLoader(yaml.SafeLoader):
-    """Refuses a depth that no show has and for which the library takes seconds."""
-
-    _depth = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise RecursionError
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        return node
-
-
 class _Plain:
     """Turns the node tree into dicts, lists and scalars, noting lines on the way."""
 
@@ -158,7 +142,9 @@ class _Plain:
             if key in values:
                 first = self._file.line((*location, key))
                 self._problem(
-                    key_node, f"The key '{key}' stands here twice (first on line {first}).", "Remove one."
+                    key_node,
+                    f"The key '{shortened(key)}' stands here twice (first on line {first}).",
+                    "Remove one.",
                 )
                 continue
             self._file.lines[(*location, key)] = key_node.start_mark.line + 1
@@ -174,8 +160,9 @@ class _Plain:
                 return value
         except (yaml.YAMLError, ValueError, OverflowError):
             pass
-        shown = node.value if len(node.value) <= 60 else f"{node.value[:57]}..."
-        self._problem(node, f"'{shown}' cannot be read.", "Write a number, a word or 'quoted text'.")
+        self._problem(
+            node, f"'{shortened(node.value)}' cannot be read.", "Write a number, a word or 'quoted text'."
+        )
         return None
 
     def _problem(self, node: yaml.Node, message: str, cure: str) -> None:

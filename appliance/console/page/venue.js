@@ -4,7 +4,7 @@ import { words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
 const SURE_MS = 6000, CHECKED_WITHIN_MS = 100_000;
-let file = null;
+let file = null, asked = "";
 
 export function initVenue() {
   byId("file-read").addEventListener("click", readFile);
@@ -93,11 +93,18 @@ async function save(now) {
   tell(words("file_checking"), []);
   const buttons = [byId("file-check"), byId("file-now")];
   for (const button of buttons) button.disabled = true;
-  const answer = await ask("/api/box/file", { text: byId("file-text").value, values: changed(), now }, CHECKED_WITHIN_MS);
+  const wanted = { text: byId("file-text").value, values: changed(), now };
+  const sure = asked === JSON.stringify(wanted);  // the same once more answers its questions
+  asked = "";
+  const answer = await ask("/api/box/file", { ...wanted, sure }, CHECKED_WITHIN_MS);
   for (const button of buttons) button.disabled = false;
   if (answer.status !== 200) return tell(answer.words || words("no_page"), []);
-  const { problems, words: said } = answer.value;
+  const { problems, asks, words: said } = answer.value;
   if (problems.length) return tell(words("file_refused"), problems);
+  if (asks) {
+    asked = JSON.stringify(wanted);
+    return tell(words("file_sure"), asks.map((one) => ({ words: one })));
+  }
   if (!now) await readFile();
   return tell(said, []);
 }
