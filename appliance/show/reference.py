@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inspect import cleandoc
 from typing import Any
 
 from pydantic import BaseModel
@@ -115,12 +116,12 @@ def reference() -> str:
 
 def _tables(model: type[Section], path: str) -> list[str]:
     """This section's table and those of the sections in it."""
-    parts = [f"### {path}\n\n{model.__doc__}\n"] if path else []
+    parts = [f"### {path}\n\n{cleandoc(model.__doc__ or '')}\n"] if path else []
     rows = ["| key | value | default | meaning |", "|---|---|---|---|"]
-    rows += [_row(name, field) for name, field in model.model_fields.items()]
+    rows += [_row(field.alias or name, field) for name, field in model.model_fields.items()]
     parts.append("\n".join(rows) + "\n")
-    for name, field in model.model_fields.items():
-        below = describe.section(field.annotation)
+    for key, field in model.model_fields.items():
+        name, below = field.alias or key, describe.section(field.annotation)
         if below:
             place = f"{path}.{name}" if path else name
             if path and below is HandConfig:
@@ -133,7 +134,8 @@ def _tables(model: type[Section], path: str) -> list[str]:
 def _row(name: str, field: FieldInfo) -> str:
     limits = describe.bounds(field)
     value = describe.kind(field.annotation) + (f", {limits}" if limits else "")
-    return f"| `{name}` | {value} | {_default(field)} | {field.description} |"
+    meaning = cleandoc(field.description or "").partition("\n\n")[0].replace("\n", " ")
+    return f"| `{name}` | {value} | {_default(field)} | {meaning} |"
 
 
 def _default(field: FieldInfo) -> str:
@@ -145,10 +147,12 @@ def _default(field: FieldInfo) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, BaseModel):
         return "its own defaults"
-    if isinstance(value, list) and value:
+    if isinstance(value, list) and value and isinstance(value[0], BaseModel):
         return "one receiver with the defaults below"
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return f"`[{', '.join(part if isinstance(part, str) else f'{part:g}' for part in value)}]`"
+    if isinstance(value, str) and value.startswith("#"):  # without quotes YAML takes it for a comment
+        return f"`'{value}'`"
     words = {None: "null", True: "true", False: "false", "": '""'}
     return f"`{words[value] if isinstance(value, bool) or value in (None, '') else value}`"
 
