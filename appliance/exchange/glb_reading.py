@@ -21,6 +21,7 @@ from appliance.pose.recording import Recording
 
 _DAMAGED = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError)
 _STILL_SCALE = 1e-3  # a joint that is scaled by less is not scaled
+_SHORTEST_ROTATION = 0.5  # length of a quaternion; a shorter one is a hole in the data
 _PROP = 0.5  # of the joints of the largest skeleton: a smaller one is no second dancer
 _SHOWN = 8
 _WHOLE_RATE = 1e-5  # a rate this near to a whole number is that number: times are stored in single precision
@@ -52,11 +53,15 @@ def read_glb(path: Path, true_fps: float | None = None, choice: Choice = WHOLE) 
 
 
 class _Track(NamedTuple):
-    """What an animation says of one property of a node: at `times` (K,) `values` (K, C), and between."""
+    """What an animation says of one property of a node: at `times` (K,) `values` (K, C), and between.
+
+    lost: keys that were no numbers.
+    """
 
     times: Array
     values: Array
     interpolation: str
+    lost: int
 
 
 _Tracks = dict[tuple[int, str], _Track]
@@ -79,6 +84,12 @@ class _Scene:
         joints = self._skinned(skins, choice.skin) if skins else set()
         above = {node for joint in joints for node in self._chain(joint)}
         self._tracks = self._animation(above, choice.animation)
+        self._notes += [
+            f"{path} of '{self._nodes[node].get('name', node)}': {counted(track.lost, 'key')} of "
+            f"{track.lost + len(track.times)} lost (no numbers), the joint moves evenly over them"
+            for (node, path), track in self._tracks.items()
+            if track.lost
+        ]
         self._joints = self._ordered(joints or {node for node, _ in self._tracks}, bool(skins))
 
     def recording(self, true_fps: float | None) -> Recording:
@@ -139,7 +150,7 @@ class _Scene:
             x = x / np.linalg.norm(x, axis=-1, keepdims=True)
             y = y - x * np.sum(x * y, axis=-1, keepdims=True)
             y = y / np.linalg.norm(y, axis=-1, keepdims=True)
-        if (np.isfinite(linear).all(axis=(-2, -1)) & ~np.isfinite(y).all(axis=-1)).any():
+        if not np.isfinite(y).all():
             name = self._nodes[joint].get("name", joint)
             raise ExchangeError(self._file.path, f"Joint '{name}' is scaled to nothing. Apply scales first.")
         return np.stack([x, y, np.cross(x, y)], axis=-1)
@@ -241,7 +252,13 @@ class _Scene:
                 values = values.reshape(len(times), 3, -1)[:, 1]
             if len(values) != len(times) or (np.diff(times) <= 0).any():
                 raise ValueError("the times of an animation do not rise or do not fit its values")
-            tracks[target["node"], target["path"]] = _Track(times, values, kind)
+            sound = np.isfinite(times) & np.isfinite(values).all(axis=1)
+            if target["path"] == "rotation":
+                sound &= np.linalg.norm(values, axis=1) > _SHORTEST_ROTATION
+            if not sound.any():
+                raise ValueError(f"no key of an animation's {target['path']} is a number")
+            lost = int(np.count_nonzero(~sound))
+            tracks[target["node"], target["path"]] = _Track(times[sound], values[sound], kind, lost)
         return tracks
 
     def _ordered(self, chosen: set[int], skinned: bool) -> list[int]:

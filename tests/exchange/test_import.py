@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.fitting import fit_skeleton, pose_frames
+from appliance.exchange.importing import PointsOptions, import_points
 from appliance.exchange.points_file import read_names, read_points
 from appliance.exchange.topology import directions_at_rest, parents_by_name
 from appliance.pose import quaternion
@@ -271,3 +274,140 @@ def test_wrong_shapes_and_unknown_names_end_with_what_to_do(tmp_path: Path, bunr
     points.write_bytes(b"hello")
     assert "no NPY file" in bunraku("import", points, "--names", names, "--out", out, status=2).err
     assert not out.exists()
+
+
+def imported(folder: Path, points: Array, names: Sequence[str], **options: Any) -> tuple[Recording, str]:
+    """Points through a file: the dance, and what is said."""
+    np.save(folder / "points.npy", points)
+    (folder / "names.txt").write_text("\n".join(names))
+    said: list[str] = []
+    found = import_points(folder / "points.npy", PointsOptions(folder / "names.txt", **options), said.append)
+    return found.recording, "\n".join(said)
+
+
+def test_a_point_at_zero_for_a_while_was_not_seen(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=2.0)
+    points, hand, foot = points_of(meant), meant.skeleton.index("LeftHand"), meant.skeleton.index("RightFoot")
+    holed = points.copy()
+    holed[20:26, hand] = 0.0
+    holed[40:90, foot] = 0.0
+    holed[50] = np.where(np.arange(len(meant.skeleton))[:, None] == 3, 0.0, holed[50])
+    found, said = imported(tmp_path, holed, meant.skeleton.names)
+    assert "LeftHand is 0, 0, 0 in frames 20 to 25: taken as not seen." in said
+    assert "UpperChest is 0, 0, 0 in frame 50: taken as not seen." in said
+    assert "Gaps: 2 of up to 0.12 s" in said and "LeftHand in frames 20 to 25" in said
+    assert "RightFoot in frames 40 to 89 was not seen for 1.00 s, from 0.80 s on" in said
+    apart = np.linalg.norm(points_of(found) - points, axis=-1)
+    assert apart[:, hand].max() < 0.03
+
+
+def test_a_root_that_is_the_origin_stays_there_and_any_other_point_was_never_seen(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    centred = points_of(meant) - points_of(meant)[:, :1]
+    found, said = imported(tmp_path, centred, meant.skeleton.names)
+    assert "0, 0, 0" not in said and "Gaps" not in said
+    np.testing.assert_allclose(found.roots, 0.0, atol=1e-9)
+    unseen = points_of(meant)
+    unseen[:, meant.skeleton.index("LeftHand")] = 0.0
+    with pytest.raises(ExchangeError, match="LeftHand: never seen"):
+        imported(tmp_path, unseen, meant.skeleton.names)
+
+
+def test_a_root_that_sets_out_from_the_origin_is_there(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    points = points_of(meant) - points_of(meant)[:1, :1]
+    assert (points[0, 0] == 0.0).all()
+    assert "0, 0, 0" not in imported(tmp_path, points, meant.skeleton.names)[1]
+
+
+def test_infinite_places_are_gaps(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    holed = points_of(meant)
+    holed[5:8, 7] = np.inf
+    assert "Gaps: 1 of up to 0.06 s" in imported(tmp_path, holed, meant.skeleton.names)[1]
+
+
+def table_of(points: Array, names: Sequence[str], kind: str) -> str:
+    """Points as programs and spreadsheets write them."""
+    rows = [[f"{value:.6f}" for value in row] for row in points.reshape(len(points), -1).tolist()]
+    between, axes = {"underscores": ("_", "XYZ"), "capitals": ("", "XYZ")}.get(kind, (".", "xyz"))
+    titles = [f"{name}{between}{axis}" for name in names for axis in axes]
+    if kind == "semicolons":
+        rows = [[word.replace(".", ",") for word in row] for row in rows]
+    if kind == "quoted commas":
+        rows = [[f'"{word.replace(".", ",")}"' for word in row] for row in rows]
+    if kind == "index":
+        titles, rows = ["", *titles], [[str(number), *row] for number, row in enumerate(rows)]
+    if kind == "frame and time":
+        titles = ["Frame", "Time (Seconds)", *titles]
+        rows = [[str(number + 1), f"{number / 25:.4f}", *row] for number, row in enumerate(rows)]
+    if kind == "NA":
+        rows[3][3:6], rows[4][3:6] = ["NA"] * 3, ["NaN", "#N/A", "null"]
+    if kind == "a row cut":
+        rows[-1] = rows[-1][:4]
+    if kind == "words in a row":
+        rows[4][2] = "lost"
+    mark = {"semicolons": ";", "tabs": "\t"}.get(kind, ",")
+    end = "\n\n  \n" if kind == "blank last lines" else "\n"
+    comment = "# of a tracker\n" if kind == "a comment" else ""
+    return comment + "\n".join(mark.join(row) for row in [titles, *rows]) + end
+
+
+TABLES = {
+    "plain": "", "underscores": "", "capitals": "", "semicolons": "", "tabs": "", "quoted commas": "",
+    "index": "", "frame and time": "Rate: 25 frames a second, by the column of times", "blank last lines": "",
+    "NA": "Gaps: 1 of up to 0.04 s", "a comment": "", "a row cut": "line 51: 1 row lost (this line has 4",
+    "words in a row": "'lost' is not a number",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_tables_as_programs_write_them_are_read(kind: str, tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    points = points_of(meant)
+    (tmp_path / "points.csv").write_text(table_of(points, meant.skeleton.names, kind))
+    said: list[str] = []
+    found = import_points(tmp_path / "points.csv", PointsOptions(), said.append).recording
+    assert found.skeleton.names == meant.skeleton.names
+    assert found.fps == (25.0 if kind == "frame and time" else 50.0)
+    assert TABLES[kind] in "\n".join(said)
+    seen = len(meant) - (kind == "a row cut")
+    assert len(found) == seen
+    assert np.linalg.norm(points_of(found) - points[:seen], axis=-1).max() < 0.03
+
+
+def test_names_and_a_rate_that_are_given_apply_before_those_of_the_table_are_judged(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    text = table_of(points_of(meant), ["marker"] * len(meant.skeleton), "frame and time")
+    (tmp_path / "points.csv").write_text(text)
+    (tmp_path / "names.txt").write_bytes("\n".join(meant.skeleton.names).encode("utf-16"))
+    with pytest.raises(ExchangeError, match="Two points have the same name"):
+        import_points(tmp_path / "points.csv", PointsOptions(), print)
+    options = PointsOptions(tmp_path / "names.txt", fps=100.0)
+    assert import_points(tmp_path / "points.csv", options, print).recording.fps == 100.0
+
+
+def test_a_first_column_that_counts_is_no_place(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    text = table_of(points_of(meant), meant.skeleton.names, "index")
+    (tmp_path / "points.csv").write_text(text.split("\n", 1)[1])
+    (tmp_path / "names.txt").write_text("\n".join(meant.skeleton.names))
+    said: list[str] = []
+    found = import_points(tmp_path / "points.csv", PointsOptions(tmp_path / "names.txt"), said.append)
+    assert found.recording.skeleton.names == meant.skeleton.names
+    assert "the first column, which rises evenly" in "".join(said)
+
+
+def test_prefixes_of_a_performer_say_what_hangs_on_what(tmp_path: Path) -> None:
+    meant = moved(body("Actor01_{side}{joint}"), seconds=1.0)
+    names = [name if name.startswith("Actor") else f"Actor01_{name}" for name in meant.skeleton.names]
+    found, _ = imported(tmp_path, points_of(meant), names)
+    assert found.skeleton.parents == meant.skeleton.parents
+
+
+def test_points_that_the_model_does_not_have_are_named(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    write_bvh(tmp_path / "like.bvh", meant)
+    points = np.concatenate([points_of(meant), np.ones((len(meant), 1, 3))], axis=1)
+    _, said = imported(tmp_path, points, [*meant.skeleton.names, "Cane"], model=tmp_path / "like.bvh")
+    assert "no joints of like.bvh left out: Cane" in said
