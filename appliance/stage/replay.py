@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -88,13 +89,8 @@ class Replay:
                 self._obey(events[number], comparison)
 
     def _restore(self, keyframe: bytes) -> None:
-        try:
+        with _refused("A keyframe"):
             self.tick.restore(unpacked(keyframe))
-        except DAMAGED as error:
-            raise JournalError(
-                f"A keyframe is of another release, or damaged ({type(error).__name__}: {error}). It can be "
-                "drawn; to dance it again, take the release that recorded it."
-            ) from error
 
     def _rows(self) -> dict[int, int]:
         return {int(number): row for row, number in enumerate(self._run.tick_numbers)}
@@ -122,19 +118,30 @@ class Replay:
             float(recorded["started"]),
             int(recorded["skipped"]),
         )
-        self.tick.run(slot)
-        self.tick.after(slot)
-        comparison.look(recorded, self.tick)
+        with _refused(f"Tick {slot.tick}, or the keyframe before it,"):
+            self.tick.run(slot)
+            self.tick.after(slot)
+            comparison.look(recorded, self.tick)
 
     def _obey(self, event: dict[str, Any], comparison: Comparison) -> None:
-        try:
+        with _refused("An order, or the keyframe before it,"):
             asked, now, done_then = event["order"], float(event["now"]), bool(event["done"])
             order = Order(asked["name"], tuple(map(float, asked["values"])), asked["text"])
-        except DAMAGED as error:
-            raise JournalError(f"An order is of another release, or damaged ({error}).") from error
-        self._link.answers(order.text, done_then)
-        done, _ = carry_out(order, self.tick.parts, self.tick.iterations, self._wearing, now)
-        comparison.note_order(order.name, done_then, done)
+            self._link.answers(order.text, done_then)
+            done, _ = carry_out(order, self.tick.parts, self.tick.iterations, self._wearing, now)
+            comparison.note_order(order.name, done_then, done)
+
+
+@contextmanager
+def _refused(what: str) -> Iterator[None]:
+    """A journal holds whatever somebody wrote into it: what cannot be danced is refused in words."""
+    try:
+        yield
+    except DAMAGED as error:
+        raise JournalError(
+            f"{what} is of another release, or damaged ({type(error).__name__}: {error}). The run can be "
+            "drawn; to dance it again, take the release that recorded it."
+        ) from error
 
 
 class _RecordedNetwork(PuppetNetwork):

@@ -6,6 +6,7 @@ import io
 import os
 import tarfile
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from appliance.recorder import chunks, log
 from appliance.recorder.environment import fingerprints
 from appliance.recorder.export import export
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.keyframe import POSITION
+from appliance.recorder.keyframe import POSITION, packed, unpacked
 from appliance.recorder.reading import last_kept, read_journal
 from appliance.recorder.record import EVENT, TICK
 from appliance.recorder.segments import segment_paths
@@ -240,6 +241,28 @@ def test_a_keyframe_of_another_release_is_refused_in_words(
     (run,) = read_journal(path).runs
     with pytest.raises(JournalError, match="another release"):
         list(Replay(run, load_show(show)).dance(Comparison(0.0, 0.0)))
+
+
+@pytest.mark.parametrize("odd", [None, "late", [], {"a": 1}])
+def test_a_keyframe_with_a_value_that_nobody_looks_at_before_the_first_tick_is_refused_in_words(
+    whole: bytes, show: Path, tmp_path: Path, odd: object
+) -> None:
+    """A text as the latest start of a tick ended a replay in a traceback."""
+    path, (facts, keyframe, entries) = tmp_path / "odd.segment", chunks.chunks(whole)
+    state = unpacked(keyframe.data[POSITION.size :])
+    changes = [state | {name: odd} for name in state]
+    changes += [state | {"parts": state["parts"] | {name: odd}} for name in state["parts"]]
+    for changed in changes:
+        odd_keyframe = chunks.chunk(chunks.KEYFRAME, POSITION.pack(0) + packed(changed))
+        header, log_ = (chunks.chunk(one.kind, one.data, one.ticks) for one in (facts, entries))
+        path.write_bytes(header + odd_keyframe + log_)
+        (run,) = read_journal(path).runs
+        replay = Replay(run, load_show(show))
+        is_refused = changed["latest_start_s"] == odd or changed["parts"] == odd
+        refused = pytest.raises(JournalError, match="another release")
+        with refused if is_refused else suppress(JournalError):
+            list(replay.dance(Comparison(0.0, 0.0)))
+        replay.tick.parts.close()
 
 
 def test_an_order_of_another_release_is_refused_in_words(whole: bytes, show: Path, tmp_path: Path) -> None:
