@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -28,19 +29,37 @@ WIDTH_INCHES = 15.0
 STRIP_SHARE = 0.58  # height of the filmstrip by its width
 LETTERS_IN_A_ROW = 200  # were all joints' names as long as the longest; more run into each other
 LABEL_PT, SLANTED_LABELS_PT = 8.0, 540.0  # slanted ones are smaller where more than 67 stand side by side
+ALIVE = {
+    "critic": "critic\n(0.5: cannot tell)",
+    "critic_legs": "critic,\nlegs",
+    "critic_moving": "critic, with\nspeed and jerk",
+    "spread_legs": "spread,\nlegs (1)",
+    "spread_trunk": "spread,\ntrunk (1)",
+    "energy_legs": "energy,\nlegs (1)",
+    "energy_trunk": "energy,\ntrunk (1)",
+    "energy_arms": "energy,\nfree arms (1)",
+    "coupling_fidelity": "coupling to\nthe hand (1)",
+    "memorisation": "memorisation\n(0: one moment)",
+}
+COLOURS = {"phrase": IVORY, "pasted": FAINT, "network": VERMILION, "matching": SLATE}
+MOST_SHOWN = 2.0  # a bar that is longer says no more
 SLANTED: dict[str, Any] = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"}
 
 
 def draw_report(
     path: Path, name: str, report: dict[str, Any], evaluation: Evaluation, coder: Coder, take: Take
 ) -> Path:
-    """Filmstrip of a take and its reconstruction; errors by joint and by iterations; latents; int8."""
+    """Filmstrip of a take and its reconstruction; errors by joint and by iterations; latents; int8; the held
+    dance beside its baselines, where there were enough recordings to compare it.
+    """
     import matplotlib.image
 
-    figure = new_figure(WIDTH_INCHES, WIDTH_INCHES * STRIP_SHARE + 8.4)
+    compared = alive(report)
+    figure = new_figure(WIDTH_INCHES, WIDTH_INCHES * STRIP_SHARE + 8.4 + 4.2 * bool(compared))
     figure.suptitle(_headline(name, report), color=INK, fontsize=15, x=0.01, ha="left")
     figure.get_layout_engine().set(w_pad=0.15, h_pad=0.12)
-    grid = figure.add_gridspec(3, 3, height_ratios=[WIDTH_INCHES * STRIP_SHARE, 3.6, 3.6])
+    heights = [WIDTH_INCHES * STRIP_SHARE, 3.6, 3.6, *[3.6] * bool(compared)]
+    grid = figure.add_gridspec(len(heights), 3, height_ratios=heights)
     with tempfile.TemporaryDirectory() as folder:
         title = (
             f"{take.name}, a take that it never saw"
@@ -55,7 +74,37 @@ def draw_report(
     _by_iterations(dressed(figure.add_subplot(grid[2, 0])), report)
     _latents(dressed(figure.add_subplot(grid[2, 1])), evaluation)
     _quantization(dressed(figure.add_subplot(grid[2, 2])), report)
+    if compared:
+        draw_alive(dressed(figure.add_subplot(grid[3, :])), compared)
     return save(figure, path)
+
+
+def alive(report: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Baseline to figures of ALIVE, means over the hands; empty where the report compares no dances."""
+    rows = [one["baselines"] for one in report.get("puppetry", {}).values() if "baselines" in one]
+    found: dict[str, dict[str, float]] = {}
+    for kind in (kind for kind in COLOURS if rows and all(kind in row for row in rows)):
+        known = {name: [row[kind][name] for row in rows if row[kind][name] is not None] for name in ALIVE}
+        found[kind] = {name: fmean(values) for name, values in known.items() if values}
+    return found
+
+
+def draw_alive(axes: Any, compared: dict[str, dict[str, float]]) -> None:
+    """The figures of the held dance, a bar for each baseline."""
+    names = [name for name in ALIVE if any(name in row for row in compared.values())]
+    width = 0.8 / len(compared)
+    for number, (kind, row) in enumerate(compared.items()):
+        places = [place + (number + 0.5) * width - 0.4 for place, name in enumerate(names) if name in row]
+        heights = [min(row[name], MOST_SHOWN) for name in names if name in row]
+        axes.bar(places, heights, width, color=COLOURS[kind], label=kind)
+    axes.axhline(1.0, color=FAINT, linewidth=0.8)
+    axes.set_xticks(range(len(names)), [ALIVE[name] for name in names], color=INK, fontsize=LABEL_PT)
+    axes.set_ylim(0, 1.2 * axes.get_ylim()[1])
+    _titled(
+        axes,
+        "Is the held dance alive? Beside it: the phrase, the phrase with the arm pasted on, motion matching",
+    )
+    _legend(axes)
 
 
 def _headline(name: str, report: dict[str, Any]) -> str:
