@@ -9,6 +9,7 @@ import os
 import socket
 from typing import TYPE_CHECKING
 
+from appliance.box.served import listening
 from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
@@ -48,11 +49,3 @@ def address(host: str, port: int, https: bool = False) -> str:
             asking.connect(_ELSEWHERE)
             host = asking.getsockname()[0]
     return f"http{'s' * https}://{f'[{host}]' if ':' in host else host}:{port}"
-
-
-def listening(host: str, port: int) -> socket.socket:
-    """`::` takes IPv4 too; on a machine without IPv6 it is IPv4 alone."""
-    if host == "::" and not socket.has_dualstack_ipv6():
-        host = "0.0.0.0"
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    return socket.create_server((host, port), family=family, dualstack_ipv6=host == "::")

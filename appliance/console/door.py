@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from appliance.box.fallback import Fallbacks
+from appliance.box.served import plain_address
 from appliance.console.fallback import CROWDED
 
 MOST = 256  # connections at once
@@ -143,11 +144,6 @@ def gives_way(guests: Iterable[tuple[Guest, str, float]]) -> Guest:
     listed = list(guests)
     crowd = Counter(address for _, address, _ in listed)
     return min(listed, key=lambda one: (-crowd[one[1]], one[2]))[0]
-
-
-def plain_address(address: str) -> str:
-    """An address without its zone; an IPv4 address also where it came in by IPv6."""
-    return address.split("%")[0].lower().removeprefix("::ffff:")
 
 
 async def _open(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ipaddress
-import socket
 from collections.abc import Awaitable, Callable, Sequence
 
 from aiohttp import web
 
+from appliance.box.served import OwnNames, plain_address
 from appliance.console.devices import Device, Devices
-from appliance.console.door import Door, plain_address
+from appliance.console.door import Door
 
 COOKIE = "bunraku_device"
 _READING = ("GET", "HEAD")
@@ -38,8 +38,7 @@ class Guard:
 
     def __init__(self, viewers: Sequence[str], names: Sequence[str], devices: Devices, door: Door) -> None:
         self._viewers = [ipaddress.ip_network(one) for one in viewers]
-        own = socket.gethostname().lower()
-        self._names = {"localhost", own, f"{own}.local", *(name.lower() for name in names)}
+        self._names = OwnNames(names)
         self._devices, self._door = devices, door
         self.refused = 0
 
@@ -78,7 +77,7 @@ class Guard:
     def _complaint(self, request: web.Request) -> str:
         if not self._may_look(peer(request)):
             return "This device may not open the page. The box file lists those that may: `console: viewers`."
-        if not self._is_own(request.host):
+        if not self._names.has(request.host):
             return "The box does not know this name as its own. Use its address, or list the name."
         origin = request.headers.get("Origin")
         if origin is None and not _upgrades(request) and request.method in _READING:
@@ -93,17 +92,6 @@ class Guard:
         except ValueError:
             return False
         return asker.is_loopback or any(asker in network for network in self._viewers)
-
-    def _is_own(self, host: str) -> bool:
-        """Addresses are: a foreign page that points its name at the box still sends its name."""
-        name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
-        if name.lower() in self._names:
-            return True
-        try:
-            ipaddress.ip_address(name.strip("[]"))
-        except ValueError:
-            return False
-        return True
 
 
 def peer(request: web.Request) -> str:

@@ -18,6 +18,11 @@ class StreamConfig(Section):
     viewers: list[Viewers] = key(
         "Devices that may fetch it: addresses or networks. This machine always may.", [], length=(0, 32)
     )
+    names: list[str] = key(
+        "Names by which programs reach it, beside addresses, localhost and this machine's own name.",
+        [],
+        length=(0, 8),
+    )
     rate: float = key("Pictures a second at most.", 25.0, within=(1, 60))
     ndi: str | None = key(
         "Name under which NDI programs see it, where NDI's library (libndi) is installed; null: not by NDI.",

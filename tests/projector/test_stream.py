@@ -174,7 +174,7 @@ def test_a_client_that_takes_nothing_for_long_makes_room(monkeypatch: pytest.Mon
         await runner.setup()
         await web.TCPSite(runner, HOST, port := free_ports(1, socket.SOCK_STREAM)[0]).start()
         _, writer = await asyncio.open_connection(HOST, port, limit=64)
-        writer.write(b"GET /picture.mjpg HTTP/1.1\r\nHost: box\r\n\r\n")
+        writer.write(b"GET /picture.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n")
         async with asyncio.timeout(WITHIN_S):
             while not newest.watching:
                 await asyncio.sleep(0.01)
@@ -218,6 +218,31 @@ def test_a_taken_port_is_told_once_and_the_projector_goes_on() -> None:
             shown.feed.offer(now + later, (1, 1), lambda: bytes(4))
         shown.feed.close()
     assert len(said) == 1 and "is the port another program's?" in said[0]
+
+
+@pytest.mark.parametrize(("host", "through"), [("::", HOST), ("::", "::1"), ("0.0.0.0", HOST)])
+def test_every_network_is_ipv4_and_ipv6_and_no_foreign_name_is_answered(host: str, through: str) -> None:
+    """A foreign page points its own name at the box (DNS rebinding), and its browser sends that name."""
+    if ":" in host + through and not socket.has_dualstack_ipv6():
+        pytest.skip("this machine has no IPv6")
+    (port,) = free_ports(1, socket.SOCK_STREAM)
+    config = StreamConfig(host=host, port=port, viewers=["10.0.0.0/8"], names=["Hall.example"])
+    feed = Feed(config, pytest.fail)
+    feed.offer(time.monotonic(), (1, 1), lambda: bytes(4))
+    until, found = time.monotonic() + WITHIN_S, dict[str, int]()
+    own = f"[{through}]" if ":" in through else through
+    for name in (f"{own}:{port}", "hall.example", f"localhost:{port}", "evil.example", "evil.example:80"):
+        while name not in found:
+            connection = HTTPConnection(through, port, timeout=WITHIN_S)
+            try:
+                connection.request("GET", "/nothing", headers={"Host": name})
+                found[name] = connection.getresponse().status
+            except ConnectionRefusedError:
+                assert time.monotonic() < until, "nothing listens"
+                time.sleep(0.02)
+            connection.close()
+    feed.close()
+    assert list(found.values()) == [404, 404, 404, 403, 403]
 
 
 def test_a_stream_into_the_network_names_its_viewers(tmp_path: Path) -> None:

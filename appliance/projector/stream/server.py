@@ -15,6 +15,9 @@ from typing import BinaryIO
 from aiohttp import web
 from PIL import Image
 
+from appliance.box.log_limit import limit_log
+from appliance.box.open_files import open_more_files
+from appliance.box.served import OwnNames, listening, plain_address
 from appliance.projector.stream.keying import keyed
 from appliance.projector.stream.ndi import NdiSource
 from appliance.projector.stream.pipe import WANTED, Picture, read_picture
@@ -74,13 +77,15 @@ class Newest:
 
 async def serve(config: StreamConfig, pictures: BinaryIO, asks: BinaryIO) -> None:
     """Listen, until the pictures end or the process is asked to stop. Raises OSError where it cannot."""
+    open_more_files()
+    limit_log()
     ndi = _ndi_source(config)
     newest, loop = Newest(config, asks, ndi), asyncio.get_running_loop()
     over = asyncio.Event()
     loop.add_signal_handler(signal.SIGTERM, over.set)
     runner = web.AppRunner(_app(config, newest), access_log=None, shutdown_timeout=0.5)
     await runner.setup()
-    await web.TCPSite(runner, config.host, config.port).start()
+    await web.SockSite(runner, listening(config.host, config.port)).start()
 
     def take_pictures() -> None:
         """In a thread of its own: as long as encoding takes, clients are served."""
@@ -132,14 +137,17 @@ def png_of(picture: Picture) -> bytes:
 
 
 def _app(config: StreamConfig, newest: Newest) -> web.Application:
-    networks = [ipaddress.ip_network(one) for one in config.viewers]
+    networks, names = [ipaddress.ip_network(one) for one in config.viewers], OwnNames(config.names)
 
     @web.middleware
     async def viewers_only(request: web.Request, handler: Handler) -> web.StreamResponse:
-        address = ipaddress.ip_address((request.remote or "").partition("%")[0])
-        mapped = getattr(address, "ipv4_mapped", None) or address
-        if not (mapped.is_loopback or any(mapped in network for network in networks)):
+        address = ipaddress.ip_address(plain_address(request.remote or ""))
+        if not (address.is_loopback or any(address in network for network in networks)):
             raise web.HTTPForbidden(text="The box file lists this device nowhere under stream: viewers.")
+        if not names.has(request.host):  # a foreign page that points its own name at the box
+            raise web.HTTPForbidden(
+                text="The box does not know this name. Use its address, or stream: names."
+            )
         return await handler(request)
 
     async def stream(request: web.Request) -> web.StreamResponse:
