@@ -28,6 +28,7 @@ FREE_SETTLING_S = 1.0
 LATE = 1  # flag of the journal
 POWER_ON_S, POWER_ON_AND_JOIN_S = 1.0, 5.0  # until a reading is used: network up; Wi-Fi joined first
 RESTART_S = 1.5
+RESPONSE_MS = 45.0  # from a step of the sensor to half of it in the output joint
 LIGHT_MS = 75.0  # from a step of the hand to half of it on the screen, at 60 pictures a second
 NAMED = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}
 FEW = {"p50": 50.0, "max": 100.0}
@@ -142,6 +143,9 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
             figures["transport_ms"]["p50"],
             (free_p50 or 0.0) / 4,
             "ms",
+        ),
+        Limit(
+            "response to a step, half of the way, median", figures["response_ms"]["p50"], RESPONSE_MS, "ms"
         ),
         Limit("tick, median", figures["tick_ms"]["p50"], 2.0, "ms"),
         Limit("tick, p99", figures["tick_ms"]["p99"], 6.0, "ms"),

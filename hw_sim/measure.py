@@ -22,6 +22,7 @@ from hw_sim.progress import Progress
 
 REFUSED, FAILED = 2, 1
 BEAT_S = 0.02
+FEWEST_STEPS_S = 3.0  # of the shortest run: two or three steps
 _LARGEST_YAML = 1 << 20
 LOCKED_DRIFT_PPM = 60.0  # what a wearable's crystal may be off by; the lock has to follow it
 POWERED_S = 1.5  # how long a sensor is on until it is switched off again
@@ -108,8 +109,9 @@ def measure(
 
 
 def locked_course(seconds: float) -> Course:
-    """In phase; the last part with the phrase standing still, for the response to steps."""
-    return Course("locked", seconds, min(12.0, seconds / 3.0), drift_ppm=LOCKED_DRIFT_PPM)
+    """In phase; the last part with the phrase standing still, for the response to steps, one a second."""
+    standing_s = min(12.0, max(FEWEST_STEPS_S, seconds / 3.0))
+    return Course("locked", seconds, standing_s, drift_ppm=LOCKED_DRIFT_PPM)
 
 
 def free_course(seconds: float) -> Course:

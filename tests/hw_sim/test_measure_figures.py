@@ -72,7 +72,7 @@ def power_ons(count: int, until_reading_s: float = 0.75) -> tuple[list[Reading],
 
 def evidence() -> Evidence:
     sent = readings(400)
-    locked, free = run(sent, frames(sent)), run(sent, frames(sent, latency_s=0.012))
+    locked, free = run(sent, frames(sent, response_s=0.02)), run(sent, frames(sent, latency_s=0.012))
     return Evidence(locked, free, run(*power_ons(5)), [Restart(10.0, 10.1, 11.0 + n / 10) for n in range(3)])
 
 
@@ -183,6 +183,8 @@ def test_the_firmware_may_take_as_long_as_joining_a_wifi_takes() -> None:
         ({"transport_ms": {"p50": 3.5, "p99": 4.0, "p999": 4.0, "max": 4.0}}, "transport, median"),
         ({"transport_ms": {"p50": None, "p99": None, "p999": None, "max": None}}, "nothing came"),
         ({"free_running_transport_ms": {"p50": 6.0, "p99": 20.0}}, "against free running"),
+        ({"response_ms": {"p50": 46.0}}, "response to a step"),
+        ({"response_ms": {"p50": None}}, "nothing came"),
         ({"tick_ms": {"p50": 2.2, "p99": 5.0, "max": 9.0}}, "tick, median"),
         ({"tick_ms": {"p50": 1.0, "p99": 6.5, "max": 9.0}}, "tick, p99"),
         ({"late_ticks": 1}, "late ticks"),
