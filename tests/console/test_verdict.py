@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import time
+from collections import defaultdict
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from appliance.console.page_files import FOLDER, languages
 from appliance.console.verdict import verdict
 from appliance.show_control.status_messages import Status
+from hw_sim.figures import verdict as verdict_of_measure
 
 GOOD: dict[str, Any] = dict.fromkeys(Status._fields, 0) | {
     "state": "dancing",
@@ -64,9 +66,9 @@ def test_missing_sensors_are_named() -> None:
 
 @pytest.mark.parametrize("language", languages())
 def test_each_language_knows_the_words_of_the_page(language: str) -> None:
-    """A language may add words (fallbacks are English otherwise); it lacks none, with the same values."""
+    """With the same values in the same sentences."""
     english, own = table("en"), table(language)
-    assert english.keys() <= own.keys()
+    assert english.keys() == own.keys()
     for key, sentence in english.items():
         assert set(re.findall(r"\{\w+\}", sentence)) == set(re.findall(r"\{\w+\}", own[key])), key
     page = (FOLDER / "index.html").read_text()
@@ -82,6 +84,25 @@ def test_german_speaks_of_each_fallback() -> None:
 
     known = {f"fallback_{name}" for name in EVERY} | {"fallback_now", "fallback_before"}
     assert {key for key in table("de") if key.startswith("fallback_")} == known
+    for name, row in EVERY.items():
+        assert table("en")[f"fallback_{name}"] == row.words, "the table says in English what the box says"
+        if row.named:
+            about = row.named.replace("{{", "{").replace("}}", "}")
+            assert table("en")[f"named_{name}"] == about
+
+
+@pytest.mark.parametrize("language", languages())
+def test_each_language_has_the_limits_of_a_measurement(language: str) -> None:
+    """As certificate.js asks for them."""
+    nothing = dict.fromkeys(("p50", "p99"))
+    numbers = dict.fromkeys(("late_ticks", "missing_frames", "ticks", "firmware"), 0)
+    figures = defaultdict(lambda: nothing, **numbers, rss_mb=None, start_to_first_frame_s=None)
+    figures["hand_to_light_ms"] = nothing
+    for limit in verdict_of_measure(figures):
+        key = f"limit_{re.sub(r'[^a-z0-9]+', '_', limit.words.lower())}"
+        assert key in table(language), key
+        if language == "en":
+            assert table("en")[key] == limit.words
 
 
 def table(language: str) -> dict[str, str]:

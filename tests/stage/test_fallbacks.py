@@ -13,6 +13,7 @@ import pytest
 
 from appliance.box.fallback import RECENT_S, Fallback, Fallbacks, Fallen, fallen
 from appliance.box.process_health import OF_THE_COMPANY
+from appliance.console.fallback import OF_THE_PAGE
 from appliance.generator.fallback import OF_THE_GENERATOR
 from appliance.keeper.fallback import OF_THE_KEEPER
 from appliance.lights.fallback import OF_THE_LIGHTS
@@ -281,6 +282,7 @@ EVERY = {
         *OF_THE_SOUND,
         *OF_THE_COMPANY,
         *OF_CONTROL,
+        *OF_THE_PAGE,
     )
 }
 
