@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import sys
 import threading
@@ -22,12 +23,22 @@ def test_a_name_that_is_no_text_does_not_silence_what_follows() -> None:
     os.close(reading)
 
 
-def test_who_does_not_read_holds_nobody_up() -> None:
+def test_a_reader_that_takes_nothing_holds_nobody_up() -> None:
+    """The pipe holds some 60 lines of these, and the queue WAITING_LINES: all others are dropped, at once."""
     reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 1 << 16)
     speaker = LogWriter(writing)
-    for _ in range(1000):
-        speaker.say("x" * 1000)
-    speaker.close()
+
+    def speak() -> None:
+        for _ in range(1000):
+            speaker.say("x" * 1000)
+        speaker.close()
+
+    speaking = threading.Thread(target=speak, daemon=True)
+    speaking.start()
+    speaking.join(20.0)
+    assert not speaking.is_alive(), "a line waited for its reader"
+    assert 1000 - WAITING_LINES - 70 <= speaker.dropped <= 1000 - WAITING_LINES
     os.close(reading)
     os.close(writing)
 

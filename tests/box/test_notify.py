@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from appliance.box.notify import Notifier
+from appliance.box.notify import ALIVE, ENDING, READY, NotifyListener, Notifier
 from tests.box.supervisor import Supervisor
+
+
+def open_files() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
 
 
 @pytest.fixture(params=["path", "abstract"])
@@ -66,14 +72,25 @@ def test_a_supervisor_that_takes_nothing_holds_up_nobody(supervisor: Supervisor)
     assert supervisor.heard() == ["WATCHDOG=1"], "and it is heard again when there is room"
 
 
-@pytest.mark.parametrize("address", ["", "/nowhere/at/all", "x" * 200])
-def test_where_nobody_listens_it_is_silent(address: str) -> None:
-    notifier = Notifier({"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "1000000"})
+@pytest.mark.parametrize("place", ["", "notify", "no/such/folder/notify", "x" * 200])
+def test_where_nobody_listens_it_is_silent_and_goes_on_trying(
+    place: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = open_files()
+    notifier = Notifier({"NOTIFY_SOCKET": str(tmp_path / place) if place else "", "WATCHDOG_USEC": "1000000"})
+    assert open_files() - before == bool(place), "without an address no socket is made"
     notifier.ready()
     notifier.ping(1.0)
+    if place == "notify":
+        supervisor = Supervisor(str(tmp_path / place))
+        notifier.ping(1.3)
+        assert supervisor.heard() == ["READY=1\nWATCHDOG=1"], "one that comes late hears all that counts"
+        supervisor.close()
     notifier.stopping()
     notifier.close()
     notifier.ping(100.0)
+    assert open_files() == before
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_ready_for_which_there_was_no_room_is_said_again(tmp_path: Path) -> None:
@@ -87,3 +104,31 @@ def test_a_ready_for_which_there_was_no_room_is_said_again(tmp_path: Path) -> No
     assert supervisor.heard() == ["READY=1\nWATCHDOG=1", "WATCHDOG=1"]
     notifier.close()
     supervisor.close()
+
+
+def test_a_parent_hears_its_children_by_the_same_words_and_the_kernel_says_which_one() -> None:
+    listener = NotifyListener()
+    environ = listener.environ(0.8)
+    notifier = Notifier(environ)
+    assert notifier.every_s == pytest.approx(0.2)
+    notifier.ready("50.0 Hz")
+    notifier.ping(1000.0)
+    notifier.ping(1000.1)
+    child = (
+        "import os, sys; from appliance.box.notify import Notifier; Notifier().stopping(); print(os.getpid())"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", child],
+        env={**os.environ, **environ},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert list(listener.heard()) == [
+        (os.getpid(), f"{READY}\nSTATUS=50.0 Hz"),
+        (os.getpid(), ALIVE),
+        (int(ran.stdout), ENDING),
+    ]
+    assert list(listener.heard()) == []
+    notifier.close()
+    listener.close()

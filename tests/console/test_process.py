@@ -96,6 +96,13 @@ def test_a_taken_port_is_said_and_beside_a_stage_another_one_serves() -> None:
             assert other.getsockname()[1] != wanted.port
 
 
-def test_its_help_teaches() -> None:
-    words = run_bunraku("console", "--help").stdout
-    assert all(word in words for word in ("PIN", "pin", "devices", "revoke", "browser", "play"))
+def test_its_help_says_how_the_page_starts_and_what_each_command_does() -> None:
+    words = " ".join(run_bunraku("console", "--help").stdout.split())
+    assert "`bunraku play` starts it by itself and prints its address and PIN." in words
+    assert "Example: bunraku console --box box.yaml" in words
+    for command, sentence in (
+        ("pin", "Print the PIN that a device gives once"),
+        ("devices", "List the devices that gave the PIN"),
+        ("revoke", "Forget a device: it needs the PIN again"),
+    ):
+        assert f" {command} {sentence}" in words

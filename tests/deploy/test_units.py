@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from appliance.box.notify import WATCHDOG_S
 from appliance.cli.app import parser
 from appliance.cli.preflight import parsed
 from appliance.keeper.keeper import END_S
@@ -122,6 +123,15 @@ def test_what_lasts_is_watched_and_started_again_for_ever(name: str) -> None:
     assert said["WatchdogSignal"] == ["SIGABRT"]
     assert said["NotifyAccess"] == ["main"]
     assert "PYTHONFAULTHANDLER=1" in said["Environment"]
+
+
+@pytest.mark.parametrize("process", WATCHDOG_S)
+def test_a_unit_is_watched_as_bunraku_play_watches_its_companion(process: str) -> None:
+    assert seconds(settings(f"bunraku-{process}.service")["WatchdogSec"][0]) == WATCHDOG_S[process]
+
+
+def test_a_service_may_open_more_files_than_one_laptop_opens_connections() -> None:
+    assert int(settings("bunraku-console.service")["LimitNOFILE"][-1]) >= 4096
 
 
 def test_a_stage_that_hangs_dances_again_within_three_seconds() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 from pathlib import Path
@@ -29,17 +30,25 @@ def test_who_is_not_asked_for_is_told_so(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
+    ("text", "asks_for_sound", "has_wires", "is_sound"),
     [
-        "sound: {}\noutputs: {dmx: [{universe: 1, wire: artnet}]}\n",
-        "sound: loud\noutputs: everywhere\n",
-        "sound: []\noutputs: {dmx: null}\n",
+        ("sound: {}\noutputs: {dmx: [{universe: 1, wire: artnet}]}\n", True, True, True),
+        ("sound: {}\n", True, False, True),
+        ("outputs: {dmx: [{universe: 1, wire: artnet}]}\n", False, True, True),
+        ("sound: loud\noutputs: everywhere\n", True, True, False),
+        ("sound: []\noutputs: {dmx: null}\n", True, True, False),
+        ("sound: loud\n", True, False, False),
     ],
 )
-def test_all_else_is_for_the_whole_look(tmp_path: Path, text: str) -> None:
+def test_only_what_is_surely_not_asked_for_is_refused_and_all_else_by_the_whole_look(
+    tmp_path: Path, text: str, asks_for_sound: bool, has_wires: bool, is_sound: bool
+) -> None:
     box = box_file(tmp_path, text)
-    require_sound(box)
-    require_wires(box)
+    for look, asked in ((require_sound, asks_for_sound), (require_wires, has_wires)):
+        with contextlib.nullcontext() if asked else pytest.raises(NotAskedForError):
+            look(box)
+    with contextlib.nullcontext() if is_sound else pytest.raises(ConfigError, match=r"box.yaml:1: "):
+        load_box(box)
 
 
 def test_without_a_box_file_the_defaults_count() -> None:
