@@ -11,13 +11,18 @@ import pytest
 
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
+from appliance.pose.joint_names import side_of
+from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.pose.stage_frame import in_stage_frame
 from appliance.show.check import verify_bundle
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.catalogue import Catalogue
 from appliance.studio.data.dataset import Dataset, DatasetError, load_dataset
 from appliance.studio.data.mirror import asymmetry, mirror_pairs, mirrored
 from appliance.studio.evaluation.findings import findings, require_windows
+from tests.pose.conventions import as_the_system_writes, dance_of
+from tests.pose.other_frames import rezeroed
 from tests.studio.bodies import NAMINGS, body, carried, moved, sideways, z_up
 from tests.studio.conftest import bunraku
 from tests.studio.test_commands import said
@@ -118,6 +123,60 @@ def test_hips_that_are_held_still_remain_the_root(tmp_path: Path) -> None:
 
 def test_left_and_right_along_z_are_mirrored_there() -> None:
     assert_two_sided(sideways(moved(body(), 2.0)), axis=2)
+
+
+def axes_along_bones(dance: Recording, kind: str) -> Array:
+    """(J, 4): world rotations to a zero pose in which each bone lies along x of its joint, as rigs have it.
+
+    On the right all axes point the other way (Maya's 'behaviour'), or only one (Biped).
+    """
+    skeleton, zero = dance.skeleton, []
+    for joint in range(len(skeleton)):
+        below = [c for c, parent in enumerate(skeleton.parents) if parent == joint]
+        side = side_of(skeleton.names[joint])
+        bone = skeleton.offsets[below[0]] if below else skeleton.offsets[joint]
+        x = bone / np.linalg.norm(bone) * np.where([side < 0, False, False], -1.0, 1.0)
+        z = np.cross(x, [0.0, 0.1, 1.0] if abs(x[2]) < 0.9 else [0.1, 1.0, 0.0])
+        frame = np.stack([x, np.cross(z, x) / np.linalg.norm(z), z / np.linalg.norm(z)], axis=-1)
+        if side < 0:
+            flip = np.diag([-1.0, -1.0, -1.0] if kind == "behaviour" else [1.0, 1.0, -1.0])
+            frame = np.diag([-1.0, 1.0, 1.0]) @ frame @ flip
+        zero.append(quaternion.inverse(quaternion.from_matrix(frame)))
+    return np.stack(zero)
+
+
+@pytest.mark.parametrize("kind", ["shortest", "behaviour", "Biped"])
+def test_rigs_whose_bones_lie_along_local_axes_are_mirrored(tmp_path: Path, kind: str) -> None:
+    folder = tmp_path / "dancer"
+    folder.mkdir()
+    for seed in range(2):
+        if kind == "shortest":
+            written = as_the_system_writes(dance_of("LAFAN", seed=seed), "LAFAN")
+        else:
+            dance = dance_of("LAFAN", seed=seed)
+            written = rezeroed(dance, axes_along_bones(dance, kind))
+        write_bvh(folder / f"take_{seed}.bvh", written)
+    found = load_dataset(folder)
+    assert found.skeleton.stance is not None
+    assert found.asymmetry == "" and "mirror images besides" in told(found)
+    recording = found.takes[0].recording
+    skeleton, pairs = recording.skeleton, mirror_pairs(recording.skeleton)
+    seen, _ = skeleton.forward_kinematics(recording.poses, recording.roots)
+    image = mirrored(recording)
+    places, _ = skeleton.forward_kinematics(image.poses, image.roots)
+    np.testing.assert_allclose(places, seen[:, pairs] * [-1, 1, 1], atol=0.005)
+    back = mirrored(image)
+    apart = np.degrees(quaternion.angle_between(back.poses, recording.poses))
+    assert apart.max() < 1.0
+
+
+def test_a_rig_along_local_axes_that_is_lame_is_not_mirrored_and_named() -> None:
+    dance = dance_of("LAFAN")
+    dance.skeleton.offsets[dance.skeleton.index("LeftFoot")] *= 0.6
+    written, _ = in_stage_frame(rezeroed(dance, axes_along_bones(dance, "behaviour")))
+    assert written.skeleton.stance is not None
+    why = asymmetry(written.skeleton, range(len(written.skeleton)))
+    assert why == "LeftFoot and RightFoot are not each other's mirror image in the rest pose"
 
 
 def test_a_body_without_two_sides_is_not_mirrored_and_it_is_said_why(tmp_path: Path) -> None:
