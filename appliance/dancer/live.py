@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from appliance.dancer.extrapolation import Extrapolation
 from appliance.dancer.slerp import FloatArray, Slerp
@@ -82,7 +83,7 @@ class Live:
         of this moment, whose signs the stream takes over.
         """
         lengths = np.sqrt(np.einsum("jk,jk->j", pose, pose))
-        comes = ~np.isnan(pose).all(axis=1)
+        comes: NDArray[np.bool_] = np.logical_not(np.isnan(pose).all(axis=1))
         if not comes.any() or not (np.abs(lengths[comes] - 1.0) < _UNIT).all():
             return False
         interval_s, was_silent = arrival - self._arrival, self.silent_s(arrival) > SILENT_S

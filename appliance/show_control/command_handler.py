@@ -257,7 +257,7 @@ class CommandHandler:
             raise
 
     def _note_live(self, now: float) -> None:
-        missing = self._live.missing(now) if self._takes_live else ""
+        missing = self._live.partial(now) if self._takes_live else ""
         self._observer.own.set(LIVE_PARTIAL.name, bool(missing))
         self._observer.own.concern(LIVE_PARTIAL.name, filter(None, [missing]))
 

@@ -35,6 +35,7 @@ class LiveInput:
         self._vmc: tuple[Facts, VmcInput] | None = None
         self._heard_at = -math.inf
         self._came = ""
+        self._newest: VmcInput | None = None  # where the newest pose came bone by bone
 
     def hear(self, address: str, arguments: Sequence[object], facts: Facts | None, now: float) -> None:
         """One message that `is_live`. Raises ValueError with one clear sentence."""
@@ -70,7 +71,7 @@ class LiveInput:
         if max(map(abs, numbers)) > _UNIT:
             raise ValueError(f"{address}: a rotation is a quaternion of length 1: w, x, y, z.")
         self._write(now, self._root, numbers)
-        self._came = f"{joints} of {joints} joints"
+        self._came, self._newest = f"{joints} of {joints} joints", None
 
     def _hear_vmc(self, address: str, arguments: Sequence[object], facts: Facts, now: float) -> None:
         if self._vmc is None or self._vmc[0] is not facts:
@@ -80,7 +81,7 @@ class LiveInput:
         vmc = self._vmc[1]
         if (whole := vmc.hear(address, arguments)) is not None:
             self._write(now, *whole)
-            self._came = f"{len(vmc.known)} of {vmc.bones} bones"
+            self._came, self._newest = f"{len(vmc.known)} of {vmc.bones} bones", vmc
 
     def _write(self, now: float, root: Sequence[float], rotations: Sequence[float]) -> None:
         self._writer.write(now, root, rotations)
@@ -90,21 +91,24 @@ class LiveInput:
         """How much of the figure comes, like `17 of 17 bones`; empty: no live dancer is heard."""
         return self._came if now - self._heard_at <= SILENT_S else ""
 
-    def missing(self, now: float) -> str:
-        """The same where bones of the body do not come, and which; empty: all do, or nobody is heard."""
-        names = self._vmc[1].missing if self._vmc is not None and self._came.endswith("bones") else []
-        if not names or not self.came(now):
-            return ""
-        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-        return f"{self._came} come, without {', '.join(names[:_MOST_NAMED])}{more}"
+    def partial(self, now: float) -> str:
+        """How much comes and what is missing, where that are bones of the body; else empty."""
+        is_partial = self._newest is not None and not self._newest.is_whole
+        return self._without() if is_partial and self.came(now) else ""
 
     def words(self, now: float) -> str:
         """A sentence about it, for the one that lets the show start from it."""
-        if missing := self.missing(now):
-            return f"Of the live dancer {missing}: the others stay with the phrase."
-        if came := self.came(now):
-            return f"Of the live dancer {came} come."
-        return "No live dancer is heard: the phrase plays on until its program sends."
+        if not self.came(now):
+            return "No live dancer is heard: the phrase plays on until its program sends."
+        if without := self._without():
+            return f"Of the live dancer {without}: the others stay with the phrase."
+        return f"Of the live dancer {self._came} come."
+
+    def _without(self) -> str:
+        """How many bones come, and which do not; empty: all do."""
+        names = [] if self._newest is None else self._newest.missing
+        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+        return f"{self._came} come, without {', '.join(names[:_MOST_NAMED])}{more}" if names else ""
 
     def close(self) -> None:
         """Release the file."""

@@ -130,9 +130,9 @@ def _hands(status: Status, observer: StageObserver, now: float) -> Iterator[Mess
     if facts is None:
         return
     let_go = observer.health().get("let_go", ())
-    for joint, source in zip(facts.held, facts.hands, strict=True):
+    for hand, (joint, source) in enumerate(zip(facts.held, facts.hands, strict=True)):
         name = facts.skeleton.names[joint]
-        by = "position" if joint in facts.by_position else "orientation"
+        by = "position" if hand in facts.by_position else "orientation"
         yield "/hands/hand", name, source, int(name not in let_go), by
 
 

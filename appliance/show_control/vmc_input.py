@@ -61,8 +61,14 @@ class VmcInput:
 
     @property
     def missing(self) -> list[str]:
-        """Bones of a body that this figure has and that did not come."""
-        return [bone for bone in self._joint_of if bone in _OF_BODY and bone not in self.known]
+        """Bones of this figure that did not come, those of the body first."""
+        missing = [bone for bone in self._joint_of if bone not in self.known]
+        return sorted(missing, key=lambda bone: bone not in _OF_BODY)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all bones of the body came."""
+        return _OF_BODY.isdisjoint(self.missing)
 
     def hear(self, address: str, arguments: Sequence[object]) -> tuple[Vector, list[float]] | None:
         """One message; the hips' place in metres and all joints' w, x, y, z in the skeleton's order once a
