@@ -107,7 +107,7 @@ def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:
         "ends": skeleton["ends"],
         "held": [skeleton["joints"][joint] for joint in facts["held"]],
         "hands": facts["hands"],
-        "by_position": [skeleton["joints"][joint] for joint in facts["by_position"]],
+        "by_position": facts["by_position"],
         "puppets": facts["puppets"],
         "coding": facts["coding"],
         "interaction": facts["interaction"],

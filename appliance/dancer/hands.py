@@ -29,8 +29,8 @@ class Hands:
     extrapolated over the window; a kept joint has the orientations of the phrase's own window.
     places (M, 3), place_weights (M,): joints that are held by place, metres in the figure's frame
     (held_places.in_figure). The root is the origin there: a hand on it moves the figure's path (hips_drawn)
-    and has no weight. by_place (M,): joints with such hands. holds (M,): how firmly each joint is held, in
-    either way.
+    and has no weight. by_place: whether each puppeteer gives a place. Two of them may hold one joint, one in
+    each way. holds (M,): how firmly each joint is held, in either way.
     """
 
     def __init__(
@@ -46,22 +46,25 @@ class Hands:
         HandError.
         """
         self.puppeteers = tuple(puppeteers)
-        taken: list[int] = []
+        taken: list[tuple[int, bool]] = []  # joints, and whether by place
         places: list[int] = []
         self._turned: list[tuple[slice, Puppeteer]] = []  # with the rows of each, in what follows
         self._placed: list[HeldPlace] = []
         for puppeteer in puppeteers:
             held = puppeteer.joints if isinstance(puppeteer, Springs) else (puppeteer.joint,)
             for joint in held:
-                place = _place(joint, joints)
-                if place in taken:
-                    raise HandError(f"Two hands hold '{joint}'. Give each joint to one hand only.")
-                taken.append(place)
+                way = _place(joint, joints), isinstance(puppeteer, HeldPlace)
+                if way in taken:
+                    raise HandError(
+                        f"Two hands hold '{joint}'. Give each joint to one hand, or to one by orientation "
+                        "and one by position."
+                    )
+                taken.append(way)
             if isinstance(puppeteer, HeldPlace):
                 self._placed.append(puppeteer)
             else:
                 self._turned.append((slice(len(places), len(places) + len(held)), puppeteer))
-                places += taken[-len(held) :]
+                places += [place for place, _ in taken[-len(held) :]]
         self._places: NDArray[np.intp] = np.array(places, dtype=np.intp)
         self._placed.sort(key=lambda one: not one.is_root)  # the others stand on what it does
         self._hips = next((one for one in self._placed if one.is_root), None)
@@ -70,8 +73,7 @@ class Hands:
         self._placed_at: NDArray[np.intp] = np.array(
             [_place(one.joint, joints) for one in self._placed], dtype=np.intp
         )
-        self.by_place: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
-        self.by_place[self._placed_at] = True
+        self.by_place = tuple(isinstance(one, HeldPlace) for one in self.puppeteers)
         self._points = np.zeros((len(self._placed), 3), dtype=np.float32)
         self.places = np.zeros((len(joints), 3), dtype=np.float32)
         self.place_weights = np.zeros(len(joints), dtype=np.float32)

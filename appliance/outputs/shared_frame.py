@@ -59,7 +59,7 @@ class Facts:
     cards: tuple[str, ...] = ()
     puppets: tuple[str, ...] = ()  # their names; (): one, without a name
     motion: Mapping[str, Any] = field(default_factory=dict)  # sources that are made ahead, as in show.yaml
-    by_position: tuple[int, ...] = ()  # of the held joints those whose hands give positions
+    by_position: tuple[int, ...] = ()  # numbers of the hands that give positions
     trackers: Mapping[str, Sequence[str]] = field(default_factory=dict)  # joints that each VMC tracker moves
 
     @property

@@ -57,7 +57,8 @@ class HandConfig(Section):
     joint: Joint = key("Name of the held joint, one that the network moves.", length=(1, None))
     by: Literal["orientation", "position"] = key(
         "What the hand gives: an orientation of the joint, or its position in the room. `position`: for osc "
-        "and fixed. The position of the root joint draws the whole figure there, its feet on the floor.",
+        "and fixed. A joint may have one hand of each. The position of the root joint draws the whole figure "
+        "there, its feet on the floor.",
         "orientation",
     )
     tracker: str | None = key(

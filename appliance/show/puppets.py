@@ -72,11 +72,14 @@ class PuppetConfig(Section):
 
 
 def require_each_joint_once(hands: list[HandConfig]) -> list[HandConfig]:
-    """The hands of one puppet, none of whose joints is held twice. Raises a refusal."""
+    """The hands of one puppet, none of whose joints is held twice by orientation or twice by position.
+
+    Raises a refusal.
+    """
     refuse_repeats(
-        [hand.joint for hand in hands],
-        "Two hands hold the joint '{value}' (hands[{first}] and hands[{place}]).",
-        "Give one of them another joint.",
+        [(hand.joint, hand.by) for hand in hands],
+        "Two hands hold the joint '{value[0]}' by {value[1]} (hands[{first}] and hands[{place}]).",
+        "Give one of them another joint, or let one hold by orientation and the other by position.",
     )
     return hands
 

@@ -164,7 +164,7 @@ class ShowConfig(Section):
         at_start = [hand.springs for hand in self.hands if hand.springs]
         return {
             "phrase": self.motion.sources,
-            "hands": tuple(hand.joint for hand in self.hands),
+            "hands": tuple(dict.fromkeys(hand.joint for hand in self.hands)),
             "springs": tuple(dict.fromkeys([*at_start, *springs_by_name(self.springs)])) if at_start else (),
             "look": tuple(looks_by_name(self.looks)),
             "card": tuple(cards_by_name(self.cards)),

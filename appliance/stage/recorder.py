@@ -80,7 +80,7 @@ class Recorder:
         hands = parts.hands
         for hand, place in enumerate(parts.first.hand_places):
             field["targets"][0, hand] = hands.targets[0, place]
-            if hands.by_place[place]:
+            if hands.by_place[hand]:
                 field["targets"][0, hand, 0] = 0.0
                 field["targets"][0, hand, 1:] = hands.places[place]
             field["weights"][0, hand] = hands.holds[place]

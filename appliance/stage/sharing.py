@@ -34,7 +34,7 @@ def facts_of(
         skeleton=show.skeleton,
         held=tuple(joints.index(hand.joint) for hand in config.hands),
         hands=tuple(hand.sensor or hand.kind for hand in config.hands),
-        by_position=tuple(joints.index(hand.joint) for hand in config.hands if hand.by == "position"),
+        by_position=tuple(place for place, hand in enumerate(config.hands) if hand.by == "position"),
         trackers=_trackers(hand for _, hand in config.hands_at),
         phrases=names["phrase"],
         cues=tuple(cue.model_dump(mode="json") for cue in config.cues),

@@ -229,9 +229,8 @@ def _dance(parts: StageParts, show: Show) -> Callable[[int, int], object]:
     held = []
     for one, most in zip(parts.puppets, show.config.iterations_of_puppets, strict=True):
         mask = one.hands.mask.copy()
-        mask[one.hand_places] = True
-        mask &= ~one.hands.by_place
-        one.puppet.place_weights[:] = one.hands.by_place
+        for place, is_by_place in zip(one.hand_places, one.hands.by_place, strict=True):
+            (one.puppet.place_weights if is_by_place else mask)[place] = 1
         one.puppet.select(one.motion.window())
         held.append((one.puppet, most, (mask, one.hands.targets, one.hands.weights)))
 

@@ -195,7 +195,21 @@ def test_hands_of_both_kinds_hold_one_figure(skeleton: Skeleton) -> None:
     assert hands.targets[:, 2] == pytest.approx(np.tile([1, 0, 0, 0], (8, 1)))
     assert (hands.places.dtype, hands.place_weights.dtype) == (np.float32, np.float32)
     with pytest.raises(HandError, match="Two hands hold 'lShldr'"):
-        Hands([FixedOrientation("lShldr", RIGHT), RemotePlace("lShldr", skeleton)], JOINTS)
+        Hands([FixedPlace("lShldr", skeleton, THERE), RemotePlace("lShldr", skeleton)], JOINTS)
+
+
+def test_a_joint_is_held_by_orientation_and_by_place_at_once(skeleton: Skeleton) -> None:
+    turned, placed = FixedOrientation("lShldr", RIGHT, 0.8), FixedPlace("lShldr", skeleton, THERE, 0.5)
+    hands = Hands([turned, placed], JOINTS)
+    root, positions = np.array(ROOT, np.float32), positions_of(skeleton)
+    for tick in range(100):
+        hands.pull(tick * TICK_S, WINDOW, root, positions)
+    assert hands.by_place == (False, True)
+    assert hands.weights == pytest.approx([0, 0, 0.8, 0, 0])
+    assert hands.place_weights == pytest.approx([0, 0, 0.5, 0, 0])
+    assert hands.holds == pytest.approx([0, 0, 0.8, 0, 0])
+    assert hands.places[2] == pytest.approx(np.array(THERE) - ROOT, abs=2e-3)
+    assert hands.targets[:, 2] == pytest.approx(np.tile(RIGHT, (8, 1)))
 
 
 def test_where_the_puppet_stands_and_faces_is_taken_from_its_places(skeleton: Skeleton) -> None:

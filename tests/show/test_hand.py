@@ -58,6 +58,18 @@ def test_hands_by_position_are_read(show_yaml: ShowYaml) -> None:
     assert hands[1].fixed is not None and hands[1].fixed.position == (0.3, 1.0, -2.0)
 
 
+def test_a_joint_may_have_a_hand_by_orientation_and_one_by_position(show_yaml: ShowYaml) -> None:
+    both = (
+        "name: x\nhands:\n  - {sensor: wrist, joint: lForeArm}\n"
+        "  - {osc: true, joint: lForeArm, by: position}\n"
+    )
+    config = load_show(show_yaml(both)).config
+    assert [hand.by for hand in config.hands] == ["orientation", "position"]
+    assert config.names["hands"] == ("lForeArm",)
+    error = refusal(show_yaml(both + "  - {fixed: {position: [0, 1, 0]}, joint: lForeArm, by: position}\n"))
+    assert "Two hands hold the joint 'lForeArm' by position (hands[1] and hands[2])" in str(error)
+
+
 def test_a_hand_that_draws_the_hips_is_not_doubted(show_yaml: ShowYaml) -> None:
     def doubts(by: str) -> str:
         directory = show_yaml(f"name: x\nhands:\n  - {{osc: true, joint: hip, by: {by}}}\n")

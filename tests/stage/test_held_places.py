@@ -67,6 +67,22 @@ def test_the_network_is_given_the_place_and_the_weight_of_one_pass(night: Night)
     assert night.tick.frame.holds[FIGURE.index(ARM)] == 0.0
 
 
+def test_one_joint_goes_to_a_place_with_a_hands_orientation(tmp_path: Path) -> None:
+    turned = {"fixed": {"orientation": [0.8, 0.6, 0, 0]}, "joint": ARM}
+    night = Night(write_show(tmp_path / "show", [HANDS[0], turned]), tmp_path / "runtime")
+    night.order("place", *PLACE, text=ARM)
+    night.dance(80)
+    row, arm = night.parts.first.puppet, MOVING.index(ARM)
+    assert given(night) == pytest.approx(PLACE, abs=5e-3)
+    assert row.place_weights[arm] == 1.0 and night.parts.hands.mask[arm]
+    assert night.parts.hands.targets[0, arm] == pytest.approx([0.8, 0.6, 0, 0], abs=1e-5)
+    night.recorder.close()
+    night.parts.close()
+    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    placed, held = run.ticks["targets"][-1]
+    assert placed[1:] == pytest.approx(row.places[arm]) and held == pytest.approx([0.8, 0.6, 0, 0], abs=1e-5)
+
+
 def test_a_place_that_this_dancer_never_goes_to_is_brought_within_its_reach(night: Night) -> None:
     night.order("place", 0.4, 1.0, -0.5, text=ARM)
     night.dance(80)

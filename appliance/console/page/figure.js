@@ -24,10 +24,14 @@ export class Figure extends Dance {
   // Joints that a hand by OSC holds: the page is such a desk.
   get joints() {
     if (!this.show) return [];
-    return this.show.held.filter((_, place) => this.show.hands[place] === "osc").map((name) => this.show.joints.indexOf(name));
+    const names = this.show.held.filter((_, place) => this.show.hands[place] === "osc"); // twice: also by position
+    return [...new Set(names)].map((name) => this.show.joints.indexOf(name));
   }
 
-  isPlaced(joint) { return this.show.by_position.includes(this.show.joints[joint]); }
+  isPlaced(joint) {
+    const { by_position, hands, held, joints } = this.show;
+    return by_position.some((hand) => hands[hand] === "osc" && held[hand] === joints[joint]);
+  }
 
   turnBy(canvas) {
     canvas.addEventListener("pointerdown", (event) => {
