@@ -151,6 +151,22 @@ def test_a_material_file_is_read_as_it_was_written(maker: Maker, tmp_path: Path)
             read_material(path, FIGURE.names)
 
 
+@pytest.mark.parametrize("part", ["poses", "track"])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e20])
+def test_a_material_file_of_impossible_numbers_is_refused(
+    maker: Maker, tmp_path: Path, part: str, wrong: float
+) -> None:
+    loop, path = maker.make(VARY), tmp_path / "1001.material"
+    arrays = {"poses": loop.poses.copy(), "track": loop.track.copy()}
+    arrays[part][7, 0] = wrong
+    write_material(path, Material("{}", Loop.made(**arrays, step=loop.step, start_s=0.0)), FIGURE.names)
+    with (
+        np.errstate(all="ignore"),
+        pytest.raises(ValueError, match=f"its {part if part == 'poses' else 'places'}"),
+    ):
+        read_material(path, FIGURE.names)
+
+
 def test_a_network_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "none.onnx").write_bytes(b"none")
     with pytest.raises(MotionNetworkError, match="cannot be read"):

@@ -26,6 +26,7 @@ from appliance.dancer.material.prompt import CLOSING, closing_frame, homed, unpa
 from appliance.dancer.material.steps import HOP, Steps, danced_again, motion_of
 from appliance.dancer.phrase import FPS, X, Z
 from appliance.pose import quaternion
+from appliance.pose.possible import possible_roots
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
@@ -135,7 +136,7 @@ class Maker:
         count = closing_frame(poses[:, network.places])
         track = np.repeat(main.track[:1], count, axis=0)
         dance = Recording(self._skeleton, poses[:count].astype(float), roots[:count], FPS)
-        track[:, X : Z + 1] = homed(carried(dance, cyclic=False).roots)
+        track[:, X : Z + 1] = homed(possible_roots(carried(dance, cyclic=False).roots, FPS))
         cycle = Cycle.of(Loop(poses[:count], track, CLOSING, -CLOSING / FPS))
         return cycle, cycle.poses
 

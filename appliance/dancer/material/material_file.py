@@ -13,7 +13,9 @@ import numpy as np
 
 from appliance.box.durable import write_whole
 from appliance.dancer.loop import Loop, Placement
+from appliance.dancer.slerp import FloatArray
 from appliance.pose.foreign_file import opened, plain_json
+from appliance.pose.possible import FARTHEST_ON_STAGE_M
 
 SUFFIX = ".material"
 LARGEST = 64 * 2**20  # bytes: ten minutes of a figure of 43 joints are 22 MB
@@ -21,6 +23,7 @@ LARGEST = 64 * 2**20  # bytes: ten minutes of a figure of 43 joints are 22 MB
 _MAGIC = b"bunraku material 1\n"
 _HEAD = struct.Struct("<19sxI")  # magic, bytes of the facts
 _ALIGNED = 64
+_UNIT = 0.01  # how far the mean square of unit quaternions may be from 1
 
 
 class Material(NamedTuple):
@@ -81,7 +84,17 @@ def read_material(path: Path, joints: tuple[str, ...]) -> Material:
         poses = np.frombuffer(memory, np.float32, rows * figure * 4, at).reshape(rows, figure, 4)
         track = np.frombuffer(memory, np.float32, rows * columns, at + poses.nbytes).reshape(rows, columns)
         yaw, x, z = map(float, facts["step"])
+        _require_possible(poses, track, (yaw, x, z, float(facts["start_s"])))
         loop = Loop.made(poses, track, Placement(yaw, x, z), float(facts["start_s"]))
         return Material(str(facts["recipe"]), loop)
     except (LookupError, TypeError, ArithmeticError, struct.error, ValueError) as error:
         raise ValueError(f"{path} is no material of this show ({error}).") from None
+
+
+def _require_possible(poses: FloatArray, track: FloatArray, step: tuple[float, ...]) -> None:
+    """Raises ValueError for numbers that nobody danced; one pass over each array, because a tick waits."""
+    flat = poses.reshape(-1)
+    if not abs(4 * float(flat.dot(flat)) / flat.size - 1.0) < _UNIT:
+        raise ValueError("its poses are none")
+    if not (np.abs(track[:, :4]).max() <= FARTHEST_ON_STAGE_M and max(map(abs, step)) <= FARTHEST_ON_STAGE_M):
+        raise ValueError("its places are none")
