@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from appliance.cli.options import ChosenFile, ThisBoxFile, command_group
+from appliance.pose.idle_options import refuse_idle
 from appliance.release.installed_box import box_here
 from appliance.show_control.packet import readable
 
@@ -114,7 +115,7 @@ def write_stretch(
         for part in stretch(one, start, seconds):
             sys.stdout.buffer.write(part)
         return
-    if out.suffix == EXPORTED:
+    if out.suffix.casefold() == EXPORTED:
         export_stretch(source, out, one, start, seconds)
         return
     whole = Recording(one.skeleton, one.ticks["pose"], one.ticks["root"], 1.0 / one.header["tick_s"])
@@ -123,6 +124,7 @@ def write_stretch(
 
 @journal.command("export")
 def export_journal(
+    context: typer.Context,
     to: Annotated[Path | None, typer.Argument(help="Folder or file. Default: the stick.")] = None,
     box: ThisBoxFile = None,
     chosen: ChosenFile = None,
@@ -130,6 +132,9 @@ def export_journal(
     bvh: Annotated[Path | None, typer.Option(help="Write what was danced into this BVH file.")] = None,
     glb: Annotated[
         Path | None, typer.Option(help="Write it into this glTF file, for Blender, three.js, TouchDesigner.")
+    ] = None,
+    puppet: Annotated[
+        str | None, typer.Option(help="With --bvh or --glb: which puppet of several, by name.")
     ] = None,
 ) -> None:
     """Write the journal into one file that replay, filmstrip and list read, on a stick for example.
@@ -140,8 +145,9 @@ def export_journal(
 
     source = _recorded(box, chosen, recorded)
     if bvh is not None or glb is not None:
-        _export_dance(source, to, {".bvh": bvh, ".glb": glb})
+        _export_dance(source, to, {".bvh": bvh, ".glb": glb}, puppet)
         return
+    refuse_idle(context, ("puppet",), "without --bvh or --glb")
     if to is not None:
         typer.echo(f"Exported: {export(source, to, progress=_progress)}")
         return
@@ -149,8 +155,8 @@ def export_journal(
         typer.echo(f"Exported: {export(source, STICK, progress=_progress)}. The stick can be pulled.")
 
 
-def _export_dance(source: Path, to: Path | None, wanted: dict[str, Path | None]) -> None:
-    """What was danced, as recordings. Raises JournalError or ExchangeError."""
+def _export_dance(source: Path, to: Path | None, wanted: dict[str, Path | None], puppet: str | None) -> None:
+    """What was danced, as recordings. Raises JournalError, StageError or ExchangeError."""
     from appliance.cli.pictures import load_dance
     from appliance.exchange.exchange_error import ExchangeError
     from appliance.exchange.formats import write_recording
@@ -160,10 +166,13 @@ def _export_dance(source: Path, to: Path | None, wanted: dict[str, Path | None])
     for ending, out in wanted.items():
         if out is not None and out.suffix.lower() != ending:
             raise ExchangeError(out, f"A file for --{ending[1:]} ends with {ending}.")
-    danced = load_dance(source).recording
+    dance = load_dance(source)
+    danced, which = dance.of_puppet(puppet), ""
+    if dance.names:
+        which = f" by {puppet or dance.names[0]} of {', '.join(dance.names)} (--puppet)"
     for out in filter(None, wanted.values()):
         write_recording(out, danced)
-        typer.echo(f"Exported: {out}, {danced.seconds:.1f} s of dance.")
+        typer.echo(f"Exported: {out}, {danced.seconds:.1f} s of dance{which}.")
 
 
 def _recorded(box: Path | None, chosen: Path | None, recorded: Path | None) -> Path:

@@ -10,10 +10,17 @@ from typing import Annotated
 import typer
 
 from appliance.box.clock import TICK_S
-from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
+from appliance.pictures.filmstrip import COLUMNS, MissingPicturesError, Strip, draw_filmstrip, draw_strips
 from appliance.pose.file_trouble import sentence
+from appliance.pose.idle_options import refuse_idle
 from appliance.pose.quaternion import Array
-from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, read_upright, reading_options
+from appliance.pose.reading_options import (
+    AS_THE_FILES_SAY,
+    OPTIONS,
+    ReadingOptions,
+    read_upright,
+    reading_options,
+)
 from appliance.pose.recording import Recording
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
@@ -28,13 +35,25 @@ from appliance.stage.stage_error import StageError
 class RecordedDance:
     """A recording, how firmly hands held each joint in it (N, J; None: no hand did), its title.
 
-    others: of the puppets beside the first, frame by frame.
+    others: of the puppets beside the first, frame by frame; names: of all puppets, where there are several;
+    start_s: second of what was danced at which it begins.
     """
 
     recording: Recording
     holds: Array | None
     title: str
     others: tuple[Recording, ...] = ()
+    names: tuple[str, ...] = ()
+    start_s: float = 0.0
+
+    def of_puppet(self, name: str | None) -> Recording:
+        """The dance of one of several puppets; None: of the first. Raises StageError."""
+        if name is None:
+            return self.recording
+        if name not in self.names:
+            there = f"There are {', '.join(self.names)}." if self.names else "It has one, without a name."
+            raise StageError(f"{self.title}: no puppet '{name}' danced. {there}")
+        return (self.recording, *self.others)[self.names.index(name)]
 
     def part(self, start_s: float, seconds: float) -> RecordedDance:
         """`seconds` of it from a start on; a negative start counts from the end. Raises StageError."""
@@ -49,11 +68,13 @@ class RecordedDance:
         holds = None if self.holds is None else self.holds[first : first + len(part)]
         end_s = start_s + max(seconds, 1.0 / whole.fps)
         others = tuple(other.excerpt(start_s, end_s) for other in self.others)
-        return replace(self, recording=part, holds=holds, others=others)
+        begin_s = self.start_s + first / whole.fps
+        return replace(self, recording=part, holds=holds, others=others, start_s=begin_s)
 
 
 @reading_options
 def filmstrip(
+    context: typer.Context,
     recording: Annotated[Path, typer.Argument(help="A BVH recording, or the journal of a run.")],
     out: Annotated[Path | None, typer.Option(help="The PNG. Default: beside the recording.")] = None,
     start: Annotated[
@@ -70,6 +91,10 @@ def filmstrip(
     reading: ReadingOptions,
 ) -> None:
     """Draw a recording or a journal as a row of poses; held joints are highlighted."""
+    if look is None:
+        refuse_idle(context, ("show",), "without --look")
+    if not _is_recording(recording):
+        refuse_idle(context, OPTIONS, "with a journal, which is upright and in metres")
     out = out or recording.with_suffix(".png")
     dance = load_dance(recording, reading).part(start, seconds)
     print(draw_dance(dance, out) if look is None else render_dance(dance, out, look, show))
@@ -80,7 +105,7 @@ def load_dance(source: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> Reco
 
     What had to be guessed about a recording is said on standard error.
     """
-    if source.suffix.lower() == ".bvh":
+    if _is_recording(source):
         recording, guesses = read_upright(source, reading)
         for guess in guesses:
             print(f"{source.name}: {guess.sentence()}.", file=sys.stderr)
@@ -90,6 +115,7 @@ def load_dance(source: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> Reco
     skeleton, fps = journal.skeleton, 1.0 / TICK_S
     danced = Recording(skeleton, ticks["pose"], ticks["root"], fps)
     others = ticks["others_pose"].shape[1] if "others_pose" in (ticks.dtype.names or ()) else 0
+    names = tuple(name for name, _ in journal.header.get("puppets", ())) if others else ()
     return RecordedDance(
         danced,
         holds_of(journal.header, ticks),
@@ -98,16 +124,29 @@ def load_dance(source: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> Reco
             Recording(skeleton, ticks["others_pose"][:, one], ticks["others_root"][:, one], fps)
             for one in range(others)
         ),
+        names,
     )
 
 
+def _is_recording(source: Path) -> bool:
+    return source.suffix.lower() == ".bvh"
+
+
 def draw_dance(dance: RecordedDance, out: Path) -> Path:
-    """Draw a filmstrip of lit figures in rows, held joints highlighted. Raises StageError."""
-    danced = dance.recording
+    """Draw a filmstrip of lit figures, held joints highlighted: two rows, or one for each of several puppets.
+
+    Raises StageError.
+    """
+    danced, start_s = dance.recording, dance.start_s
+    body, holds = (danced.skeleton, danced.poses, danced.roots, danced.fps), dance.holds
     try:
-        return draw_filmstrip(
-            out, danced.skeleton, danced.poses, danced.roots, danced.fps, holds=dance.holds, title=dance.title
-        )
+        if not dance.others:
+            return draw_filmstrip(out, *body, holds=holds, title=dance.title, start_s=start_s)
+        strips = [
+            Strip(one.poses, one.roots, name, holds=holds if one is danced else None)
+            for one, name in zip((danced, *dance.others), dance.names, strict=True)
+        ]
+        return draw_strips(out, danced.skeleton, strips, danced.fps, dance.title, COLUMNS, start_s)
     except MissingPicturesError as error:
         raise StageError(str(error)) from error
     except OSError as error:

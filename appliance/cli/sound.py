@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from appliance.cli.options import BoxFile, ChosenFile
+from appliance.pose.idle_options import refuse_idle
 from appliance.release.choice import box_of
 from appliance.show.asked_for import require_sound
 from appliance.show.bundle import default_show_path, named_show
@@ -15,6 +16,7 @@ from appliance.stage.stage_error import StageError
 
 
 def sound(
+    context: typer.Context,
     recording: Annotated[
         Path | None, typer.Argument(help="With --file: a BVH recording, or the journal of a run.")
     ] = None,
@@ -27,6 +29,7 @@ def sound(
 ) -> None:
     """Play the strings of the show that the stage dances, through the sound card."""
     if file is None and recording is None:
+        refuse_idle(context, ("show",), "without --file: the show that the stage dances has its own strings")
         box = box_of(box, chosen)
         require_sound(box)
         from appliance.sound.run import run_sound

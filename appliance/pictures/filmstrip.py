@@ -18,6 +18,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
 INK, FAINT = "#efe6d8", "#9a948c"
+COLUMNS = 10
 _MORE_SCRIPTS = (
     *("Noto Sans CJK JP", "Noto Sans CJK SC", "WenQuanYi Zen Hei", "IPAGothic", "Droid Sans Fallback"),
     *("Noto Sans Arabic", "Noto Sans Hebrew", "Noto Sans Devanagari", "Noto Sans Thai"),
@@ -56,15 +57,17 @@ def draw_strips(
     fps: float,
     title: str = "",
     columns: int = 8,
+    start_s: float = 0.0,
 ) -> Path:
     """Draw dances of the same length under each other, instant by instant, into a PNG and return its path.
 
-    Raises MissingPicturesError where matplotlib is missing, ValueError where there is no pose.
+    start_s: second of the recording at which they begin. Raises MissingPicturesError where matplotlib is
+    missing, ValueError where there is no pose.
     """
     count = min((len(strip.poses) for strip in strips), default=0)
     chosen = np.linspace(0, count - 1, min(columns, count)).round().astype(np.int64)
     rows = [_row(strip, chosen) for strip in strips]
-    return draw_rows(path, skeleton, rows, fps, title, _held(skeleton, rows))
+    return draw_rows(path, skeleton, rows, fps, title, _held(skeleton, rows), start_s)
 
 
 def _row(strip: Strip, chosen: NDArray[np.int64], colour: Array = IVORY) -> Row:
@@ -81,22 +84,23 @@ def draw_filmstrip(
     fps: float,
     holds: Array | None = None,
     title: str = "",
-    columns: int = 10,
+    columns: int = COLUMNS,
     rows: int | None = None,
     against: Array | None = None,
     labels: tuple[str, str] = ("original", "reconstruction"),
+    start_s: float = 0.0,
 ) -> Path:
     """Draw columns x rows evenly spaced instants of a dance into a PNG and return its path.
 
     poses: (N, J, 4) local unit quaternions; roots: (N, 3) metres; fps: poses a second; holds: (N, J) how
     firmly a hand holds each joint, 0..1: its colour, and the way that it has gone while it was held;
     against: other poses (N, J, 4) for a second row below the first, instant by instant (original above
-    reconstruction). Two rows unless said otherwise.
+    reconstruction). Two rows unless said otherwise. start_s: second of the recording at which it begins.
     Raises MissingPicturesError where matplotlib is missing, ValueError where there is no pose.
     """
     drawn = _rows(np.asarray(poses, float), np.asarray(roots, float), columns, rows or 2, against, labels)
     drawn = [replace(row, holds=holds) for row in drawn]
-    return draw_rows(path, skeleton, drawn, fps, title, _held(skeleton, drawn))
+    return draw_rows(path, skeleton, drawn, fps, title, _held(skeleton, drawn), start_s)
 
 
 def held_throughout(poses: Array, joints: Sequence[int]) -> Array:
@@ -117,16 +121,23 @@ def _held(skeleton: Skeleton, rows: Sequence[Row]) -> str:
 
 
 def draw_rows(
-    path: Path | str, skeleton: Skeleton, rows: Sequence[Row], fps: float, title: str, coloured: str
+    path: Path | str,
+    skeleton: Skeleton,
+    rows: Sequence[Row],
+    fps: float,
+    title: str,
+    coloured: str,
+    start_s: float = 0.0,
 ) -> Path:
     """Draw rows under each other, each with instants, coloured joints and words of its own, into a PNG.
 
-    fps: poses a second; coloured: what the coloured joints are. Raises as draw_strips does.
+    fps: poses a second; coloured: what the coloured joints are; start_s: as in draw_strips, which raises the
+    same.
     """
     matplotlib_figure, canvas = _matplotlib()
     if not rows or not len(rows[0].chosen):
         raise ValueError("a filmstrip needs at least one pose")
-    stage = Stage(skeleton, rows, fps)
+    stage = Stage(skeleton, rows, fps, start_s)
     height, width = stage.floor.shape[:2]
     figure = matplotlib_figure(figsize=(width / 100, height / 100), dpi=100)
     axes = figure.add_axes((0, 0, 1, 1))

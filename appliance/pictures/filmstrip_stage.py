@@ -47,8 +47,9 @@ class Row:
 class Stage:
     """The picture in layers: the floor with its shadows, the trails, the figures; and where words belong."""
 
-    def __init__(self, skeleton: Skeleton, rows: Sequence[Row], fps: float) -> None:
-        self.skeleton, self.fps = skeleton, fps
+    def __init__(self, skeleton: Skeleton, rows: Sequence[Row], fps: float, start_s: float = 0.0) -> None:
+        """start_s: second of the recording at which the rows begin, which the stamps count from."""
+        self.skeleton, self.fps, self.start_s = skeleton, fps, start_s
         self.body = Body(skeleton)
         self.scale = HEIGHT_PX / self.body.height
         self.times: list[tuple[float, float, str]] = []
@@ -100,7 +101,7 @@ class Stage:
             centre = self.margin_px + (column + 0.5) * COLUMN_PX
             self._figure(row, int(index), centre, floor, rows)
             self._trail(row, int(index), centre, floor, top)
-            stamp = row.stamps[column] if row.stamps else f"{index / self.fps:.1f} s"
+            stamp = row.stamps[column] if row.stamps else f"{self.start_s + index / self.fps:.1f} s"
             self.times.append((centre, top + self.floor_px + FOOTER_PX, stamp))
         if row.label:
             self.labels.append((top + 12, row.label))

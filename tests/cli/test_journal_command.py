@@ -5,11 +5,12 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from appliance.cli import journal
+from appliance.cli import journal, pictures
 from appliance.exchange.formats import read_as_told
 from appliance.pose import quaternion
 from appliance.recorder.reading import read_journal
@@ -17,6 +18,7 @@ from appliance.release import choice
 from tests.bundles import write_show
 from tests.command import Command
 from tests.recorder.night import Night
+from tests.stage.test_puppets import write_puppets
 
 
 @pytest.fixture
@@ -69,6 +71,30 @@ def test_the_dance_of_the_night_is_a_recording(recorded: Path, tmp_path: Path, b
         assert found.skeleton.same_joints(danced.skeleton)
         np.testing.assert_allclose(found.roots, danced.ticks["root"], atol=1e-5)
         assert np.degrees(quaternion.angle_between(found.poses, danced.ticks["pose"])).max() < 0.1
+
+
+def test_of_several_puppets_the_one_that_is_written_is_named_and_may_be_chosen(
+    tmp_path: Path, bunraku: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    night = Night(write_puppets(tmp_path / "show"), tmp_path / "runtime")
+    night.dance(60)
+    kept = night.kept(tmp_path / "journal")
+    export = ("journal", "export", "--journal", kept, "--bvh", tmp_path / "one.bvh")
+    assert "by left of left, right, late, slow (--puppet)" in bunraku(*export).out
+    assert "by slow of left" in bunraku(*export, "--puppet", "slow").out
+    danced = read_journal(kept).ticks["others_root"][:, 2]
+    np.testing.assert_allclose(read_as_told(tmp_path / "one.bvh")[0].roots, danced, atol=1e-5)
+    assert "no puppet 'nobody' danced" in bunraku(*export, "--puppet", "nobody", status=2).err
+    alone = ("journal", "export", tmp_path / "out", "--journal", kept, "--puppet", "slow")
+    assert "--puppet does nothing without --bvh or --glb" in bunraku(*alone, status=2).err
+    drawn: list[Any] = []
+    monkeypatch.setattr(pictures, "draw_strips", lambda *given: drawn.extend(given) or given[0])
+    bunraku("filmstrip", kept, "--out", tmp_path / "all.png", "--seconds", "0.5", "--start", "0.6")
+    _, _, strips, *_, start_s = drawn
+    assert [strip.label for strip in strips] == ["left", "right", "late", "slow"] and start_s == 0.6
+    assert strips[0].holds is not None and np.array_equal(strips[3].roots, danced[30:55])
+    words = bunraku("filmstrip", kept, "--show", tmp_path / "show", "--up", "z", status=2).err
+    assert "--show does nothing without --look" in words
 
 
 def test_a_recording_has_the_ending_of_its_format(recorded: Path, tmp_path: Path, bunraku: Command) -> None:

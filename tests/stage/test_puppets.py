@@ -22,6 +22,7 @@ from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from appliance.stage.sharing import facts_of
+from appliance.stage.stage_error import StageError
 from appliance.stage.stage_parts import admission, assemble
 from tests.bundles import swaying_phrase, write_show
 from tests.recorder.night import BOX, Night, reading
@@ -123,6 +124,11 @@ def test_their_journal_dances_again_bit_for_bit(night: Night, tmp_path: Path) ->
     drawn = load_dance(tmp_path / "kept").part(2.0, 1.0)
     assert len(drawn.others) == 3 and len(drawn.others[0]) == 50
     assert np.array_equal(drawn.others[1].roots, run.ticks["others_root"][100:150, 1])
+    assert drawn.names == ("left", "right", "late", "slow") and drawn.start_s == pytest.approx(2.0)
+    assert np.array_equal(drawn.of_puppet("late").poses, drawn.others[1].poses)
+    assert drawn.of_puppet(None) is drawn.recording
+    with pytest.raises(StageError, match=r"no puppet 'nobody' danced. There are left, right, late, slow"):
+        drawn.of_puppet("nobody")
     run = replace(run, ticks=run.ticks.copy())
     run.ticks["others_pose"][300, 2, 0] = [0.0, 1.0, 0.0, 0.0]
     comparison = Comparison(float(run.ticks["frame_time"][0]), 0.0)
