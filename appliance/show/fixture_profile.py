@@ -137,7 +137,7 @@ def built_in_folder() -> Path:
 def profile_names(show: Path | None) -> Sequence[str]:
     """Names of all profiles that a show can use."""
     folders = [built_in_folder()] + ([show / FOLDER] if show is not None else [])
-    return sorted({path.stem for folder in folders for path in folder.glob("*.yaml")})
+    return sorted({name for folder in folders for name in _profiles_in(folder)})
 
 
 def find_profile(name: str, show: Path | None) -> Path | None:
@@ -145,7 +145,13 @@ def find_profile(name: str, show: Path | None) -> Path | None:
     folders = ([show / FOLDER] if show is not None else []) + [built_in_folder()]
     if "/" in name or "\\" in name:
         return None
-    return next((path for folder in folders if (path := folder / f"{name}.yaml").is_file()), None)
+    return next((path for folder in folders if (path := _profiles_in(folder).get(name)) is not None), None)
+
+
+def _profiles_in(folder: Path) -> dict[str, Path]:
+    """Name to file; the ending in any case."""
+    files = (path for path in sorted(folder.glob("*"), reverse=True) if path.is_file())
+    return {path.stem: path for path in files if path.suffix.casefold() == ".yaml"}
 
 
 _read: dict[tuple[Path, int], ProfileConfig] = {}

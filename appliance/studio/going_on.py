@@ -25,7 +25,7 @@ def open_start(path: Path) -> TorchCoder:
     """
     if path.is_dir() and (path / "checkpoint.pt").exists():
         return load_puppet(path / "checkpoint.pt")[0]
-    if path.suffix == ".pt":
+    if path.suffix.casefold() == ".pt":
         return load_puppet(path)[0]
     return read_exported(load_show(path).network if path.is_dir() else path)
 

@@ -42,9 +42,7 @@ def inspect(
         ]
         for folder in filter(Path.is_dir, recordings):
             if others := left_out_of(folder):
-                typer.echo(
-                    f"Left out of {folder}, as only its BVH files are read: {', '.join(others)}.", err=True
-                )
+                typer.echo(f"Only BVH files are read, left out of {folder}: {others}.", err=True)
         if not files:
             raise StudioError(f"{recordings[0]} has no .bvh files. Give BVH recordings, or a folder of them.")
         found = [

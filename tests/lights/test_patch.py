@@ -124,7 +124,7 @@ def test_a_lamp_without_a_dimmer_is_dimmed_by_its_colours(
 
 def test_amber_goes_dark_with_the_colours_beside_it(show: Path) -> None:
     profile = {"name": "A", "modes": [{"name": "one", "channels": ["red", "green", "blue", "amber"]}]}
-    (show / "profiles" / "amber.yaml").write_text(yaml.safe_dump(profile))
+    (show / "profiles" / "amber.YAML").write_text(yaml.safe_dump(profile))
     patch = patch_of([{"name": "lamp", "profile": "amber", "address": 1}], show)
     values = with_values(patch, dimmer=1.0, amber=1.0)
     assert patch.encode(patch.dimmed(values, 1.0))[1][3] == 255

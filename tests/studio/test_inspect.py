@@ -7,11 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from appliance.pose.bvh import write_bvh
 from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.data.catalogue import Catalogue
+from appliance.studio.data.dataset import load_dataset
 from appliance.studio.data.remembered import KEY, reading_facts, remembered_reading
+from appliance.studio.evaluation.findings import findings
 from appliance.studio.inspection import zero_pose
 from tests.pose.conventions import as_the_system_writes, dance_of, skeleton_of
 from tests.pose.other_frames import scaled
@@ -46,6 +49,40 @@ def test_fingers_and_the_whole_trunk_are_recognised_and_a_root_on_the_floor_is_n
     taken = {joint["name"]: joint["taken_for"] for joint in found["joints"]}
     expected = {"LeftHandIndex2": "left index", "Spine2": "spine", "Spine4": "chest", "Root": ""}
     assert {name: taken[name] for name in expected} == expected
+
+
+def test_an_ending_in_any_case_is_one_and_what_is_left_out_of_a_folder_is_named(tmp_path: Path) -> None:
+    for name in ("one.bvh", "two.BVH", "three.Bvh"):
+        write_bvh(tmp_path / name, dance_of("Mixamo", seconds=2.0))
+    assert [found["name"] for found in facts(tmp_path)] == ["one", "three", "two"]
+    assert "Only BVH files" not in said(bunraku("inspect", tmp_path))
+    (tmp_path / "._one.bvh").write_bytes(b"of the Finder")
+    (tmp_path / "four.GLB").write_bytes(b"")
+    (tmp_path / "more").mkdir()
+    write_bvh(tmp_path / "more" / "five.bvh", dance_of("Mixamo", seconds=2.0))
+    told = said(bunraku("inspect", tmp_path))
+    assert f"Only BVH files are read, left out of {tmp_path}: four.GLB, more/." in told
+    assert "Only BVH files are read, left out: four.GLB, more/." in findings(load_dataset(tmp_path))
+
+
+@pytest.mark.parametrize("time", ["0", "soon", "-1"])
+def test_the_true_rate_makes_a_header_s_nonsense_readable(tmp_path: Path, time: str) -> None:
+    file = tmp_path / "take.bvh"
+    write_bvh(file, dance_of("Mixamo", seconds=2.0))
+    file.write_text(file.read_text().replace("Frame Time: 0.02\n", f"Frame Time: {time}\n"))
+    assert "--true-fps" in said(bunraku("inspect", file))
+    (found,) = facts(file, "--true-fps", "60")
+    assert (found["fps"], found["header_fps"]) == (60.0, 60.0)
+
+
+def test_rows_that_are_lost_are_said(tmp_path: Path) -> None:
+    file = tmp_path / "take.bvh"
+    write_bvh(file, dance_of("Mixamo", seconds=2.0))
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([*lines[:-1], lines[-1][:-20]]))
+    (found,) = facts(file)
+    assert found["frames"] == 99
+    assert f"line {len(lines)}: 1 row lost" in found["changed"][0]
 
 
 def test_every_guess_can_be_overruled(tmp_path: Path) -> None:

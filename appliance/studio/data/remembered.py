@@ -31,7 +31,7 @@ class Remembered:
         """What was asked for, then what training was told.
 
         That does not hold for what Bunraku made (a phrase, a variation): it is in the stage's frame already.
-        Raises BvhError or OSError.
+        Raises OSError.
         """
         if self.options == AS_THE_FILES_SAY or self._is_made_by_us(file):
             return asked
@@ -41,7 +41,10 @@ class Remembered:
         """Whether a file has the rate of phrases, and bone for bone the skeleton of the training."""
         if self.skeleton is None:
             return False
-        found = read_bvh(file)
+        try:
+            found = read_bvh(file)
+        except BvhError:  # perhaps only until what was asked for is applied
+            return False
         return (
             bool(np.isclose(found.fps, FPS))
             and found.skeleton.same_joints(self.skeleton)
@@ -61,7 +64,7 @@ def reading_facts(catalogue: Catalogue) -> dict[str, Any]:
 def remembered_reading(network: Path) -> Remembered:
     """Of a show folder, a network in one, or a checkpoint; nothing where none of them tells."""
     folder = network if network.is_dir() else network.parent
-    if network.suffix == ".pt":
+    if network.suffix.casefold() == ".pt":
         from appliance.studio.evaluation.coders import load_state
 
         origin = load_state(network).get("origin") or {}

@@ -198,4 +198,4 @@ def open_coder(path: Path) -> Coder:
         if not (path / "show.yaml").exists() and (path / "checkpoint.pt").exists():
             return load_puppet(path / "checkpoint.pt")[0]
         return OnnxCoder(load_show(path).network)
-    return load_puppet(path)[0] if path.suffix == ".pt" else OnnxCoder(path)
+    return load_puppet(path)[0] if path.suffix.casefold() == ".pt" else OnnxCoder(path)
