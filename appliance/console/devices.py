@@ -43,7 +43,6 @@ class Devices:
         self._devices: tuple[Device, ...] = ()
         self._look()
         if not self._pin:
-            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             self._write(new_pin(), ())
 
     @property
@@ -67,14 +66,14 @@ class Devices:
         """A new PIN that takes too long to guess, whether there was none yet; devices stay remembered."""
         if len(self.pin) == LONG_DIGITS:
             return False
-        self._write(new_pin(LONG_DIGITS), self._devices)
+        self._keep(new_pin(LONG_DIGITS), self._devices)
         return True
 
     def remember(self, name: str) -> str:
-        """Remember one more device; its token."""
+        """Remember one more device; its token. A disk that does not take it shuts nobody out."""
         token = secrets.token_hex(32)
         kept = self.devices[-(MOST_DEVICES - 1) :]
-        self._write(self._pin, (*kept, Device(secrets.token_hex(4), name, _digest(token), time.time())))
+        self._keep(self._pin, (*kept, Device(secrets.token_hex(4), name, _digest(token), time.time())))
         return token
 
     def known(self, token: str) -> Device | None:
@@ -87,8 +86,15 @@ class Devices:
         kept = tuple(one for one in self.devices if one.id != device_id)
         if len(kept) == len(self._devices):
             return False
-        self._write(self._pin, kept)
+        self._keep(self._pin, kept)
         return True
+
+    def _keep(self, pin: str, devices: tuple[Device, ...]) -> None:
+        """As `_write`; without a place on the disk it counts until this process ends."""
+        try:
+            self._write(pin, devices)
+        except OSError:
+            self._pin, self._devices = pin, devices
 
     def _look(self) -> None:
         """Read the file again where it has changed; a spoilt one is as good as none."""
@@ -109,6 +115,7 @@ class Devices:
         self._pin, self._devices, self._changed = pin, devices, changed
 
     def _write(self, pin: str, devices: tuple[Device, ...]) -> None:
+        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         values = {"pin": pin, "devices": [asdict(device) for device in devices]}
         self._file.write(json.dumps(values, indent=1).encode())
         self._pin, self._devices, self._changed = pin, devices, self.path.stat().st_mtime_ns

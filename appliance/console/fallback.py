@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from appliance.box.fallback import Fallback
+from appliance.box.fallback import Fallback, Fallbacks
 
 _CROWDED = (
     "so many connections to the page without the PIN that the oldest are closed. The dance goes on, and "
@@ -20,3 +20,9 @@ PIN_CHANGED = Fallback(
     "gave the PIN before go on too. A new device finds it on the test card, or by: bunraku console pin.",
 )
 OF_THE_PAGE = (CROWDED, PIN_CHANGED)
+
+
+def note_crowd(fallbacks: Fallbacks, address: str) -> None:
+    """Strangers give way, most of them from this address; "": not any more."""
+    fallbacks.concern(CROWDED.name, filter(None, [address]))
+    fallbacks.set(CROWDED.name, bool(address))

@@ -7,9 +7,9 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from aiohttp import web
 
+from appliance.box.door import Door
 from appliance.box.served import OwnNames, plain_address
 from appliance.console.devices import Device, Devices
-from appliance.console.door import Door
 
 COOKIE = "bunraku_device"
 _READING = ("GET", "HEAD")

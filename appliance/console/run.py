@@ -7,10 +7,12 @@ import signal
 import socket
 import ssl
 import time
+from functools import partial
 from pathlib import Path
 
 from aiohttp import web
 
+from appliance.box.door import Door
 from appliance.box.fallback import Fallbacks
 from appliance.box.log_limit import limit_log
 from appliance.box.notify import Notifier
@@ -24,8 +26,7 @@ from appliance.console.box_view import BoxView
 from appliance.console.certificate import certificate_in, https_context
 from appliance.console.desk import Desk
 from appliance.console.devices import Devices
-from appliance.console.door import Door
-from appliance.console.fallback import OF_THE_PAGE
+from appliance.console.fallback import OF_THE_PAGE, note_crowd
 from appliance.console.guard import Guard
 from appliance.console.hands import Hands
 from appliance.console.happened import Happened
@@ -66,7 +67,7 @@ async def _serve(settings: Settings) -> int:
     folder = Path(settings.folder)
     devices, stage, watchers = Devices(Path(settings.kept)), StageView(folder), Watchers()
     fallbacks = Fallbacks(OF_THE_PAGE)
-    door, desk = Door(fallbacks), Desk(settings.control)
+    door, desk = Door(partial(note_crowd, fallbacks)), Desk(settings.control)
     guard = Guard(settings.viewers, settings.names, devices, door)
     box = BoxView(desk, stage, ProcessHealth(folder), ShowStateReader(folder))
     health, notifier = ProcessHealthWriter(folder, "console", fallbacks), Notifier()

@@ -11,7 +11,7 @@ from collections import Counter
 
 from aiohttp import WSMsgType, web
 
-from appliance.console.door import gives_way
+from appliance.box.door import gives_way
 
 MOST = 64
 LONGEST_MESSAGE = 64  # bytes; what a browser says here is whether it wants frames

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.notify import ALIVE, ENDING, READY, NotifyListener, Notifier
+from appliance.box.notify import ALIVE, ENDING, READY, Notifier, NotifyListener
 from tests.box.supervisor import Supervisor
 
 

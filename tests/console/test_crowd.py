@@ -10,16 +10,17 @@ import logging
 import resource
 import socket
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from appliance.box.door import IDLE_S, MOST, MOST_FROM_ONE, MOST_STRANGERS, Door
 from appliance.box.fallback import Fallbacks
 from appliance.box.log_limit import LINES, PERIOD_S, LogLimit
 from appliance.box.open_files import open_more_files
 from appliance.console.devices import FREE_TRIES, LONG_DIGITS, LONGEST_PAUSE_S, MOST_WRONG, PAUSE_S, WrongPins
-from appliance.console.door import IDLE_S, MOST, MOST_FROM_ONE, MOST_STRANGERS, Door
-from appliance.console.fallback import CROWDED, OF_THE_PAGE, PIN_CHANGED
+from appliance.console.fallback import CROWDED, OF_THE_PAGE, PIN_CHANGED, note_crowd
 from appliance.console.watchers import MOST as MOST_WATCHERS
 from hw_sim.peers import HOST
 from tests.console.page import Page, page_alone
@@ -190,7 +191,7 @@ class _Doorway:
 
     def __init__(self) -> None:
         self.now, self.fallbacks = 1000.0, Fallbacks(OF_THE_PAGE)
-        self.door = Door(self.fallbacks, lambda: self.now)
+        self.door = Door(partial(note_crowd, self.fallbacks), lambda: self.now)
 
     def comes(self, address: str, port: int) -> _Transport:
         made = _Transport()
@@ -251,6 +252,15 @@ def test_the_log_says_how_much_it_left_out() -> None:
     assert limit.filter(records[50])
     assert records[50].getMessage() == f"message 50 ({50 - LINES} messages before this one were left out.)"
     assert limit.filter(records[51]) and records[51].getMessage() == "message 51"
+
+
+def test_what_is_no_http_leaves_no_traceback_in_the_log(own_page: Page) -> None:
+    for head in (b"GET / HTTP/1.1\r\nContent-Length: -1\r\n\r\n", b"GET /\xff HTTP/1.1\r\n\r\n", b"\0" * 99):
+        with socket.create_connection((HOST, own_page.port), PATIENCE_S) as one:
+            one.sendall(head)
+            assert b" 400 " in one.recv(1 << 10)
+    words = (own_page.box_file.parent / "page.txt").read_text()
+    assert len(words.splitlines()) == 1, words
 
 
 def test_a_process_takes_the_descriptors_that_it_may_have() -> None:

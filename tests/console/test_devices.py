@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import stat
 from pathlib import Path
 
@@ -79,3 +80,19 @@ def test_many_addresses_together_hold_up_no_other_one_but_ask_for_a_longer_pin(t
     assert devices.lengthen_pin() and not devices.lengthen_pin()
     assert len(Devices(tmp_path / "kept.json").pin) == LONG_DIGITS and devices.known(token)
     assert len(devices.change_pin()) == DIGITS
+
+
+def test_a_folder_that_is_deleted_or_takes_nothing_shuts_no_device_out(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "kept.json"
+    devices = Devices(path)
+    first, pin = devices.remember("phone"), devices.pin
+    shutil.rmtree(path.parent)
+    second = devices.remember("laptop")
+    assert devices.pin == pin and devices.known(first) and devices.known(second)
+    assert Devices(path).known(second), "it is made again"
+    shutil.rmtree(path.parent)
+    path.parent.write_text("a file where the folder was")
+    third = devices.remember("tablet")
+    assert devices.pin == pin and all(map(devices.known, (first, second, third)))
+    found = devices.known(first)
+    assert found is not None and devices.revoke(found.id) and devices.known(first) is None

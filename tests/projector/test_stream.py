@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import signal
 import socket
 import subprocess
@@ -18,6 +19,8 @@ import pytest
 from aiohttp import web
 from PIL import Image
 
+from appliance.box.door import MOST_FROM_ONE, Door
+from appliance.box.open_files import open_more_files
 from appliance.pose.recording import Recording
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import draw_still, moment_of
@@ -170,7 +173,7 @@ def test_a_client_that_takes_nothing_for_long_makes_room(monkeypatch: pytest.Mon
 
     async def until_it_is_gone() -> None:
         newest = server.Newest(StreamConfig(), BytesIO())
-        runner = web.AppRunner(server._app(StreamConfig(), newest))
+        runner = web.AppRunner(server._app(StreamConfig(), newest, Door(print)))
         await runner.setup()
         await web.TCPSite(runner, HOST, port := free_ports(1, socket.SOCK_STREAM)[0]).start()
         _, writer = await asyncio.open_connection(HOST, port, limit=64)
@@ -243,6 +246,25 @@ def test_every_network_is_ipv4_and_ipv6_and_no_foreign_name_is_answered(host: st
             connection.close()
     feed.close()
     assert list(found.values()) == [404, 404, 404, 403, 403]
+
+
+def test_a_thousand_connections_that_say_nothing_leave_room_for_a_client(shown: tuple[Shown, int]) -> None:
+    projector, port = shown
+    projector.show(bytes(4), (1, 1))
+    first = connected(port, "/picture.jpg")
+    answered(projector, first)
+    first.close()
+    open_more_files()
+    with contextlib.ExitStack() as opened:
+        for _ in range(1100):
+            opened.enter_context(socket.create_connection((HOST, port), WITHIN_S))
+        connection = connected(port, "/picture.jpg")
+        assert b"200 OK" in answered(projector, connection)
+        connection.close()
+        process = projector.feed._process
+        assert process is not None
+        held = list(Path(f"/proc/{process.pid}/fd").iterdir())
+        assert len(held) < MOST_FROM_ONE + 40
 
 
 def test_a_stream_into_the_network_names_its_viewers(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from typing import BinaryIO
 from aiohttp import web
 from PIL import Image
 
+from appliance.box.door import IDLE_S, Door
 from appliance.box.log_limit import limit_log
 from appliance.box.open_files import open_more_files
 from appliance.box.served import OwnNames, listening, plain_address
@@ -83,9 +84,14 @@ async def serve(config: StreamConfig, pictures: BinaryIO, asks: BinaryIO) -> Non
     newest, loop = Newest(config, asks, ndi), asyncio.get_running_loop()
     over = asyncio.Event()
     loop.add_signal_handler(signal.SIGTERM, over.set)
-    runner = web.AppRunner(_app(config, newest), access_log=None, shutdown_timeout=0.5)
+    door, listens = Door(_say_crowd), listening(config.host, config.port)
+    listens.setblocking(False)
+    runner = web.AppRunner(
+        _app(config, newest, door), access_log=None, shutdown_timeout=0.5, keepalive_timeout=IDLE_S
+    )
     await runner.setup()
-    await web.SockSite(runner, listening(config.host, config.port)).start()
+    serve_client = runner.server
+    assert serve_client is not None
 
     def take_pictures() -> None:
         """In a thread of its own: as long as encoding takes, clients are served."""
@@ -99,10 +105,13 @@ async def serve(config: StreamConfig, pictures: BinaryIO, asks: BinaryIO) -> Non
             loop.call_soon_threadsafe(over.set)
 
     threading.Thread(target=take_pictures, name="pictures", daemon=True).start()
-    asking = loop.create_task(newest.ask())
+    works = newest.ask(), door.accept(listens, serve_client), door.watch()
+    tasks = [loop.create_task(one) for one in works]
     await over.wait()
-    asking.cancel()
+    for task in tasks:
+        task.cancel()
     await runner.cleanup()
+    listens.close()
 
 
 def _ndi_source(config: StreamConfig) -> NdiSource | None:
@@ -136,18 +145,30 @@ def png_of(picture: Picture) -> bytes:
     return file.getvalue()
 
 
-def _app(config: StreamConfig, newest: Newest) -> web.Application:
+def _say_crowd(address: str) -> None:
+    if address:
+        print(
+            f"{address} holds so many connections to the stream that the oldest are closed. Audience and "
+            "media servers get the picture. Leave that address out of `stream: viewers`.",
+            file=sys.stderr,
+            flush=True,
+        )
+
+
+def _app(config: StreamConfig, newest: Newest, door: Door) -> web.Application:
     networks, names = [ipaddress.ip_network(one) for one in config.viewers], OwnNames(config.names)
 
     @web.middleware
     async def viewers_only(request: web.Request, handler: Handler) -> web.StreamResponse:
         address = ipaddress.ip_address(plain_address(request.remote or ""))
-        if not (address.is_loopback or any(address in network for network in networks)):
+        may_look = address.is_loopback or any(address in network for network in networks)
+        if request.transport is not None:
+            connection = request.transport.get_extra_info("peername")
+            door.note_request(connection, is_known=may_look, watches=False)
+        if not may_look:
             raise web.HTTPForbidden(text="The box file lists this device nowhere under stream: viewers.")
         if not names.has(request.host):  # a foreign page that points its own name at the box
-            raise web.HTTPForbidden(
-                text="The box does not know this name. Use its address, or stream: names."
-            )
+            raise web.HTTPForbidden(text="This is no name of the box. Use its address, or stream: names.")
         return await handler(request)
 
     async def stream(request: web.Request) -> web.StreamResponse:

@@ -1,4 +1,4 @@
-"""The door: accepts connections, and closes strangers' before a device that gave the PIN finds no room."""
+"""The door of an HTTP server: lets connections in, and closes strangers' before a known one has no room."""
 
 from __future__ import annotations
 
@@ -10,14 +10,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-from appliance.box.fallback import Fallbacks
 from appliance.box.served import plain_address
-from appliance.console.fallback import CROWDED
 
 MOST = 256  # connections at once
-MOST_STRANGERS = (
-    160  # of them, connections that have not shown a cookie: the rest is for devices with the PIN
-)
+MOST_STRANGERS = 160  # of them, of strangers: the rest is for known devices
 MOST_FROM_ONE = 96  # of strangers, from one address
 IDLE_S = 30.0  # after its last request a stranger's connection is closed, unless it watches
 _LOOK_S = 1.0
@@ -52,14 +48,15 @@ class _Connection:
 
 
 class Door:
-    """Accepts on a listening socket. Each connection is a stranger's until a request of it shows a cookie.
+    """Accepts on a listening socket. Each connection is a stranger's until a request of it says otherwise.
 
     A new connection is always let in, as long as a stranger's can be closed for it: the one that has been
-    quiet for the longest time, of the address that has most of them.
+    quiet for the longest time, of the address that has most of them. tell: hears the address of the crowd
+    when one had to give way, and "" when the crowd is over.
     """
 
-    def __init__(self, fallbacks: Fallbacks, monotonic: Callable[[], float] = time.monotonic) -> None:
-        self._fallbacks, self._monotonic = fallbacks, monotonic
+    def __init__(self, tell: Callable[[str], None], monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._tell, self._monotonic, self._crowd = tell, monotonic, ""
         self._connections: dict[Peer, _Connection] = {}
         self._crowded_until = 0.0
 
@@ -106,7 +103,7 @@ class Door:
         return made
 
     def note_request(self, peer: object, is_known: bool, watches: bool) -> None:
-        """A request came by this connection; is_known: from a device that gave the PIN."""
+        """A request came by this connection; is_known: from a device that is no stranger."""
         connection = self._connections.get(peer) if isinstance(peer, tuple) else None
         if connection is not None:
             connection.newest = self._monotonic()
@@ -119,7 +116,7 @@ class Door:
             if not (one.is_known or one.watches) and now - one.newest > IDLE_S:
                 one.close()
         if now > self._crowded_until:
-            self._fallbacks.set(CROWDED.name, "")
+            self._tell_of("")
 
     def _strangers(self) -> list[_Connection]:
         return [one for one in self._connections.values() if not one.is_known]
@@ -132,8 +129,12 @@ class Door:
         leaving.close()
         self._connections = {peer: one for peer, one in self._connections.items() if one is not leaving}
         self._crowded_until = now + _QUIET_S
-        self._fallbacks.set(CROWDED.name, True)
-        self._fallbacks.concern(CROWDED.name, [leaving.address])
+        self._tell_of(leaving.address)
+
+    def _tell_of(self, crowd: str) -> None:
+        if crowd != self._crowd:
+            self._crowd = crowd
+            self._tell(crowd)
 
     def _forget_closed(self) -> None:
         self._connections = {peer: one for peer, one in self._connections.items() if not one.is_over}
