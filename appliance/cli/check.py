@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import SHOW_OR_NAME, BoxFile
 from appliance.dancer.material.maker import open_network
-from appliance.dancer.material.motion_network import MotionNetworkError
+from appliance.dancer.material.map_reach import MapReach
+from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
+from appliance.dancer.phrase_cache import PhraseCache
 from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
@@ -27,6 +31,7 @@ from appliance.show.check import not_as_packed, verify_bundle
 from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
 from appliance.show.show import Show, load_show
+from appliance.show.sources import MAIN, PATH
 from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.admission import Admission
 from appliance.stage.open_sensors import reach
@@ -74,7 +79,7 @@ def _check(directory: Path, box_file: Path | None) -> None:
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
     too_many = too_much(show.config.cues, verdict.most_coding, show.file)
-    for warning in (*reach(list(parts.worn), box), *unwired(show, box), *too_many):
+    for warning in (*reach(list(parts.worn), box), *unwired(show, box), *too_many, *_dead_map(show)):
         print(warning)
 
 
@@ -132,6 +137,25 @@ def _refuse_motion_networks(show: Show) -> None:
             problems.append(show.file.problem(("motion", source), f"{file.name}: {error}", cure))
     if problems:
         raise ConfigError(problems)
+
+
+def _dead_map(show: Show) -> Iterator[str]:
+    """A warning where a finger on the map of poses would change next to nothing."""
+    if PATH not in show.motion_networks:
+        return
+    network = MotionNetwork(show.motion_networks[PATH], show.skeleton.names)
+    found = PhraseCache(show.directory, None).phrase(show.phrases[MAIN], show.skeleton, False)
+    if network.ground is None or found is None:
+        return
+    middle, directions, low, high = network.ground
+    reached = MapReach.of(
+        low,
+        high,
+        lambda points: network.decode((middle + points @ directions).astype(np.float32))[:, 0],
+        found[0].poses[:, network.places],
+    )
+    if reached.is_dead:
+        yield f"{show.motion_networks[PATH].name}: {reached.sentence()}"
 
 
 def _refuse_misfits(show: Show, box: BoxConfig) -> None:

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.idle_options import is_written, refuse_idle
 from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.show.bundle import named_show
 from appliance.studio import (
@@ -72,6 +73,7 @@ Hand = Annotated[str | None, typer.Option(help="Joint of the first hand. Default
 @app.command()
 @reading_options
 def train(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder for the show.")],
     recordings: Recordings = None,
     model: Annotated[
@@ -158,6 +160,13 @@ def train(
     Other models are those of 'Beyond Imitation': a checkpoint for the studio's other commands. Under torchrun
     the same command trains in several processes.
     """
+    of_show, of_files = ("phrase", "name", "hand"), ("catalogue", "held_out", "keep")
+    if model is not ModelName.puppet:
+        refuse_idle(context, of_show, f"with --model {model.value}, which makes no show")
+    if not resume and recordings is None and puppet is not None:
+        refuse_idle(context, of_files, "without --recordings: the dancer's own are read as they were")
+    if model is not ModelName.improviser and not resume:
+        refuse_idle(context, ("puppet",), f"with --model {model.value}")
     with clear_errors("train"):
         from appliance.studio import train_command
         from appliance.studio.train_options import TrainOptions
@@ -192,6 +201,7 @@ def train(
                 phrase=phrase,
                 name=name,
                 hand=hand,
+                written=tuple(name for name in ("model", "seed") if is_written(context, name)),
             )
         )
     if not done:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress, track
+from rich.progress import Progress
 from rich.table import Table
 
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
@@ -24,6 +24,7 @@ from appliance.studio.evaluation.measurement import Iterations, Measurement
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.pairs import apart_from, pair_up
 from appliance.studio.evaluation.recorded import Recorded
+from appliance.studio.progress import shown
 from appliance.studio.studio_error import StudioError
 
 
@@ -57,7 +58,7 @@ def run(options: EvaluateOptions) -> None:
         console.print(_about(take), highlight=False)
 
     def progress(parts: Iterable[Any], count: int) -> Iterable[Any]:
-        return track(parts, "coding", count, console=console, transient=True, disable=not console.is_terminal)
+        return shown(parts, "coding", console, count)
 
     answer = {}
     if options.reference is not None:
@@ -88,10 +89,13 @@ def _checked(options: EvaluateOptions) -> list[Iterations]:
             "dancer did in the recordings that the network learned from. Give both, or neither."
         )
     asked = options.joints or options.iterations or options.picture or options.other_dancer
-    if not options.hands and asked:
+    if not options.hands and (asked or not options.compared):
         raise StudioError(
-            "--joint, --iterations, --picture and --other-dancer are about a hand: give --hands as well."
+            "--joint, --iterations, --picture, --other-dancer and --no-baselines are about a hand: give "
+            "--hands as well."
         )
+    if options.other_dancer is not None and not options.compared:
+        raise StudioError("--other-dancer is a baseline, and --no-baselines wants none. Leave one out.")
     return [_iterations(words) for words in options.iterations] or list(puppetry.ITERATIONS)
 
 

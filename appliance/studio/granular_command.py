@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.idle_options import refuse_idle
 from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.studio.clear_errors import clear_errors
 
@@ -16,6 +17,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 @app.command()
 @reading_options
 def granular(
+    context: typer.Context,
     checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training.")],
     out: Annotated[Path, typer.Option(help="The phrase, a BVH file; its figures and picture lie beside it.")],
     recordings: Annotated[
@@ -57,6 +59,19 @@ def granular(
     A walk through the prior (or samples, with --samples), the path between two takes, or the network fed with
     what it danced before. The phrase plays in a show as any other.
     """
+    walk, noise = ("spread", "speed", "samples"), ("offset", "seed")
+    if feedback is not None:
+        refuse_idle(context, (*walk, *noise, "hop", "other", "mix"), "with --feedback")
+    elif one is not None:
+        refuse_idle(context, walk, "with --from")
+        if other is None:
+            refuse_idle(context, ("mix",), "without --to")
+        if not offset:
+            refuse_idle(context, ("seed",), "with --from, except with --offset")
+    else:
+        refuse_idle(context, ("other", "mix", "offset"), "without --from")
+        if samples:
+            refuse_idle(context, ("speed",), "with --samples")
     with clear_errors("granular"):
         from appliance.studio.granular.walk import GranularOptions, run
 

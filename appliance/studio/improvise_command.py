@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.idle_options import refuse_idle
 from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.studio.clear_errors import INTERRUPTED, clear_errors
 
@@ -16,6 +17,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 @app.command()
 @reading_options
 def improvise(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="The phrase, a BVH file; report and picture go beside it.")],
     checkpoint: Annotated[
         Path | None,
@@ -54,6 +56,14 @@ def improvise(
     recording. The published network (--model, lstm-mixtures) makes no endless phrase: it continues the
     prompt, or a recorded moment that --seed chooses.
     """
+    if model is not None:
+        refuse_idle(context, ("minutes", "steps"), "with --model, which is trained already")
+    elif steps:
+        refuse_idle(context, ("minutes",), "with --steps")
+    if prompt is None:
+        refuse_idle(context, ("prompt_end",), "without --prompt")
+    else:
+        refuse_idle(context, ("dances", "dance_minutes"), "with --prompt")
     with clear_errors("improvise"):
         from appliance.studio.improviser import improvisation
         from appliance.studio.improviser.phrase import PhraseOptions

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.idle_options import refuse_idle
 from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.studio.clear_errors import clear_errors
 
@@ -21,6 +22,7 @@ Moved = Annotated[
 @app.command()
 @reading_options
 def path(
+    context: typer.Context,
     model: Model,
     out: Annotated[Path, typer.Option(help="The dance, a BVH file; its figures and picture lie beside it.")],
     phrase: Annotated[
@@ -51,6 +53,8 @@ def path(
         raise typer.BadParameter("Give a PHRASE with --wobble AMPLITUDE FREQUENCY, or --draw FILE.")
     if wobble is not None and not (0 <= wobble[0] <= 5 and 0 < wobble[1] <= 10):
         raise typer.BadParameter("--wobble takes an amplitude of 0 to 5 and a frequency up to 10 Hz.")
+    if draw is not None:
+        refuse_idle(context, ("seed", "start"), "with --draw")
     with clear_errors("path"):
         from appliance.studio.pose_space.path import PathOptions, run
 

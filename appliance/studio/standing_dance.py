@@ -15,7 +15,7 @@ from appliance.studio.data.dataset import FPS, Dataset
 from appliance.studio.data.remembered import Remembered
 from appliance.studio.evaluation.coders import MovedJoints, Poses
 from appliance.studio.evaluation.evaluation import load_takes
-from appliance.studio.improviser.footing import plant_feet
+from appliance.studio.improviser.footing import Progress, plant_feet
 from appliance.studio.studio_error import StudioError
 
 
@@ -44,10 +44,10 @@ def excerpt_of(
     return replace(excerpt, roots=roots)
 
 
-def standing(poses: Poses, given: Recording | None, dataset: Dataset) -> Recording:
+def standing(poses: Poses, given: Recording | None, dataset: Dataset, progress: Progress = iter) -> Recording:
     """Poses (T, M, 4) of the moving joints with all joints, on the path of a recording or on the spot.
 
-    The feet are planted in a cycle: danced there and back, a dance is one.
+    The feet are planted in a cycle: danced there and back, a dance is one. progress: through the steps.
     """
     dance = on_the_spot(poses, dataset) if given is None else _on_its_path(poses, given, dataset)
     there_and_back = replace(
@@ -55,7 +55,7 @@ def standing(poses: Poses, given: Recording | None, dataset: Dataset) -> Recordi
         poses=quaternion.continuous(np.concatenate([dance.poses, dance.poses[::-1]])),
         roots=np.concatenate([dance.roots, dance.roots[::-1]]),
     )
-    return plant_feet(there_and_back).excerpt(0.0, len(poses) / FPS)
+    return plant_feet(there_and_back, progress=progress).excerpt(0.0, len(poses) / FPS)
 
 
 def on_the_spot(poses: Poses, dataset: Dataset) -> Recording:

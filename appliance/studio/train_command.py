@@ -32,11 +32,14 @@ from appliance.studio.improviser.improviser_training import ImproviserTraining
 from appliance.studio.improviser.learning import AnyTraining, train_until_done, training_for
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesTraining
 from appliance.studio.model_uses import USES
+from appliance.studio.pose_space.ground import Ground
 from appliance.studio.processes import Processes, joined
 from appliance.studio.studio_error import StudioError
 from appliance.studio.train_options import TrainOptions
 from appliance.studio.trained_on import reading_progress
 from appliance.studio.variations.sweep import report
+
+_SIZES = ("window", "latent", "width", "depth", "mixtures", "ahead", "learning_rate", "batch")
 
 
 def run(options: TrainOptions) -> bool:
@@ -116,6 +119,9 @@ def _finish(
             coder = load_checkpoint(checkpoint)[0]
             file = export_motion(coder, training.dataset, settings.model, options.out)
             console.print(f"{file}: a show that holds it dances from it live (docs/variations.md, On stage).")
+        if isinstance(training, Training) and settings.model == "pose":
+            ground = Ground.of(load_checkpoint(checkpoint)[0].autoencoder, training.dataset)
+            console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
         if isinstance(training, ImproviserTraining):
             _export_improviser(training, checkpoint, console)
         console.print(f"{checkpoint} is ready. What it is for: {USES[settings.model]}.")
@@ -162,6 +168,7 @@ def _settings_and_source(
         state = load_state(checkpoint)
         settings = settings_from(state["settings"])
         source = sources.remembered(state, options.recordings, checkpoint, options.reading)
+        _require_as_begun(options, settings, source)
         return _paced(settings, options), source, state
     if checkpoint.exists():
         raise StudioError(
@@ -190,6 +197,26 @@ def _settings_and_source(
         options.recordings, options.catalogue, options.held_out, options.reading, options.keep
     )
     return _paced(settings, options), source, None
+
+
+def _require_as_begun(options: TrainOptions, settings: AnySettings, source: Sources) -> None:
+    """Raises StudioError for options that a training which goes on can no longer follow."""
+    other = [
+        f"--{name.replace('_', '-')} (it has {getattr(settings, name, 'none')})"
+        for name in (*options.written, "network", *_SIZES)
+        if getattr(options, name) and getattr(options, name) != getattr(settings, name, None)
+    ]
+    if options.catalogue or options.held_out or options.keep:
+        asked = sources.given(
+            source.recordings, options.catalogue, options.held_out, options.reading, options.keep
+        )
+        if asked.catalogue != source.catalogue:
+            other.append("--catalogue, --held-out or --keep (its recordings stay as they were)")
+    if other:
+        raise StudioError(
+            f"--resume continues the training in {options.out} as it began, so it cannot follow "
+            f"{', '.join(other)}. Leave them out, or give another --out."
+        )
 
 
 def _puppet(options: TrainOptions, state: dict[str, Any] | None) -> Path | None:

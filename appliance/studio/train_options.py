@@ -10,7 +10,7 @@ from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """The command line of bunraku train."""
+    """The command line of bunraku train. written: those of model and seed that the user gave."""
 
     out: Path
     recordings: Path | None = None
@@ -40,3 +40,4 @@ class TrainOptions:
     phrase: Path | None = None
     name: str | None = None
     hand: str | None = None
+    written: tuple[str, ...] = ()

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import track
 
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.data import sources
 from appliance.studio.data.dataset import Dataset
 from appliance.studio.evaluation.coders import TorchCoder, load_checkpoint
+from appliance.studio.progress import shown
 from appliance.studio.studio_error import StudioError
 
 
@@ -52,6 +52,6 @@ def reading_progress(console: Console) -> Any:
     """Wraps the reading of recordings in a progress bar."""
 
     def progress(files: Sequence[Path]) -> Any:
-        return track(files, "reading", console=console, transient=True, disable=not console.is_terminal)
+        return shown(files, "reading the recordings", console)
 
     return progress

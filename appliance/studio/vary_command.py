@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.idle_options import refuse_idle
 from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.studio.clear_errors import clear_errors
 
@@ -25,6 +26,7 @@ class Region(StrEnum):
 @app.command()
 @reading_options
 def vary(
+    context: typer.Context,
     model: Annotated[Path, typer.Option(help="checkpoint.pt of bunraku train --model sequence.")],
     phrase: Annotated[
         Path | None, typer.Argument(help="BVH of the phrase; left out with --free.", show_default=False)
@@ -70,8 +72,13 @@ def vary(
     """
     if (phrase is None) != free:
         raise typer.BadParameter("Give a PHRASE, or --free for samples without one.")
-    if free and (mix is not None or region):
-        raise typer.BadParameter("--mix and --region need a PHRASE.")
+    if free:
+        refuse_idle(context, ("mix", "share", "region", "start", "seconds"), "without a PHRASE")
+    if mix is None:
+        refuse_idle(context, ("share",), "without --mix")
+    else:
+        noise = ("sigma", "count", "seed")
+        refuse_idle(context, noise, "with --mix, which makes one dance and has no noise")
     with clear_errors("vary"):
         from appliance.studio.variations.vary import VaryOptions, run
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.dancer.material import map_reach
 from appliance.recorder.reading import read_journal
 from appliance.show.bundle import bundled_shows
 from appliance.show.show import load_show
@@ -21,6 +22,15 @@ SHOWS = bundled_shows()
 def test_check_takes_its_name(bunraku: Command, tmp_path: Path, given: tuple[str, ...]) -> None:
     words = bunraku("check", *given, "--box", write_box(tmp_path)).out
     assert f"{load_show(SHOWS['martial']).config.name}: the bundle is whole." in words
+
+
+def test_check_says_that_a_map_leads_nowhere(
+    bunraku: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = write_box(tmp_path)
+    assert "map is dead" not in bunraku("check", "--box", box).out
+    monkeypatch.setattr(map_reach, "DEAD", 100.0)  # of what its poses differ by: no map leads so far
+    assert "pose.onnx: The map is dead: from corner to corner" in bunraku("check", "--box", box).out
 
 
 def test_check_takes_one_show(bunraku: Command) -> None:

@@ -15,6 +15,7 @@ import torch
 from typer.testing import CliRunner, Result
 
 from appliance.pictures import figure
+from appliance.pose.recording import Recording
 from appliance.studio import dance_files, standing_dance
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
@@ -23,7 +24,7 @@ from appliance.studio.evaluation import answer_picture, own_answer, pictures
 from appliance.studio.experiments import strips
 from appliance.studio.granular import walk
 from appliance.studio.improviser import own_output
-from appliance.studio.improviser.footing import plant_feet
+from appliance.studio.improviser.footing import Progress, plant_feet
 from appliance.studio.pose_space import path
 from appliance.studio.variations import sweep, vary
 from tests.studio.tiny import write_recordings
@@ -52,18 +53,25 @@ def _small_answers() -> Iterator[None]:
             patch.setattr(module, "COLUMNS", 2)
         patch.setattr(figure, "SUPERSAMPLE", 1)
         for module in (standing_dance, walk):
-            patch.setattr(module, "plant_feet", lambda dance: plant_feet(dance, 20))
+            patch.setattr(module, "plant_feet", _planting(20))
         patch.setattr(sweep, "WINDOWS", 3)
         patch.setattr(own_output, "SECONDS", 2.0)
         patch.setattr(own_output, "DANCES", 1)
         yield
 
 
+def _planting(steps: int) -> Callable[..., Recording]:
+    def plant(dance: Recording, progress: Progress = iter) -> Recording:
+        return plant_feet(dance, steps, progress)
+
+    return plant
+
+
 @pytest.fixture
 def quickly_written(monkeypatch: pytest.MonkeyPatch) -> None:
     """Generated dances get no picture, and their feet are hardly planted: both take seconds."""
     monkeypatch.setattr(dance_files, "draw_filmstrip", lambda *_, **__: None)
-    monkeypatch.setattr(standing_dance, "plant_feet", lambda dance: plant_feet(dance, 2))
+    monkeypatch.setattr(standing_dance, "plant_feet", _planting(2))
 
 
 def bunraku(*arguments: object) -> Result:

@@ -87,6 +87,9 @@ def test_the_report_holds_what_the_stage_and_the_artist_need(trained: Trained) -
     assert 0 < report["random_latents"]["share_within_range"] <= 1
     assert set(report["median_ms_of_ten_iterations"]) == {"fp32", "int8"}
     assert report["quantization"]["degrees"]["10"]["mean"] > 0
+    for row in report["bounds"].values():
+        assert row["holds"] == (row["from"] <= row["value"] <= row["to"])
+    assert report["bounds"]["degrees after one iteration"]["value"] == report["degrees"]["1"]["mean"]
 
 
 def test_evaluate_gives_the_agreed_json(trained: Trained, recordings: Path) -> None:

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from appliance.dancer.material.map_reach import MapReach
 from appliance.dancer.material.pose_paths import even_path, wobbled
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
@@ -110,17 +111,42 @@ def test_path_makes_a_wobbling_phrase(model: Path, recordings: Path, tmp_path: P
     result = bunraku("path", recordings / "sway_0.bvh", *options)
     assert result.exit_code == 0, result.output
     assert len(read_bvh(out)) == 100 and out.with_suffix(".png").exists()
+    assert "planting the feet ..." in result.output and "measuring the dance" in result.output
     figures = json.loads(out.with_suffix(".json").read_text())["figures"]
     assert figures["degrees_from_the_phrase"] > 1
 
 
-def test_a_line_on_the_map_becomes_a_dance(model: Path, recordings: Path, tmp_path: Path) -> None:
+def test_a_map_on_which_nothing_changes_is_dead() -> None:
+    """Poses that differ by 30 degrees, and maps that lead from one to another, or hardly anywhere."""
+    angles = np.radians(np.random.default_rng(1).uniform(0, 60, 400))
+
+    def poses_at(angle: np.ndarray) -> np.ndarray:
+        turned = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), angle)
+        return np.stack([np.tile(quaternion.IDENTITY, (len(turned), 1)), turned], axis=1)
+
+    low, high = np.array([-1.0, -2.0]), np.array([1.0, 2.0])
+    for degrees, is_dead in ((40.0, False), (7.0, True), (0.0, True)):
+        per_corner = np.radians(degrees) / 2
+        reach = MapReach.of(
+            low, high, lambda points, half=per_corner: poses_at(half * points[:, 0]), poses_at(angles)
+        )
+        assert reach.corners == pytest.approx(degrees, abs=0.1) and reach.usual == pytest.approx(20, abs=3)
+        assert reach.is_dead == is_dead
+        assert ("is dead: from corner to corner" in reach.sentence()) == is_dead
+
+
+def test_a_line_on_the_map_becomes_a_dance(
+    model: Path, recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "umap", None)
     files = [recordings / f"sway_{number}.bvh" for number in (0, 1)]
     result = bunraku("map", *files, "--model", model, "--out", tmp_path / "map")
     assert result.exit_code == 0, result.output
     for name in ("map.png", "projections.png", "distance.png", "map.html", "map.svg", "map.json"):
         assert (tmp_path / "map" / name).stat().st_size > 100, name
     report = json.loads((tmp_path / "map" / "map.json").read_text())
+    assert "UMAP is left out: umap-learn is not installed" in result.output
+    assert report["reach"]["is_dead"] is False and "The map is alive" in result.output
     assert set(report["projections"]) >= {"PCA, heading kept", "PCA, heading removed", "pose autoencoder"}
     assert report["apart"]["largest"] >= report["apart"]["mean"] > 0
     sheet = (tmp_path / "map" / "map.svg").read_text()

@@ -111,6 +111,7 @@ def test_training_ends_with_what_noise_of_each_strength_does(model: Path) -> Non
     assert report["recorded_nearest"] > 0 and report["divergence"] > 0
     said = (model / "said.txt").read_text()
     assert "by the strength of the noise" in said and "bunraku vary" in said
+    assert "reading the recordings ..." in said and "varying takes kept apart ..." in said
     assert (model / "variations.png").stat().st_size > 10_000
 
 
@@ -134,6 +135,7 @@ def test_vary_writes_each_variation_its_figures_and_a_strip(
     assert list(figures) == ["phrase", "variation_1", "variation_2"]
     assert figures["variation_1"]["degrees"] > 0 and figures["phrase"]["nearest"] < 0.5
     assert (tmp_path / "variations.png").exists() and "arms alone" in result.output
+    assert "2 of 2: planting the feet of variation_2 ..." in result.output
 
 
 def test_samples_of_the_prior_need_no_phrase_and_two_phrases_mix(

@@ -96,7 +96,7 @@ class Training(TrainingLoop[Report]):
     """State of a training: networks, optimisers, averages, history."""
 
     report_type = Report
-    saved = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer")
+    saved: tuple[str, ...] = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer")
 
     def __init__(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ def write_up(
     median_ms: dict[str, float],
 ) -> dict[str, Any]:
     """The report as JSON. difference: largest between ONNX and PyTorch in any quaternion component."""
+    figures = evaluation.as_json()
     ranges = joint_ranges(
         coder.autoencoder, windows(dataset.training, _places(coder, dataset), mirror=dataset.mirrors)
     )
@@ -50,7 +51,7 @@ def write_up(
             "held_out": sorted(take.name for take in dataset.held_out),
         },
         "evaluated_on": list(evaluated_on),
-        **evaluation.as_json(),
+        **figures,
         "quantization": {
             "passed": verdict.passed,
             "words": verdict.sentence(),
@@ -65,7 +66,26 @@ def write_up(
         "joint_range_degrees": {
             name: round(float(r), 2) for name, r in zip(coder.joints, ranges, strict=True)
         },
-        "random_latents": random_dance(coder.autoencoder, ranges),
+        "random_latents": (random := random_dance(coder.autoencoder, ranges)),
+        "bounds": bounds(figures, random),
+    }
+
+
+def bounds(figures: Mapping[str, Any], random: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+    """What a dancer should have, with what this one has: for those who train, and no reason to refuse it."""
+    latent = figures["latent"]
+    rows = {
+        "degrees after one iteration": (figures["degrees"]["1"]["mean"], 0.0, 2.0),
+        "mean of the latents": (latent["mean"], -0.05, 0.05),
+        "mean of each latent number": (latent["mean_of_each_size"], 0.0, 0.3),
+        "standard deviation of the latents": (latent["std"], 0.85, 1.15),
+        "standard deviation of each latent number": (latent["std_of_each"], 0.8, 1.2),
+        "random poses within the recorded range": (random["share_within_range"], 0.999, 1.0),
+        "degrees of a random pose beyond that range": (random["furthest_beyond_degrees"], 0.0, 30.0),
+    }
+    return {
+        name: {"value": value, "from": least, "to": most, "holds": bool(least <= value <= most)}
+        for name, (value, least, most) in rows.items()
     }
 
 

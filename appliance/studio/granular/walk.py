@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
+from appliance.studio.progress import doing, shown
 from appliance.studio.standing_dance import on_the_spot
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
@@ -59,8 +61,10 @@ def run(options: GranularOptions) -> None:
             f"--hop {options.hop} leaves gaps between windows of {most} poses. Take at most {most}."
         )
     poses = _poses(options, autoencoder, dataset)
-    phrase = plant_feet(on_the_spot(poses, dataset))
-    natural = measure(phrase, Yardstick.of(dataset.training, dataset.moving))
+    progress = partial(shown, words="planting the feet", console=console)
+    phrase = plant_feet(on_the_spot(poses, dataset), progress=progress)
+    with doing("measuring the phrase and the recordings", console):
+        natural = measure(phrase, Yardstick.of(dataset.training, dataset.moving))
     report = {"options": asdict(options), "naturalness": natural.as_json()}
     write_dance(options.out, phrase, f"{options.out.stem}: {_words(options)}", report, rows=2)
     Console().print(naturalness_table({options.out.stem: natural}))

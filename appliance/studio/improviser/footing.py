@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from appliance.studio.autoencoder import rotation
 
 ROOT_SMOOTH_FRAMES = 15
 HEIGHT_SMOOTH_FRAMES = 7
+Progress = Callable[[range], Iterable[int]]
 STILL = 1e-3  # a joint whose quaternion changes less in the whole phrase takes no part
 
 
@@ -34,14 +36,14 @@ class _Scales:
     shift_m: float = 0.05
 
 
-def plant_feet(phrase: Recording, iterations: int = 250) -> Recording:
+def plant_feet(phrase: Recording, iterations: int = 250, progress: Progress = iter) -> Recording:
     """A cyclic phrase with planted feet held and nothing below the floor (at height 0).
 
     First the root: its height from the lowest sole, its speed against the slide of what carries it; then legs
     and root together by gradient descent through forward kinematics, the last frame leading into the first.
     """
     grounded = _grounded(phrase)
-    return _settled(_grounded(carried(grounded)), iterations)
+    return _settled(_grounded(carried(grounded)), iterations, progress)
 
 
 def _grounded(phrase: Recording) -> Recording:
@@ -90,7 +92,7 @@ class _Legs(torch.nn.Module):
         return positions[:, self.tips] + root[:, None]
 
 
-def _settled(phrase: Recording, iterations: int) -> Recording:
+def _settled(phrase: Recording, iterations: int, progress: Progress) -> Recording:
     scales, fps, count = _Scales(), phrase.fps, len(phrase)
     legs = _Legs(phrase.skeleton, phrase.poses)
     pose = torch.tensor(phrase.poses[:, legs.turned], dtype=torch.float32)
@@ -104,7 +106,7 @@ def _settled(phrase: Recording, iterations: int) -> Recording:
     shifts = torch.zeros(count, 3, requires_grad=True)
     optimizer = torch.optim.Adam([turns, shifts], lr=0.01)
     pace = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, iterations)
-    for _ in range(iterations):
+    for _ in progress(range(iterations)):
         turn, shift = _smooth(turns, SMOOTH_FRAMES), _smooth(shifts, ROOT_SMOOTH_FRAMES)
         made = legs(_turned(pose, turn), root + shift)
         slide = (made.roll(-1, 0) - made)[..., [0, 2]] * fps

@@ -73,6 +73,7 @@ def run(options: ImproviseOptions) -> bool:
     state = None if options.model is None else _improviser_state(options.model)
     if state is not None and state["settings"]["network"] == PoseMixturesSettings.network:
         assert options.model is not None
+        _require_no_loop(options)
         published, _ = load_pose_improviser(options.model)
         dataset = trained_on(
             options.model, published.joints, state, options.recordings, console, options.reading
@@ -107,6 +108,16 @@ def run(options: ImproviseOptions) -> bool:
     Console().print(naturalness_table({options.out.stem: natural}))
     say(f"{options.out}: {verdict(natural)}")
     return True
+
+
+def _require_no_loop(options: ImproviseOptions) -> None:
+    """Raises StudioError for options about an endless phrase: the published improviser makes none."""
+    loop, usual = options.phrase, PhraseOptions()
+    if options.checkpoint is not None or (loop.dances, loop.minutes) != (usual.dances, usual.minutes):
+        raise StudioError(
+            f"{options.model} needs no dancer and makes no endless phrase: a CHECKPOINT, --dances and "
+            "--dance-minutes do nothing. Leave them out."
+        )
 
 
 def continue_prompt(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from appliance.dancer.material.map_reach import MapReach
 from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import Dataset
@@ -15,6 +17,7 @@ from appliance.studio.pose_space import map_pictures
 from appliance.studio.pose_space.latent_poses import PoseMap, latents_of, poses_of
 from appliance.studio.pose_space.pose_model import training_poses
 
+EDGE = 1.0  # percent of the recorded poses that lie outside of the map on each side
 GRID = 9  # figures along the map's wider side
 NOBODY = 0.35  # of the map's spread: farther from all recorded poses nobody has been
 
@@ -38,6 +41,18 @@ class Ground:
         """Points (T, D) of poses (T, M, 4)."""
         return self.pose_map.points(latents_of(self.autoencoder, poses)[0])
 
+    @cached_property
+    def reach(self) -> MapReach:
+        """How far the map leads that is drawn, and that a show gets."""
+        low, high = np.percentile(self.known[:, :2], [EDGE, 100 - EDGE], axis=0)
+        moving = list(self.dataset.moving)
+        danced = [take.recording.poses[take.sound][:, moving] for take in self.dataset.training]
+
+        def poses_at(points: Array) -> Array:
+            return poses_of(self.autoencoder, self.pose_map.latents(points))
+
+        return MapReach.of(low, high, poses_at, np.concatenate(danced))
+
     def draw(self, file: Path, paths: Mapping[str, Array]) -> tuple[float, float, float, float]:
         """Paths over the map's first two directions; returns its left, right, bottom and top."""
         return map_pictures.draw_map(file, self.known, paths, self._figures(), NOBODY)
@@ -45,7 +60,7 @@ class Ground:
     def _figures(self) -> list[tuple[Array, Array, Sequence[tuple[int, int]]]]:
         """On a grid: place (2,), the figure that is usual there (J, 3) in metres, its bones."""
         skeleton = self.dataset.skeleton
-        low, high = np.percentile(self.known[:, :2], [1, 99], axis=0)
+        low, high = np.percentile(self.known[:, :2], [EDGE, 100 - EDGE], axis=0)
         step = float((high - low).max()) / (GRID - 1)
         columns, rows = (np.arange(a, b + step / 2, step) for a, b in zip(low, high, strict=True))
         places = np.array([(x, y) for y in rows for x in columns])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -17,8 +18,9 @@ from appliance.studio.evaluation.nearest import reference_of, without_heading
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.pose_space.drawing import read_line
+from appliance.studio.pose_space.ground import Ground
 from appliance.studio.pose_space.latent_poses import latents_of, poses_of
-from appliance.studio.pose_space.pose_model import map_of
+from appliance.studio.progress import doing, shown
 from appliance.studio.standing_dance import excerpt_of, standing
 from appliance.studio.trained_on import open_model
 
@@ -55,13 +57,18 @@ def run(options: PathOptions) -> None:
     else:
         assert options.draw is not None, "the command asks for a phrase with a wobble, or a drawing"
         line = even_path(read_line(options.draw), round(options.seconds * FPS))
-        poses = poses_of(autoencoder, map_of(autoencoder, dataset).latents(line))
-    whole = standing(poses, given, dataset)
+        ground = Ground.of(autoencoder, dataset)
+        poses = poses_of(autoencoder, ground.pose_map.latents(line))
+        if ground.reach.is_dead:
+            console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
+    whole = standing(poses, given, dataset, partial(shown, words="planting the feet", console=console))
     write_recording(options.out, whole)
+    with doing("measuring the dance and the recordings", console):
+        reference = reference_of(dataset.training, dataset.moving_names)
+        nearest = float(reference.nearest(poses).mean())
+        natural = measure(whole, Yardstick.of(dataset.training, dataset.moving), endless=False)
     figures = {
-        "nearest_recorded_pose_degrees": float(
-            reference_of(dataset.training, dataset.moving_names).nearest(poses).mean()
-        ),
+        "nearest_recorded_pose_degrees": nearest,
         "degrees_a_second": FPS * energy(without_heading(poses)),
     }
     strips = [Strip(whole.poses, whole.roots, _words(options))]
@@ -72,10 +79,9 @@ def run(options: PathOptions) -> None:
         )
         strips.insert(0, Strip(given.poses, given.roots, "phrase"))
         strips[1] = Strip(whole.poses, whole.roots, _words(options), behind=strips[0])
-    draw_strips(
-        options.out.with_suffix(".png"), dataset.skeleton, strips, FPS, options.out.stem, columns=COLUMNS
-    )
-    natural = measure(whole, Yardstick.of(dataset.training, dataset.moving), endless=False)
+    with doing("drawing the strip", console):
+        picture = options.out.with_suffix(".png")
+        draw_strips(picture, dataset.skeleton, strips, FPS, options.out.stem, COLUMNS, options.start)
     report = {"options": asdict(options), "figures": figures, "naturalness": natural.as_json()}
     write_report(options.out.with_suffix(".json"), report)
     said = ", ".join(f"{name.replace('_', ' ')} {value:.1f}" for name, value in figures.items())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from appliance.studio.pose_space import map_pictures
 from appliance.studio.pose_space.drawing import UNITS
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.pose_space.latent_poses import distance_over_time
-from appliance.studio.pose_space.projections import Projection, projections
+from appliance.studio.pose_space.projections import WITHOUT_UMAP, Projection, projections
 from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import open_model
@@ -64,6 +64,7 @@ def run(options: MapOptions) -> None:
     _write_page(options.out / "map.html", ground, recordings, paths)
     report: dict[str, Any] = {
         "explained": ground.pose_map.explained,
+        "reach": {**asdict(ground.reach), "is_dead": ground.reach.is_dead},
         "projections": {
             one.name: dict(zip(("step", "longest_step"), one.continuity, strict=True)) for one in found
         },
@@ -73,6 +74,9 @@ def run(options: MapOptions) -> None:
     (options.out / "map.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     for projection in found:
         console.print(_continuity(projection), highlight=False)
+    if not any(one.name.startswith("UMAP") for one in found):
+        console.print(f"- {WITHOUT_UMAP}", highlight=False)
+    console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
     console.print(
         f"{options.out}: map.html to turn in a browser, map.png, projections.png, and map.svg to draw a "
         "line on for bunraku path --draw.",

@@ -1,4 +1,4 @@
-"""The training poses of a pose model, and the map that belongs to it."""
+"""The training poses of a pose model, from which its map is made."""
 
 from __future__ import annotations
 
@@ -9,12 +9,7 @@ from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import Dataset
 from appliance.studio.improviser.naturalness import figure_shapes
-from appliance.studio.pose_space.latent_poses import PoseMap, latents_of
-
-
-def map_of(autoencoder: Autoencoder, dataset: Dataset, dimensions: int = 2) -> PoseMap:
-    """The directions along which the training poses differ most."""
-    return PoseMap.of(*training_poses(autoencoder, dataset), dimensions)
+from appliance.studio.pose_space.latent_poses import latents_of
 
 
 def training_poses(autoencoder: Autoencoder, dataset: Dataset) -> tuple[Latents, Array]:

@@ -17,6 +17,7 @@ from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.improviser.naturalness import figure_shapes
 from appliance.studio.pose_space.latent_poses import PoseMap, latents_of
 
+WITHOUT_UMAP = "UMAP is left out: umap-learn is not installed here. Add it with: pip install umap-learn"
 MOST_NEIGHBOURS_OF = 4000  # figures that UMAP is fitted to
 
 

@@ -15,7 +15,6 @@ from statistics import mean
 import numpy as np
 import torch
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
 from appliance.pictures.filmstrip import Strip, draw_strips
@@ -25,6 +24,7 @@ from appliance.studio.data.dataset import FPS, Dataset, Take, window_starts
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.evaluation.dance_figures import degrees_apart, energy
 from appliance.studio.evaluation.nearest import Reference, reference_of, without_heading
+from appliance.studio.progress import doing, shown
 from appliance.studio.standing_dance import standing
 from appliance.studio.variations.timing import difference
 from appliance.studio.variations.variations import encode_phrase, sampled, varied
@@ -70,7 +70,8 @@ def report(autoencoder: Autoencoder, dataset: Dataset, folder: Path, console: Co
     takes = list(dataset.held_out or dataset.training)
     found = sweep(autoencoder, dataset, takes, console)
     (folder / "report.json").write_text(json.dumps({"variations": asdict(found)}, indent=1) + "\n", "utf-8")
-    _draw(folder / "variations.png", autoencoder, dataset, takes)
+    with doing("drawing variations.png", console):
+        _draw(folder / "variations.png", autoencoder, dataset, takes)
     Console().print(table(found))
     console.print(
         f"Takes kept apart: {found.recorded_nearest:.1f} degrees from the nearest recorded pose; samples of "
@@ -87,10 +88,7 @@ def sweep(
     windows = _windows(takes, dataset, autoencoder.shape.window)
     reference = reference_of(dataset.training, dataset.moving_names)
     rows: dict[float, list[Row]] = {sigma: [] for sigma in SIGMAS}
-    hidden = console is None or not console.is_terminal
-    for number, window in enumerate(
-        track(windows, "varying", console=console, disable=hidden, transient=True)
-    ):
+    for number, window in enumerate(shown(windows, "varying takes kept apart", console)):
         phrase, pace = encode_phrase(autoencoder, window), energy(without_heading(window))
         own = varied(autoencoder, phrase, 0.0, 0)
         for sigma in SIGMAS:

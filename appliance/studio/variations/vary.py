@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
 from appliance.pictures.filmstrip import Strip, draw_strips
@@ -24,6 +24,7 @@ from appliance.studio.evaluation.nearest import Reference, reference_of
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.pose_space.ground import Ground
+from appliance.studio.progress import doing, shown
 from appliance.studio.standing_dance import excerpt_of, standing
 from appliance.studio.trained_on import open_model
 from appliance.studio.variations import variations
@@ -69,7 +70,9 @@ def run(options: VaryOptions) -> None:
     """Vary, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
     coder, dataset = open_model("sequence", options.model, options.recordings, console, options.reading)
-    reference = reference_of(dataset.training, dataset.moving_names)
+    with doing("measuring the recordings", console):
+        reference = reference_of(dataset.training, dataset.moving_names)
+        yardstick = Yardstick.of(dataset.training, dataset.moving)
     given = (
         None
         if options.phrase is None
@@ -77,18 +80,15 @@ def run(options: VaryOptions) -> None:
     )
     danced = _dances(options, coder, dataset, given)
     options.out.mkdir(parents=True, exist_ok=True)
-    yardstick = Yardstick.of(dataset.training, dataset.moving)
     figures, strips, natural = {}, [], {}
     if given is not None:
         write_recording(options.out / "phrase.bvh", given)
         moving = given.poses[:, list(dataset.moving)]
         figures["phrase"] = measured(moving, None, reference)
         strips.append(Strip(given.poses, given.roots, "phrase"))
-    working = track(
-        danced.items(), "standing", console=console, transient=True, disable=not console.is_terminal
-    )
-    for name, poses in working:
-        whole = standing(poses, given, dataset)
+    for number, (name, poses) in enumerate(danced.items(), 1):
+        words = f"{number} of {len(danced)}: planting the feet of {name}"
+        whole = standing(poses, given, dataset, partial(shown, words=words, console=console))
         write_recording(options.out / f"{name}.bvh", whole)
         figures[name] = measured(
             poses, None if given is None else given.poses[:, list(dataset.moving)], reference
@@ -98,7 +98,9 @@ def run(options: VaryOptions) -> None:
     if options.on_map is not None:
         _draw_on_map(options, given, danced, console)
     title = _words(options)
-    draw_strips(options.out / "variations.png", dataset.skeleton, strips, FPS, title, columns=COLUMNS)
+    with doing("drawing variations.png", console):
+        picture = options.out / "variations.png"
+        draw_strips(picture, dataset.skeleton, strips, FPS, title, COLUMNS, options.start)
     report = {
         "options": asdict(options),
         "figures": {name: asdict(one) for name, one in figures.items()},
