@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
@@ -24,7 +23,7 @@ from appliance.studio.evaluation.measurement import Iterations, Measurement
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.pairs import apart_from, pair_up
 from appliance.studio.evaluation.recorded import Recorded
-from appliance.studio.progress import shown
+from appliance.studio.progress import shown, told
 from appliance.studio.studio_error import StudioError
 
 
@@ -140,15 +139,8 @@ def _answer(
 ) -> dict[str, Any]:
     """What the body does where a hand holds a joint, as JSON."""
     count = puppetry.dances(len(measurements), len(joints), iterations, compared=recorded is not None)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("dancing", total=count)
-        return puppetry.measure(
-            measurements,
-            joints,
-            iterations,
-            advance=lambda words: bar.update(task, advance=1, description=words),
-            recorded=recorded,
-        )
+    with told(console, count) as advance:
+        return puppetry.measure(measurements, joints, iterations, advance=advance, recorded=recorded)
 
 
 def _iterations(words: str) -> Iterations:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from appliance.studio.progress import EVERY_S, doing, shown
+from appliance.studio.progress import EVERY_S, doing, shown, told
 from tests.studio.conftest import bunraku
 
 
@@ -37,6 +37,20 @@ def test_what_takes_no_time_says_one_line_and_nothing_is_said_to_nobody() -> Non
         pass
     assert said(into).splitlines() == ["coding ...", "measuring ..."]
     assert list(shown([1], "coding", None)) == [1]
+
+
+def test_parts_with_words_of_their_own_say_them_now_and_then() -> None:
+    seconds = iter((0.0, 0.0, 1.0, EVERY_S, EVERY_S, 2 * EVERY_S, 2 * EVERY_S))
+    into = console()
+    with told(into, 4, now=lambda: next(seconds)) as advance:
+        for part in ("a", "b", "c", "d"):
+            advance(part)
+    assert said(into).splitlines() == ["0 %  a", "50 %  c", "75 %  d"]
+    with told(into) as advance:
+        advance("of nobody knows how many")
+    with told(None, 3) as advance:
+        advance("to nobody")
+    assert said(into).splitlines()[3:] == ["of nobody knows how many"]
 
 
 def test_on_a_terminal_there_is_a_bar() -> None:

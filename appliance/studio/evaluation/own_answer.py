@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
 from appliance.pose.roles import held_joints
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset
@@ -21,6 +22,7 @@ from appliance.studio.evaluation.onset import CODED_WINDOWS
 from appliance.studio.evaluation.pairs import own_takes
 from appliance.studio.evaluation.puppetry_report import judged
 from appliance.studio.evaluation.recorded import Recorded
+from appliance.studio.progress import told
 from appliance.studio.studio_error import StudioError
 
 PARTS = ("left upper arm", "left forearm", "head")
@@ -37,6 +39,7 @@ def own_answer(
     picture: Path,
     one_pass_error: float | None = None,
     steps: int | None = None,
+    console: Console | None = None,
 ) -> dict[str, Any]:
     """The figures of puppetry.measure, and cause, verdict, advice, measured_on; draws a picture.
 
@@ -60,9 +63,10 @@ def own_answer(
     pairs = [_beginning(pair, size.ticks) for pair in takes.pairs[: size.pairs]]
     measurements = [Measurement(coder, pair, reference) for pair in pairs]
     recorded = Recorded(takes.reference, coder.joints)
-    found = puppetry.measure(
-        measurements, joints[: size.joints], ITERATIONS, FREE, turning=False, recorded=recorded
-    )
+    with told(console) as advance:
+        found = puppetry.measure(
+            measurements, joints[: size.joints], ITERATIONS, FREE, advance, turning=False, recorded=recorded
+        )
     draw_answer(picture, measurements[0], joints[0], puppetry.IN_PLAY)
     return {**found, "measured_on": takes.words, **judged(found, learned(dataset, steps), one_pass_error)}
 

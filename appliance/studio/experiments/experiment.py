@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
 from appliance.pictures.filmstrip import draw_strips
@@ -34,6 +33,7 @@ from appliance.studio.experiments.families import CONDITIONS, Trial, usual_trace
 from appliance.studio.experiments.null_networks import KINDS, null_networks
 from appliance.studio.experiments.page import write_page
 from appliance.studio.experiments.strips import FIGURES, strip_of_excerpts, strips_of_trial
+from appliance.studio.progress import told
 from appliance.studio.studio_error import StudioError
 
 TITLE = "Experiments with a puppet"
@@ -80,16 +80,10 @@ def run(options: ExperimentOptions) -> None:
     drawing: list[Future[Path]] = []
     with (
         ProcessPoolExecutor(mp_context=get_context("spawn")) as pool,  # a strip takes seconds
-        Progress(console=console, transient=True, disable=not console.is_terminal) as bar,
+        told(
+            console, work * len(CONDITIONS) + len(KINDS) + (1 + work * len(FIGURES)) * options.pictures
+        ) as advance,
     ):
-        task = bar.add_task(
-            "dancing",
-            total=work * len(CONDITIONS) + len(KINDS) + (1 + work * len(FIGURES)) * options.pictures,
-        )
-
-        def advance(words: str) -> None:
-            bar.update(task, advance=1, description=words)
-
         if options.pictures:
             pictures["The five as recorded"] = [figure_2]
             drawing.append(pool.submit(draw_strips, *strip_of_excerpts(figure_2, excerpts)))

@@ -92,7 +92,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     report[KEY] = reading_facts(request.source.catalogue)
     say("Measuring whether the body answers a hand.")
     error = report["degrees"]["1"]["mean"]
-    report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png", error, state["step"])
+    report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png", error, state["step"], console)
     packing.write_skeleton(request.out, dataset.skeleton, _shown_pose(dataset))
     about = "what the show starts from; another: bunraku export --phrase FILE"
     if request.phrase is not None:
