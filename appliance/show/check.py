@@ -12,6 +12,7 @@ import numpy as np
 
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import content, plain_json, require_inside
+from appliance.pose.possible import FASTEST_M_S, impossible_frames
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import (
@@ -31,6 +32,7 @@ LARGEST_BYTES = 25_000_000
 LARGEST_REPORT = 16_000_000
 RATE_HZ = 50.0
 OFFSET_TOLERANCE_M = 1e-3
+_MOST_NAMED = 5  # frames in a message
 
 
 @dataclass(frozen=True)
@@ -128,12 +130,15 @@ def _phrase(show: Show, name: str, path: Path) -> Iterator[Finding]:
     except OSError as error:
         yield Finding(path, 0, f"The phrase cannot be read ({error.strerror}).", COPY_AGAIN)
         return
+    for note in phrase.notes:
+        yield Finding(path, 0, f"{note[0].upper()}{note[1:]}.", COPY_AGAIN, "warning")
     yield from _phrase_skeleton(path, phrase.skeleton, show.skeleton)
     if abs(phrase.fps - RATE_HZ) > 0.1:
         message = (
             f"The phrase has {phrase.fps:.4g} poses a second and is resampled to {RATE_HZ:g} at each start."
         )
         yield Finding(path, 0, message, "Pack it at 50 Hz.", "warning")
+    yield from _phrase_path(path, phrase)
     if name == MAIN:
         yield from _excerpt(show, phrase)
     elif len(phrase) * RATE_HZ / phrase.fps < WINDOW:
@@ -150,6 +155,20 @@ def _phrase_skeleton(path: Path, found: Skeleton, wanted: Skeleton) -> Iterator[
     other = sorted(set(found.names) ^ set(wanted.names))
     which = f"only one of them has {', '.join(other[:5])}" if other else "their order or parents differ"
     yield Finding(path, 0, f"The phrase has other joints than skeleton.bvh: {which}.", cure)
+
+
+def _phrase_path(path: Path, phrase: Recording) -> Iterator[Finding]:
+    """Frames to which the root jumps: the dance goes on from where it stood."""
+    frames = impossible_frames(phrase.roots, phrase.fps)
+    if not len(frames):
+        return
+    named = ", ".join(f"{frame + 1} ({frame / phrase.fps:.2f} s)" for frame in frames[:_MOST_NAMED])
+    more = f" and {len(frames) - _MOST_NAMED} more" if len(frames) > _MOST_NAMED else ""
+    message = (
+        f"The root jumps farther than {FASTEST_M_S:g} m/s in frame{'s' * (len(frames) > 1)} {named}{more}: "
+        "these steps are left out, and the figure goes on from where it stood."
+    )
+    yield Finding(path, 0, message, "Mend the capture, or cut the phrase there.", "warning")
 
 
 def _excerpt(show: Show, phrase: Recording) -> Iterator[Finding]:

@@ -186,12 +186,21 @@ def test_a_root_that_jumps_is_a_warning_that_names_file_and_frames(bundle: Path,
     assert "goes on from where it stood" in finding.message
 
 
-def test_a_broken_phrase_keeps_its_line(bundle: Path) -> None:
+def test_a_row_of_the_phrase_that_is_lost_is_a_warning_with_its_line(bundle: Path) -> None:
     lines = (bundle / "phrase.bvh").read_text().splitlines()
     lines[-1] = lines[-1].replace("0", "nan", 1)
     (bundle / "phrase.bvh").write_text("\n".join(lines) + "\n")
     finding = only(bundle)
-    assert (finding.file.name, finding.line) == ("phrase.bvh", len(lines))
+    assert (finding.file.name, finding.level) == ("phrase.bvh", "warning")
+    assert f"Line {len(lines)}: 1 row lost" in finding.message
+
+
+def test_a_broken_phrase_keeps_its_line(bundle: Path) -> None:
+    lines = (bundle / "phrase.bvh").read_text().splitlines()
+    lines[0] = "HIERARCHIE"
+    (bundle / "phrase.bvh").write_text("\n".join(lines) + "\n")
+    finding = only(bundle)
+    assert (finding.file.name, finding.line) == ("phrase.bvh", 1)
 
 
 def test_a_bundle_that_is_too_large_is_a_warning(bundle: Path) -> None:
