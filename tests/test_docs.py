@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from appliance.cli.app import PLUG_INS, parser, plug_ins
 from appliance.show import describe
 from appliance.show.box import BoxConfig
 from appliance.show.section import Section
@@ -153,3 +155,47 @@ def test_a_key_of_the_reference_loads_with_the_default_that_it_names(
     own = keys_of(model)[key].get_default(call_default_factory=True, validated_data={})
     if "`" in default and default not in ("`{}`", "`[{}]`"):
         assert written == json.loads(json.dumps(own, default=str))
+
+
+COMMAND = re.compile(r"(?:^|\$|sudo|&&|;|\||\() *bunraku((?: +[^\s`|&;>()]+)+)")
+
+
+def commands_in(page: str) -> Iterator[tuple[int, list[str]]]:
+    """Words behind `bunraku` in code spans and fences, with their line."""
+    fenced = False
+    for number, line in enumerate(page.splitlines(), 1):
+        if line.lstrip().startswith("```"):
+            fenced = not fenced
+            continue
+        for code in [line] if fenced else re.findall(r"`([^`]+)`", line):
+            for found in COMMAND.finditer(code.partition(" # ")[0]):
+                yield number, found[1].split()
+
+
+def strange_words(words: list[str], command: Any) -> list[str]:
+    """Commands and options that bunraku does not have."""
+    while getattr(command, "commands", None) and words and re.fullmatch(r"[a-z][a-z-]*", words[0]):
+        if words[0] not in command.commands:
+            return [words[0]]
+        command, words = command.commands[words[0]], words[1:]
+    options = {name for one in command.params for name in (*one.opts, *one.secondary_opts)}
+    asked = [word.partition("=")[0].rstrip(",.:") for word in words if word.startswith("--")]
+    return [word for word in asked if word not in options | {"--help"}]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_and_options_of_the_pages_exist(page: Path) -> None:
+    bunraku = parser(None, plug_ins(entry_points(group=PLUG_INS)))
+    strange = {
+        f"{page.name}:{number}": found
+        for number, words in commands_in(page.read_text("utf-8"))
+        if (found := strange_words(words, bunraku))
+    }
+    assert strange == {}
+
+
+def test_an_option_that_is_none_is_found() -> None:
+    bunraku = parser(None, plug_ins(entry_points(group=PLUG_INS)))
+    (found,) = commands_in("Type `sudo bunraku journal export --to-stick --bvh FILE`, or bunraku dance.")
+    assert strange_words(found[1], bunraku) == ["--to-stick"]
+    assert strange_words(["dance"], bunraku) == ["dance"]

@@ -107,7 +107,8 @@ class LimitsConfig(Section):
 
     tick_budget_ms: float = key(
         "What one tick of 20 ms may use. On stage a show that needs more runs with fewer iterations, and the "
-        "box says so; `bunraku check` refuses it.",
+        "box says so; `bunraku check` refuses it. At power-on a new show is refused only where a single "
+        "iteration is too much.",
         10.0,
         within=(0.5, 18),
     )
