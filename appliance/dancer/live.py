@@ -96,19 +96,21 @@ class Live:
         signs = np.where(np.einsum("jk,jk->j", self._newest, reference) < 0.0, -1.0, 1.0)
         self._newest *= signs[:, None].astype(np.float32)
         knows_root = bool((np.abs(root) <= FARTHEST_M).all())
-        if knows_root and self._has_root and not was_silent:
+        if self._has_root and not was_silent:
+            if not knows_root:
+                root, knows_root = self._root[1].copy(), True  # unknown for a moment: the last good one
             self._carry_on(root, min(max(interval_s, SHORTEST_S), LONGEST_S))
         self._root[0] = self._root[1]
         self._root[1] = root if knows_root else 0.0
         fresh = comes & (not was_silent) & ~self._comes
         if was_silent:
             np.copyto(self._before, self._newest)
-            self._root[0] = self._root[1]
             self._is_new[:] = True
         elif fresh.any():
             self._before[fresh], self._is_new[fresh] = self._newest[fresh], True
         self._comes[:] = comes
-        if knows_root and (was_silent or not self._has_root):
+        if was_silent or not self._has_root:
+            self._root[0] = self._root[1]
             self._offset[:] = np.nan  # taken when the next window is laid over
         self._has_root, self._arrival = knows_root, arrival
         return True

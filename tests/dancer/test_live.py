@@ -220,3 +220,14 @@ def test_it_continues_from_a_state() -> None:
         if tick >= 30:
             other = second.lay_over(tick * TICK_S, STILL, ROOTS)
             assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
+@pytest.mark.parametrize("unknown", [range(40, 60), range(40)])
+def test_a_root_that_is_known_again_goes_on_from_where_the_figure_stands(unknown: range) -> None:
+    live, path = chosen(), []
+    for tick in range(100):
+        place = np.array([0.004 * min(tick, 40) - 700.0, 0.9, 0.0], dtype=np.float32)
+        root = NOWHERE if tick in unknown else place
+        live.hear(pose(0.1), root, tick * TICK_S - 0.01, STILL[0])  # between two ticks
+        path.append(live.lay_over(tick * TICK_S, STILL, ROOTS)[1][0].copy())
+    assert np.abs(np.diff(path, axis=0)).max() < 0.01
