@@ -1,4 +1,4 @@
-"""Dancers in twelve conventions: names, units, axes, zero poses and rates, as their systems have them.
+"""Dancers in fifteen conventions: names, units, axes, zero poses and rates, as their systems have them.
 
 Everything here is made by this script after the systems' documentation; nothing is a recording of anybody.
 """
@@ -177,6 +177,26 @@ CONVENTIONS = {
         _MOTIONBUILDER.replace("ToeBase", "Toe").replace("Spine1", "Spine2"),
         between="Spine1",
         zero="x",
+        fps=30.0,
+    ),
+    "mocopi": Convention(
+        "root torso_1 torso_7 neck_1 head shoulder up_arm low_arm hand up_leg low_leg foot toes",
+        sides=("l", "r"),
+        side="{side}_{word}",
+        between="torso_2 torso_3 torso_4 torso_5 torso_6",
+        fps=50.0,
+    ),
+    "Second Life": Convention(
+        "Pelvis Torso Chest Neck Head Collar Shoulder Elbow Wrist Hip Knee Ankle Foot",
+        side="{word}{side}",
+        prefix="m",
+        metres=1.0,
+        fps=30.0,
+    ),
+    "MMD": Convention(
+        "腰 上半身 上半身2 首 頭 肩 腕 ひじ 手首 足 ひざ 足首 つま先",
+        sides=("左", "右"),
+        metres=0.1,
         fps=30.0,
     ),
     "joint_Root": Convention(

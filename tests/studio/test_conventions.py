@@ -1,4 +1,4 @@
-"""Twelve systems' files through every door; two (--long: all) are also trained on, evaluated and played."""
+"""Fifteen systems' files through every door; two (--long: all) are also trained on, evaluated and played."""
 
 from __future__ import annotations
 

@@ -36,12 +36,12 @@ _ALONG_AXES = [
 ]
 SIDEWAYS = (0, 2)  # left and right lie along x or along z; a mirror on the floor would be none
 
-_WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
+_WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R", "左": "右"}
 _OTHER = {**_WORDS, **{right: left for left, right in _WORDS.items()}}
 # Where a name has its side, the likeliest first: mixamorig:LeftArm, hand_left; L_Arm, arm.l.001; lShldr,
 # LThumb, Bip_LHand; ArmL, ArmLT; lfoot.
 _PLACES = (
-    r"left|right|Left|Right|LEFT|RIGHT",
+    r"left|right|Left|Right|LEFT|RIGHT|左|右",
     r"(?<![A-Za-z0-9])[lLrR](?![A-Za-z0-9])",
     r"(?<![A-Za-z0-9])[lLrR](?=[A-Z])",
     r"(?<=[a-z0-9])[LR](?=T?$)",
