@@ -23,7 +23,7 @@ from appliance.show.bundle import (
     no_such_show,
     unlisted_files,
 )
-from appliance.show.config_error import ConfigError, Problem
+from appliance.show.config_error import ConfigError, Problem, bounded
 from appliance.show.network import WINDOW, inspect_network
 from appliance.show.show import Show, load_show
 from appliance.show.sources import MAIN
@@ -66,7 +66,8 @@ def verify_bundle(directory: Path | str) -> list[Finding]:
     if not directory.is_dir():
         return [_error(no_such_show(directory))]
     findings = [*_files(directory), *_show(directory)]
-    return sorted(findings, key=lambda finding: finding.level)
+    levels = ("error", "warning")
+    return [one for level in levels for one in bounded([found for found in findings if found.level == level])]
 
 
 def _files(directory: Path) -> Iterator[Finding]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 MOST_PROBLEMS = 30  # of one error: nobody reads more, and a file may have twenty thousand
 _LONGEST = 2000  # characters of a message
@@ -34,6 +35,9 @@ class Problem:
         return f"{where}: {self.message}" + (f" {self.cure}" if self.cure else "")
 
 
+AnyProblem = TypeVar("AnyProblem", bound=Problem)
+
+
 class ConfigError(ValueError):
     """A file that the box refuses: its problems in the order of their lines, the first MOST_PROBLEMS of them.
 
@@ -42,15 +46,19 @@ class ConfigError(ValueError):
 
     def __init__(self, problems: Iterable[Problem], more: int = 0) -> None:
         found = sorted(problems, key=lambda p: (str(p.file), p.line))
-        if more := more + max(0, len(found) - MOST_PROBLEMS):
-            del found[MOST_PROBLEMS:]
-            last = found[-1]
-            words = f"{more} more {'things are' if more > 1 else 'thing is'} wrong below this line."
-            found.append(Problem(last.file, last.line, words, "Mend these first."))
-        self.problems: tuple[Problem, ...] = tuple(found)
+        self.problems: tuple[Problem, ...] = tuple(bounded(found, more))
         first = self.problems[0]
         self.file, self.line, self.message = first.file, first.line, first.message
         super().__init__("\n".join(map(str, self.problems)))
+
+
+def bounded(problems: Sequence[AnyProblem], more: int = 0) -> list[AnyProblem]:
+    """The first MOST_PROBLEMS, and how many there are besides."""
+    shown, more = list(problems[:MOST_PROBLEMS]), more + max(0, len(problems) - MOST_PROBLEMS)
+    if more:
+        words = f"{more} more {'things are' if more > 1 else 'thing is'} wrong below this line."
+        shown.append(replace(shown[-1], message=words, cure="Mend these first."))
+    return shown
 
 
 class NotAskedForError(ConfigError):

@@ -13,6 +13,8 @@ from appliance.pose.foreign_yaml import DEEPEST, composed, plain_values
 from appliance.sensor.keys import KeyFileError, parse_keys
 from appliance.sensor.memory import DamagedMemoryError, read_memory
 from appliance.show.box import load_box
+from appliance.show.bundle import CHECKSUMS, write_checksums
+from appliance.show.check import verify_bundle
 from appliance.show.config_error import MOST_PROBLEMS, ConfigError
 from appliance.show.cue_writing import with_cue
 from appliance.show.yaml_edit import with_value
@@ -150,3 +152,16 @@ def test_a_change_that_shuts_out_or_lets_all_in_is_asked_for_first(
     assert "is written" in change(path, None, Change(text, [], sure=True))["words"]
     assert path.read_text() == text
     assert "asks" not in change(path, None, Change(text + "\n", [])), "what is so already is not asked again"
+
+
+def test_a_bundle_with_thousands_of_strange_files_is_told_in_few_lines(bundle: Path) -> None:
+    write_checksums(bundle)
+    with (bundle / CHECKSUMS).open("a") as sums:
+        sums.write("no checksum\n" * 5000)
+    for number in range(500):
+        (bundle / f"strange{number}").touch()
+    findings = verify_bundle(bundle)
+    levels = [one.level for one in findings]
+    assert levels == ["error"] * (MOST_PROBLEMS + 1) + ["warning"] * (MOST_PROBLEMS + 1)
+    assert "4970 more things are wrong" in findings[MOST_PROBLEMS].message
+    assert "470 more things are wrong" in findings[-1].message
