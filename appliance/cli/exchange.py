@@ -133,7 +133,8 @@ def import_(
         Path | None, typer.Option(help="Text file: a name on each line, or a name, a comma, its parent.")
     ] = None,
     like: Annotated[
-        Path | None, typer.Option(help="BVH with the skeleton that the points belong to, by their names.")
+        Path | None,
+        typer.Option(help="Recording whose skeleton the points belong to, by their names."),
     ] = None,
     fps: Annotated[
         float | None,

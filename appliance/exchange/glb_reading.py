@@ -129,6 +129,8 @@ class _Scene:
             if parent in linear:
                 own, place = linear[parent] @ own, at[parent] + (linear[parent] @ place[..., None])[..., 0]
             linear[node], at[node] = own, place
+        if np.linalg.det(linear[self._joints[0]][0]) < 0:
+            self._notes.append("a node above the joints mirrors the figure: its left side is on the right")
         frames = {joint: self._frame(joint, linear[joint]) for joint in self._joints}
         poses = np.empty((len(times), len(parents), 4))
         places = np.empty((len(times), len(parents), 3))
@@ -164,7 +166,9 @@ class _Scene:
         worn = {node["skin"]: node.get("name") for node in self._nodes if "skin" in node}
         names = [str(skin.get("name") or worn.get(number) or number) for number, skin in enumerate(skins)]
         if wanted is not None:
-            return set(skins[self._named(wanted, names, "skin")]["joints"])
+            meshes = {str(name).casefold(): number for number, name in worn.items() if name}
+            number = meshes.get(wanted.casefold(), -1)
+            return set(skins[self._named(wanted, names, "skin") if number < 0 else number]["joints"])
         figures: list[tuple[set[int], list[str]]] = []
         for name, skin in zip(names, skins, strict=True):
             joints, called = set(skin["joints"]), [name]

@@ -10,11 +10,12 @@ import numpy as np
 
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.fitting import Gap, fit_skeleton, gaps_of, like, pose_frames
+from appliance.exchange.formats import read_as_told
 from appliance.exchange.points_file import UNITS, figure_size, guess_unit, read_names, read_points, with_y_up
 from appliance.exchange.topology import directions_at_rest, parents_by_name
-from appliance.pose.bvh import read_bvh
 from appliance.pose.kept_rows import place_words
 from appliance.pose.quaternion import Array
+from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.roles import places_of
 from appliance.pose.skeleton import Skeleton
@@ -28,7 +29,7 @@ _FEW_FRAMES = 2
 
 @dataclass(frozen=True)
 class PointsOptions:
-    """names: file; model: BVH whose skeleton the points belong to; up: 'y' or 'z'.
+    """names: file; model: recording whose skeleton the points belong to; up: 'y' or 'z'.
 
     None: fps as the file's times say, else 50; unit by the size of the figure.
     """
@@ -130,7 +131,11 @@ def _require_seen(source: Path, names: Sequence[str], points: Array) -> None:
 def _as_model(
     source: Path, model: Path, names: Sequence[str], points: Array, say: Callable[[str], None]
 ) -> tuple[Skeleton, Array]:
-    figure = read_bvh(model, true_fps=USUAL_FPS).skeleton  # its dance is not asked for
+    told = ReadingOptions(true_fps={"*": USUAL_FPS})  # its dance is not asked for
+    recording, guesses = read_as_told(model, told)
+    figure = recording.skeleton
+    for guess in guesses:
+        say(f"{model.name}: {guess.sentence()}.")
     others = [name for name in names if name not in figure.names]
     if others:
         say(f"Points that are no joints of {model.name} left out: {', '.join(others)}.")

@@ -97,7 +97,10 @@ NODES = {
 @pytest.mark.parametrize("kind", NODES)
 def test_joints_are_where_all_nodes_above_put_them(kind: str, tmp_path: Path) -> None:
     found = read_glb(glb(tmp_path / "foreign.glb", NODES[kind]))
-    assert found.skeleton.names == ("Hips", "Chest", "Head", "LeftLeg") and found.notes == ()
+    assert found.skeleton.names == ("Hips", "Chest", "Head", "LeftLeg")
+    assert ("mirrors the figure" in "".join(found.notes)) == (
+        kind in ("a mirror above", "a mirror in a matrix")
+    )
     positions, _ = found.skeleton.forward_kinematics(found.poses, found.roots, found.translations)
     np.testing.assert_allclose(positions, places_of(NODES[kind], [1, 2, 3, 4], [1, 2]), atol=1e-6)
     assert np.abs(np.linalg.norm(found.poses, axis=-1) - 1.0).max() < 1e-9
@@ -128,6 +131,7 @@ HAT = {"name": "Hat", "translation": [1, 1, 1]}
         ([{"joints": [5], "name": "Hat"}, {"joints": [1, 2, 3, 4]}], (HAT,), None, ALL, "out: Hat (1 joint)"),
         ([{"joints": [2, 3], "name": "Face"}, {"joints": [1, 2, 3, 4]}], (), "face", ("Chest", "Head"), ""),
         ([{"joints": [2, 3]}, {"joints": [1, 2, 3, 4]}], (), "0", ("Chest", "Head"), ""),
+        ([{"joints": [3]}, {"joints": [1, 4]}], ({"name": "Skirt", "skin": 1},), "skirt", ("Hips", "LeftLeg"), ""),
     ],
 )  # fmt: skip
 def test_all_skins_of_a_figure_are_read_and_others_are_named(

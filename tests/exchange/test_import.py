@@ -11,6 +11,7 @@ import pytest
 
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.fitting import fit_skeleton, pose_frames
+from appliance.exchange.formats import write_recording
 from appliance.exchange.importing import PointsOptions, import_points
 from appliance.exchange.points_file import read_names, read_points
 from appliance.exchange.topology import directions_at_rest, parents_by_name
@@ -20,6 +21,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from tests.command import Command
+from tests.pose.conventions import as_the_system_writes, dance_of
 from tests.studio.bodies import NAMINGS, body, moved
 
 
@@ -411,3 +413,13 @@ def test_points_that_the_model_does_not_have_are_named(tmp_path: Path) -> None:
     points = np.concatenate([points_of(meant), np.ones((len(meant), 1, 3))], axis=1)
     _, said = imported(tmp_path, points, [*meant.skeleton.names, "Cane"], model=tmp_path / "like.bvh")
     assert "no joints of like.bvh left out: Cane" in said
+
+
+@pytest.mark.parametrize("ending", [".bvh", ".glb"])
+def test_the_model_is_read_as_every_recording_is(tmp_path: Path, ending: str) -> None:
+    meant = dance_of("Vicon", seconds=1.0)
+    model = tmp_path / f"like{ending}"
+    write_recording(model, as_the_system_writes(meant, "Vicon"))
+    found, said = imported(tmp_path, points_of(meant), meant.skeleton.names, model=model)
+    assert "turned from Z up to Y up" in said
+    np.testing.assert_allclose(found.skeleton.offsets, meant.skeleton.offsets, atol=1e-3)
