@@ -33,6 +33,7 @@ class Memory:
     port: int = 9750
     fusion: str = "imuplus"
     axes: str = "24 00"
+    crystal: str = "no"
 
 
 @dataclass
@@ -134,7 +135,7 @@ class FakeWearable:
             return (
                 f"ok name {one.name} device {one.device} key {'set' if one.key else 'none'} "
                 f"password {'set' if one.password else 'none'} port {one.port} fusion {one.fusion} "
-                f"axes {one.axes} network {one.network}"
+                f"crystal {one.crystal} axes {one.axes} network {one.network}"
             )
         if word == "set":
             return self._set(*rest.partition(" ")[::2])

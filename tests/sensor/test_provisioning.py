@@ -73,6 +73,14 @@ def test_both_sides_have_the_same_key_and_the_wearable_all_settings(path: Path) 
     assert not any(secret in "\n".join(said) for secret in (sensor.key.hex(), "curtain up 9"))
 
 
+@pytest.mark.parametrize(("crystal", "told"), [(True, "yes"), (False, "no"), (None, "yes")])
+def test_a_crystal_is_set_only_when_asked_for(path: Path, crystal: bool | None, told: str) -> None:
+    with FakeWearable(Memory(crystal="yes")) as fake:
+        provisioned(fake, path, Settings("head", crystal=crystal))
+    assert fake.saved.crystal == told
+    assert any(line.startswith("set crystal") for line in fake.heard) == (crystal is not None)
+
+
 def test_by_cable_alone_it_forgets_a_network_and_keeps_the_rest(path: Path) -> None:
     with FakeWearable(Memory("x", "none", b"", "old net", "old password", 1, "ndof", "21 02")) as fake:
         provisioned(fake, path, Settings("head"))
@@ -122,11 +130,10 @@ def test_a_wearable_does_not_take_anothers_name_by_mistake(path: Path, own: str,
     assert done.sensor.device_id not in (keys["left-wrist"].device_id, keys["spare-1"].device_id)
 
 
-@pytest.mark.parametrize("takes_over", [False, True])
-def test_a_wearable_of_the_show_does_not_leave_its_joint_by_mistake(path: Path, takes_over: bool) -> None:
-    keys = create_keys(path, ["left-wrist", "right-ankle"] if takes_over else ["right-ankle"])
+def test_a_wearable_of_the_show_does_not_leave_its_joint_to_replace_another(path: Path) -> None:
+    keys = create_keys(path, ["left-wrist", "right-ankle"])
     with FakeWearable(Memory("right-ankle", f"{keys['right-ankle'].device_id:08x}")) as fake:
-        told = refused(fake, path, takes_over=takes_over, worn=["right-ankle"])
+        told = refused(fake, path, takes_over=True, worn=["right-ankle"])
         assert "This wearable is right-ankle, a sensor of this show" in told
         assert fake.saved.key == b""
         done, _ = provisioned(fake, path, Settings("right-ankle"), worn=["right-ankle"])  # its own name

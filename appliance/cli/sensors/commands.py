@@ -38,6 +38,13 @@ FusionKind = Annotated[
 Axes = Annotated[
     str | None, typer.Option(metavar="MAP,SIGN", help="How the IMU sits: two hexadecimal registers, 24,00.")
 ]
+Crystal = Annotated[
+    bool | None,
+    typer.Option(
+        "--crystal/--no-crystal",
+        help="A 32 kHz crystal is fitted beside the IMU, for a steadier heading. Default: unchanged.",
+    ),
+]
 Name = Annotated[str, typer.Argument(help="The sensor's name, as in the key file.")]
 Anyway = Annotated[
     bool, typer.Option("--anyway", help="Also if the show wears the sensor, and loses it by that.")
@@ -56,13 +63,14 @@ def provision(
     password_file: PasswordFile = None,
     fusion: FusionKind = None,
     axes: Axes = None,
+    crystal: Crystal = None,
 ) -> None:
     """Give a wearable its name, its network and a fresh key, once, by cable."""
     from appliance.cli.sensors.box_keys import box_keys_of
     from appliance.cli.sensors.provision import provision_sensor
 
     box_keys = box_keys_of(box, keys)
-    raise typer.Exit(provision_sensor(box_keys, name, port, network, password_file, fusion, axes))
+    raise typer.Exit(provision_sensor(box_keys, name, port, network, password_file, fusion, axes, crystal))
 
 
 @sensors.callback(invoke_without_command=True)
@@ -113,6 +121,7 @@ def replace(
     password_file: PasswordFile = None,
     fusion: FusionKind = None,
     axes: Axes = None,
+    crystal: Crystal = None,
     anyway: Anyway = False,
     box: ThisBoxFile = None,
     keys: KeyFile = None,
@@ -135,11 +144,8 @@ def replace(
             "Put it on, switch it on, stand still for a breath."
         )
         raise typer.Exit(edit_keys(box_keys, lambda change: change.swap(broken, spare), words))
-    raise typer.Exit(
-        provision_sensor(
-            box_keys, broken, port, network, password_file, fusion, axes, takes_over=True, anyway=anyway
-        )
-    )
+    wearable = network, password_file, fusion, axes, crystal
+    raise typer.Exit(provision_sensor(box_keys, broken, port, *wearable, takes_over=True, anyway=anyway))
 
 
 @sensors.command()

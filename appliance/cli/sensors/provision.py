@@ -43,6 +43,7 @@ def provision_sensor(
     password_file: Path | None,
     fusion: str | None,
     axes: str | None,
+    crystal: bool | None = None,
     takes_over: bool = False,
     anyway: bool = False,
 ) -> int:
@@ -57,17 +58,17 @@ def provision_sensor(
 
     require_folder(box_keys.keys)
     try:
-        settings = Settings(name, network or "", "", _udp_port(box_keys), fusion, _axes(axes))
+        settings = Settings(name, network or "", "", _udp_port(box_keys), fusion, _axes(axes), crystal)
         is_asked = network is not None and password_file is None and sys.stdin.isatty()
         if not is_asked:
             settings = replace(settings, password=_read_password(network, password_file))
         device = port or only_wearable(found_ports())
-        worn = () if anyway else worn_sensors(box_keys) or ()
+        worn = worn_sensors(box_keys) or ()
         with clear_errors(box_keys.keys), WearableConsole(device) as cable:
             if is_asked:  # last of all, so that it is not typed in vain
                 settings = replace(settings, password=_ask_password(settings.network))
             with console.status(f"Asking {escape(device)}"):
-                done = provision(cable, box_keys.keys, settings, say, takes_over, worn)
+                done = provision(cable, box_keys.keys, settings, say, takes_over, () if anyway else worn)
     except (ConsoleError, NoWearableError, ProvisioningError) as error:
         raise StageError(str(error)) from None
     except KeyboardInterrupt:
@@ -77,7 +78,7 @@ def provision_sensor(
         ) from None
     is_well, words = reload_keys(box_keys)
     _step(console, "box", words, is_well)
-    for hint in _hints(box_keys, done, settings, device):
+    for hint in _hints(box_keys, done, settings, device, done.was in worn):
         console.print(hint, markup=False, soft_wrap=True)
     return 0 if is_well else NOT_TAKEN
 
@@ -137,7 +138,9 @@ def _axes(text: str | None) -> tuple[int, int] | None:
     return mapped, sign
 
 
-def _hints(box_keys: BoxKeys, done: Provisioned, settings: Settings, device: str) -> list[str]:
+def _hints(
+    box_keys: BoxKeys, done: Provisioned, settings: Settings, device: str, was_worn: bool
+) -> list[str]:
     """What to do next, and what in the box file would keep the wearable out."""
     name, sensors = done.sensor.name, box_keys.box.sensors
     hints = [*filter(None, [forgotten(box_keys.keys)]), ""]
@@ -154,9 +157,10 @@ def _hints(box_keys: BoxKeys, done: Provisioned, settings: Settings, device: str
                 f"The box listens there with `serial: [{{device: {device}}}]` under sensors in its box file."
             )
     if done.was:
+        loss = ", and this show wears it: the dancer moves freely there" if was_worn else ""
         hints.append(
-            f"It was {done.was} until now: no sensor has that name any more. "
-            f"Provision another one as {done.was}, or: bunraku sensors revoke {done.was}"
+            f"It was {done.was} until now: no sensor has that name any more{loss}. Provision another one as "
+            f"{done.was}, or: bunraku sensors revoke {done.was}{' --anyway' if was_worn else ''}"
         )
     if not done.identity.imu_id:
         hints.append(

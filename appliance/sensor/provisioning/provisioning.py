@@ -41,6 +41,7 @@ class Settings:
     port: int = DEFAULT_PORT
     fusion: str | None = None
     axes: tuple[int, int] | None = None  # BNO055 registers 0x41 (map) and 0x42 (sign)
+    crystal: bool | None = None  # a 32 kHz crystal is fitted beside the BNO055
 
     def __post_init__(self) -> None:
         fault = name_fault(self.name) or _network_fault(self.network, self.password) or _axes_fault(self.axes)
@@ -69,7 +70,7 @@ def provision(
     """Provision the wearable on `console` and enter it into the key file `path`.
 
     `say` gets each completed step: its name and a sentence. `takes_over`: the name may belong to another
-    wearable so far. `worn`: sensors of the show, which the wearable is refused to leave. Raises
+    wearable so far. `worn`: sensors of the show, which none leaves to take over another's place. Raises
     ProvisioningError, ConsoleError (nothing answers), KeyFileError and OSError; then the key file is as it
     was.
     """
@@ -81,7 +82,8 @@ def provision(
         shown = _shown(console)
         known = _known_as(shown, change)
         _require_free_name(settings.name, known, shown, change, takes_over)
-        _require_not_worn(settings.name, known, worn)
+        if takes_over:
+            _require_not_worn(settings.name, known, worn)
         replaced = settings.name in change.keys
         sensor = _new_key(settings.name, change, takes_over)
         change.put(sensor)
@@ -167,6 +169,8 @@ def _draft(console: WearableConsole, sensor: SensorKey, settings: Settings) -> N
         console.ask(f"set port {settings.port}")
         if settings.fusion is not None:
             console.ask(f"set fusion {settings.fusion}")
+        if settings.crystal is not None:
+            console.ask(f"set crystal {'yes' if settings.crystal else 'no'}")
         if settings.axes is not None:
             console.ask("set axes {:02x} {:02x}".format(*settings.axes))
         has_arrived = console.proves(sensor.key)

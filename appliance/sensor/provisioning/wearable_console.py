@@ -29,7 +29,7 @@ _IMU_STARTS_S = 2.0  # the BNO055 takes 0.65 s after power-on, and some tries
 _ASK_FOR_IMU_S = 0.2
 _QUIET_S = 0.15
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f]")  # control characters never reach the terminal
-_LONGEST_ANSWER = 256
+_LONGEST_ANSWER = 320
 _IDENTITY = re.compile(
     r"ok bunraku-wearable (?P<firmware>\S+) wire (?P<wire>[0-9a-f]{8}) "
     r"imu (?P<imu>none|[0-9a-f]{32}) board (?P<board>\S+)"
