@@ -28,6 +28,9 @@ constexpr uint8_t kLargest = %(largest)d;
 constexpr uint8_t kBatteryUnknown = %(battery)d;
 constexpr uint16_t kRoundTripUnknown = %(round_trip)d;
 constexpr uint8_t kHasProfile = %(has_profile)d, kIsNdof = %(is_ndof)d;  // bits of `flags`
+constexpr uint8_t kRadioIsOld = %(radio_is_old)d, kHasCrystal = %(has_crystal)d;
+constexpr uint8_t kSignalShift = %(signal_shift)d, kMostSteps = %(most_steps)d;  // its upper bits
+constexpr int8_t kWeakestDbm = %(weakest_dbm)d, kDbmAStep = %(dbm_a_step)d;
 enum Led : uint8_t { kLedOff, kLedOn, kLedSlow, kLedFast, kLedStrobe };
 
 inline void put(uint8_t*& at, uint8_t value) { *at++ = value; }
@@ -114,6 +117,12 @@ def header() -> str:
         "round_trip": wire.ROUND_TRIP_UNKNOWN,
         "has_profile": wire.HAS_PROFILE,
         "is_ndof": wire.IS_NDOF,
+        "radio_is_old": wire.RADIO_IS_OLD,
+        "has_crystal": wire.HAS_CRYSTAL,
+        "signal_shift": wire.SIGNAL_SHIFT,
+        "most_steps": wire.MOST_STEPS,
+        "weakest_dbm": wire.WEAKEST_DBM,
+        "dbm_a_step": wire.DBM_A_STEP,
     }
     return text + "".join(_packet(layout) for layout in wire.LAYOUTS.values()) + BOTTOM
 

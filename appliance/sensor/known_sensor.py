@@ -119,7 +119,9 @@ class KnownSensor:
                 f"Is there only one? Its key was copied: bunraku provision --name {name} gives it another."
             )
         if self.pairing.route(now) is not None:
-            return ""
+            session = self.pairing.session
+            newest = session.newest if session is not None else None
+            return self._about_radio(newest.flags if newest is not None else 0)
         hello = self.pairing.newest_hello
         if hello is None or hello.wire_hash == wire.WIRE_HASH:
             return ""
@@ -128,6 +130,15 @@ class KnownSensor:
             f"{hello.wire_hash:08x}, this box: {wire.WIRE_HASH:08x}) and is not let in. "
             "Its joint moves freely. "
             "Flash it with the firmware/wearable of this version, or update the box."
+        )
+
+    def _about_radio(self, flags: int) -> str:
+        if not flags & wire.RADIO_IS_OLD:
+            return ""
+        return (
+            f"The radio of sensor {self.key.name} has firmware older than 19.5.4, which hangs at an empty "
+            "packet from anyone in its network. The dance goes on. Update it before the next show: the "
+            "updater of WiFi101 does that."
         )
 
 

@@ -25,7 +25,7 @@ class SensorReading(NamedTuple):
     boot_nonce: int = 0  # changes at each power-on
     taps: int = 0  # double taps since power-on; wraps at 256
     recoveries: int = 0  # restarts of the IMU since power-on; wraps at 256; its heading is lost
-    flags: int = 0  # wire.HAS_PROFILE, wire.IS_NDOF
+    flags: int = 0  # wire.HAS_PROFILE and the others, wire.signal_dbm
     round_trip_s: float | None = None  # by the newest heartbeat's echo
     wearable: int = 0  # SensorKey.wearable; changes when another wearable gets the name
 
@@ -53,7 +53,7 @@ class SensorState(NamedTuple):
     calibration: int  # BNO055 register 0x35
     firmware: str  # "1.0.0", or "" before the first hello
     imu_id: str  # hexadecimal, or ""
-    flags: int  # wire.HAS_PROFILE, wire.IS_NDOF
+    flags: int  # wire.HAS_PROFILE and the others, wire.signal_dbm
     boot_nonce: int
     complaint: str  # a sentence for people, or ""
 

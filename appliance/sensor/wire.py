@@ -21,7 +21,8 @@ Q14 = 1 << 14  # the BNO055's quaternion scale: 16384 stands for 1.0
 BATTERY_UNKNOWN = 255
 ROUND_TRIP_UNKNOWN = 0xFFFF
 LED_OFF, LED_ON, LED_SLOW, LED_FAST, LED_STROBE = range(5)
-HAS_PROFILE, IS_NDOF = 1, 2  # bits of `flags` in hello and reading
+HAS_PROFILE, IS_NDOF, RADIO_IS_OLD, HAS_CRYSTAL = 1, 2, 4, 8  # bits of `flags` in hello and reading
+SIGNAL_SHIFT, MOST_STEPS, WEAKEST_DBM, DBM_A_STEP = 4, 15, -90, 4  # and its upper four bits
 Buffer = bytes | bytearray | memoryview
 
 
@@ -52,7 +53,11 @@ QUATERNION = Coding("h", "int16_t", count=4, scale=Q14)
 IDENTITY16 = Coding("16s", "uint8_t[16]")
 OFFSETS22 = Coding("22s", "uint8_t[22]")
 LEDS = "0 off, 1 on, 2 slow, 3 fast, 4 strobe"
-FLAGS = "bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF)"
+FLAGS = (
+    "bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF); bit 2: the radio's "
+    "own firmware is older than 19.5.4; bit 3: a crystal for the BNO055; bits 4 to 7: n > 0: the Wi-Fi had "
+    "4 n - 90 dBm when it was joined"
+)
 
 
 @dataclass(slots=True)
@@ -140,6 +145,12 @@ class Restore(Packet):
 
     imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055 that it is for"]
     offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]
+
+
+def signal_dbm(flags: int) -> int | None:
+    """How strong a wearable's Wi-Fi was when it was joined; None where it does not say."""
+    steps = flags >> SIGNAL_SHIFT
+    return WEAKEST_DBM + DBM_A_STEP * steps if steps else None
 
 
 class Layout:

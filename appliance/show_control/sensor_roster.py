@@ -24,7 +24,7 @@ class RosterLine(NamedTuple):
     age_s: float
     battery: int  # percent; 255 unknown
     calibration: int  # BNO055 register 0x35
-    flags: int  # wire.HAS_PROFILE, wire.IS_NDOF
+    flags: int  # wire.HAS_PROFILE and the others, wire.signal_dbm
     firmware: str
     imu_id: str
     neutral: str  # taken, wanted, kept, assumed; empty: no hand of the show

@@ -114,8 +114,18 @@ def symbols(elf: Path, *options: str) -> list[tuple[str, int]]:
     return [(name, int(size, 16)) for size, name in found]
 
 
+def heap_of_library(objects: list[Path]) -> list[str]:
+    """Operators new and delete that the core would borrow from the C++ library: it is linked without."""
+    asked = ["arm-none-eabi-nm", "--undefined-only", "--format=just-symbols", *map(str, objects)]
+    listing = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+    return sorted(set(re.findall(r"^_Z(?:n|d)[wal]\w*$", listing, re.MULTILINE)))
+
+
 def main(elf: Path, folder: Path) -> int:
     sizes = section_sizes(elf)
+    if borrowed := heap_of_library(sorted(folder.rglob("*.obj")) + sorted(folder.rglob("*.o"))):
+        print(f"The wearable's core: it calls {', '.join(borrowed)} of the C++ library: it has no heap.")
+        return 1
     graph = CallGraph()
     try:
         for file in sorted(folder.rglob("*.ci")):

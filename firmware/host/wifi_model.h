@@ -26,6 +26,7 @@ struct WifiConditions {
   uint32_t stale_us[2] = {2'000'000, 8'000'000};  // how long is_up() goes on after the access point went
   uint32_t send_us = 250;                        // one datagram over SPI to the radio
   uint32_t receive_us = 150;
+  Radio radio = {{19, 6, 1}, -56};  // what it tells after a join
   bool is_dead = false;      // the radio: starting it hangs until the watchdog bites
   double join_failures = 0;  // share of joins that block to the end and fail
   double send_failures = 0;  // share of datagrams that the driver refuses
@@ -54,6 +55,7 @@ class WifiModel : public DatagramLink {
   bool send(const Address& to, const uint8_t* data, uint16_t count) override;
   bool broadcast(uint16_t port, const uint8_t* data, uint16_t count) override;
   uint16_t receive(uint8_t* data, uint16_t room, Address& from) override;
+  Radio radio() override { return conditions.radio; }
 
   // The world's side. The access point: times never go back; a change may be announced ahead, which
   // matters for a join that blocks meanwhile.

@@ -26,6 +26,10 @@ class IPAddress {
 using namespace arduino;
 
 constexpr pin_size_t PIN_WIRE_SDA = 11, PIN_WIRE_SCL = 12, LED_BUILTIN = 6;
+class SERCOM;
+extern SERCOM sercom0, sercom2;
+#define PERIPH_WIRE sercom0
+
 static const uint8_t A1 = 16, A3 = 18;
 
 extern "C" {

@@ -23,6 +23,8 @@ class WiFiClass {
   uint32_t localIP();
   uint32_t subnetMask();
   uint8_t status();
+  char* firmwareVersion();
+  int32_t RSSI();  // of the network that is joined, dBm; waits for the module, up to 1 s
   void noLowPowerMode();
   void setTimeout(unsigned long timeout_ms);
 };

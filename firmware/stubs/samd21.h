@@ -55,7 +55,7 @@ struct SysTick_Type {
   volatile uint32_t CTRL, LOAD, VAL;
 };
 
-extern Sercom* const SERCOM2;
+extern Sercom* const SERCOM0;
 extern Usb* const USB;
 extern Nvmctrl* const NVMCTRL;
 extern Wdt* const WDT;

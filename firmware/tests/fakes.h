@@ -59,6 +59,7 @@ class FakeImu : public I2cBus {
   void calibrate(uint8_t calibration) { page(0)[0x35] = calibration; }
   void accelerate(int16_t x) { set(0x28, x); }
   uint8_t mode() { return page(0)[0x3D]; }
+  uint8_t trigger() { return page(0)[0x3F]; }
 
   bool is_there = true;
   int profiles_written = 0;
@@ -117,7 +118,10 @@ class FakeWifi : public DatagramLink {
     return static_cast<uint16_t>(count);
   }
 
+  Radio radio() override { return told; }
+
   bool is_there = true;  // the network
+  Radio told;
   bool is_joined = false, is_open = false;
   uint32_t join_us = 1'000'000;
   int joins = 0, leaves = 0;

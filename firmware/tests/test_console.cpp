@@ -8,6 +8,7 @@
 
 #include "blake2s.h"
 #include "console.h"
+#include "line_parsing.h"
 #include "version.h"
 #include "wire.h"
 
@@ -31,7 +32,7 @@ struct Session {
   void provision() {
     for (const char* line :
          {"set name left-wrist", "set device 1a2b3c4d", "set network Stage Left", "set port 9751",
-          "set password break a leg", "set fusion ndof", "set axes 21 04"})
+          "set password break a leg", "set fusion ndof", "set crystal yes", "set axes 21 04"})
       CHECK(ask(line) == "ok");
     CHECK(ask(std::string("set key ") + kKeyAsHex) == "ok");
   }
@@ -55,20 +56,21 @@ TEST_CASE("id") {
 TEST_CASE("a fresh board shows that it knows nothing") {
   Session session;
   CHECK(session.ask("show") ==
-        "ok name none device none key none password none port 9750 fusion imuplus axes 24 00 network ");
+        "ok name none device none key none password none port 9750 fusion imuplus crystal no axes 24 00 network ");
 }
 
 TEST_CASE("what was set is shown and kept in the draft; secrets only as set") {
   Session session;
   session.provision();
   CHECK(session.ask("show") ==
-        "ok name left-wrist device 1a2b3c4d key set password set port 9751 fusion ndof axes 21 04 "
+        "ok name left-wrist device 1a2b3c4d key set password set port 9751 fusion ndof crystal yes axes 21 04 "
         "network Stage Left");
   const Settings& draft = session.console.draft();
   CHECK(draft.device_id == 0x1A2B3C4D);
   CHECK(draft.key[15] == 15);
   CHECK(std::string(draft.password) == "break a leg");
   CHECK(draft.imu.fusion == Fusion::kNdof);
+  CHECK(draft.imu.has_crystal);
   CHECK(draft.is_provisioned());
 }
 
@@ -97,7 +99,8 @@ TEST_CASE("what breaks a rule changes nothing") {
         "set port 65536", "set port 4294977046", "set port 9750x", "set port -1", "set port",
         "set password short",
         "set password 1234567890123456789012345678901234567890123456789012345678901234",
-        "set network 123456789012345678901234567890123", "set fusion amg", "set fusion", "set axes 24",
+        "set network 123456789012345678901234567890123", "set fusion amg", "set fusion",
+        "set crystal", "set crystal 1", "set crystal maybe", "set crystal yes ", "set axes 24",
         "set axes 24 08", "set axes 64 00", "set axes 25 00", "set axes 24 01", "set axes 2400",
         "set axes 24 00 "}) {
     CAPTURE(line);
@@ -162,7 +165,9 @@ TEST_CASE("status fits one line with everything at its largest") {
   status.recoveries = status.taps = status.rate_hz = 255;
   status.readings = status.skipped = status.unsent = status.damaged_frames = 4294967295;
   status.dropped.malformed = status.dropped.foreign = status.dropped.forged = status.dropped.replayed = 65535;
+  status.radio = {{255, 255, 255}, -128};
   const std::string answer = session.ask("status");
+  CHECK(answer.find(" radio 255.255.255 -128 dBm recoveries 255 ") != std::string::npos);
   CHECK(answer.rfind("ok state linked way cable imu ok battery 65535 mV calibration", 0) == 0);
   CHECK(answer.find("calibration 0 1 2 3 profile unsaved ") != std::string::npos);
   CHECK(answer.substr(answer.size() - 14) == "replayed 65535");
@@ -177,12 +182,36 @@ TEST_CASE("each state has its word") {
   CHECK(session.ask("status").find("state greeting") != std::string::npos);
 }
 
+TEST_CASE("the radio's own firmware and its signal are told, where they are known") {
+  Session session;
+  CHECK(session.ask("status").find(" radio unknown ") != std::string::npos);
+  session.status.radio = {{19, 6, 1}, -62};
+  CHECK(session.ask("status").find(" radio 19.6.1 -62 dBm ") != std::string::npos);
+  session.status.radio.rssi_dbm = 0;
+  CHECK(session.ask("status").find(" radio 19.6.1 recoveries ") != std::string::npos);
+}
+
+TEST_CASE("a version is three numbers, whatever follows") {
+  const struct {
+    const char* text;
+    uint8_t version[3];
+  } versions[] = {{"19.6.1", {19, 6, 1}}, {"19.5.4 Ver 2", {19, 5, 4}}, {"0.0.0", {0, 0, 0}},
+                  {"19.6", {0, 0, 0}},    {"", {0, 0, 0}},              {"19.256.1", {0, 0, 0}},
+                  {"19..1", {0, 0, 0}},   {"v19.6.1", {0, 0, 0}}};
+  for (const auto& known : versions) {
+    CAPTURE(known.text);
+    uint8_t version[3] = {9, 9, 9};
+    parse_version(known.text, version);
+    CHECK(memcmp(version, known.version, sizeof version) == 0);
+  }
+}
+
 TEST_CASE("help names every command") {
   Session session;
   const std::string help = session.ask("help");
   for (const char* command :
-       {"id", "show", "status", "device", "key", "name", "network", "password", "port", "fusion", "axes",
-        "save", "forget", "prove", "strobe", "calibration save", "restart"})
+       {"id", "show", "status", "device", "key", "name", "network", "password", "port", "fusion",
+        "crystal", "axes", "save", "forget", "prove", "strobe", "calibration save", "restart"})
     CHECK(help.find(command) != std::string::npos);
   CHECK(help.substr(help.size() - 7) == "restart");
 }

@@ -22,7 +22,7 @@ Settings full() {
   memset(settings.network, 'n', kLongestNetwork);
   memset(settings.password, 'p', kLongestPassword);
   settings.port = 65535;
-  settings.imu = {Fusion::kNdof, 0x21, 0x04};
+  settings.imu = {Fusion::kNdof, 0x21, 0x04, true};
   return settings;
 }
 
@@ -49,7 +49,20 @@ TEST_CASE("settings come back as they were saved, at their longest") {
   CHECK(settings.imu.fusion == Fusion::kNdof);
   CHECK(settings.imu.axis_map == 0x21);
   CHECK(settings.imu.axis_sign == 0x04);
+  CHECK(settings.imu.has_crystal);
   CHECK(settings.is_provisioned());
+}
+
+TEST_CASE("a record from before there was a crystal to set is read as it was") {
+  fakes::FakeFlash with, without;
+  Settings settings = full();
+  save_settings(with, settings);
+  settings.imu.has_crystal = false;
+  save_settings(without, settings);
+  CHECK(with.records.begin()->second.size() == without.records.begin()->second.size());
+  REQUIRE(load_settings(without, settings));
+  CHECK_FALSE(settings.imu.has_crystal);
+  CHECK(settings.imu.fusion == Fusion::kNdof);
 }
 
 TEST_CASE("a fresh board has the defaults and no owner") {

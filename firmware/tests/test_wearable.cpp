@@ -126,3 +126,49 @@ TEST_CASE("two power-ons never have the same boot nonce") {
   stage.switch_on();
   CHECK(stage.wearable->status().boot_nonce != first);
 }
+
+TEST_CASE("crystal, old radio and signal stand in the flags of hello and readings; what is unknown does not") {
+  const struct {
+    Radio radio;
+    uint8_t flags;
+  } radios[] = {{{}, 0},
+                {{{19, 6, 1}, -62}, 7 << wire::kSignalShift},
+                {{{19, 6, 1}, -60}, 8 << wire::kSignalShift},
+                {{{19, 5, 4}, -127}, 1 << wire::kSignalShift},
+                {{{19, 5, 3}, -10}, wire::kRadioIsOld | 15 << wire::kSignalShift},
+                {{{19, 4, 200}, 0}, wire::kRadioIsOld}};
+  for (const auto& known : radios) {
+    CAPTURE(known.radio.rssi_dbm);
+    Stage stage;
+    stage.wifi.told = known.radio;
+    Settings settings = provisioned();
+    settings.imu.has_crystal = true;
+    stage.provision_and_switch_on(settings);
+    stage.run(3 * kSecond);
+    REQUIRE(stage.is_linked());
+    REQUIRE(!stage.hellos.empty());
+    REQUIRE(!stage.readings.empty());
+    const auto expected = static_cast<uint8_t>(known.flags | wire::kHasCrystal);
+    CHECK(stage.hellos.back().flags == expected);
+    CHECK(stage.readings.back().flags == expected);
+    CHECK(stage.wearable->status().radio.rssi_dbm == known.radio.rssi_dbm);
+  }
+}
+
+TEST_CASE("a crystal that is set later is told to a chip that fuses already") {
+  Stage stage;
+  stage.provision_and_switch_on();
+  stage.run(3 * kSecond);
+  REQUIRE(stage.imu.trigger() == 0);
+  stage.serial.is_open = true;
+  stage.run(kSecond);
+  CHECK(stage.ask("set crystal yes") == "ok");
+  CHECK(stage.ask("save") == "ok saved");
+  stage.run(3 * kSecond);
+  CHECK(stage.imu.trigger() == 0x80);
+  CHECK(stage.ask("set crystal no") == "ok");
+  CHECK(stage.ask("save") == "ok saved");
+  stage.run(3 * kSecond);
+  CHECK(stage.imu.trigger() == 0);
+}
+

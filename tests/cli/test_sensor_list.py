@@ -42,6 +42,18 @@ def test_the_table_has_everything_that_the_box_knows(box: RunningBox, bunraku: C
     assert "Its firmware is older." in first
 
 
+def test_newer_wearables_tell_their_signal(tmp_path: Path, bunraku: Command) -> None:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist"])
+    box = RunningBox(tmp_path)
+    box.report_sensors([LEFT._replace(flags=IS_NDOF | 8 | 5 << 4)], lambda _: "", time.monotonic())
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "signal" in out and "-70 dBm" in out
+    out, _ = bunraku("sensors", "--json", "--box", box.box_file)
+    (sensor,) = json.loads(out)["sensors"]
+    assert (sensor["signal_dbm"], sensor["has_crystal"]) == (-70, True)
+    box.close()
+
+
 def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
     line = RosterLine(
         *("a-name-of-24-letters-abc", "1a2b3c4d", "linked", "192.168.100.107:23900", 50.0, 0.5, 0.2, 0.7),

@@ -165,6 +165,18 @@ def test_a_genuine_packet_with_any_payload_never_raises() -> None:
     assert "tag" not in counted
 
 
+def test_what_a_wearable_tells_about_its_radio_stands_in_its_flags() -> None:
+    box = Box()
+    sensor = box.pair()
+    for flags, dbm in ((0, None), (0x10, -86), (0x70 | wire.IS_NDOF, -62), (0xF0, -30)):
+        box.hear(sensor.reading(flags=flags))
+        (state,) = [one for one in box.link.states(box.now) if one.name == "left-wrist"]
+        assert wire.signal_dbm(state.flags) == dbm and not state.complaint
+    box.hear(sensor.reading(flags=0x70 | wire.RADIO_IS_OLD))
+    (state,) = [one for one in box.link.states(box.now) if one.name == "left-wrist"]
+    assert "left-wrist has firmware older than 19.5.4" in state.complaint
+
+
 def test_who_sends_what_is_none_of_ours_is_told_by_name() -> None:
     box = Box()
     sensor = box.pair()

@@ -11,12 +11,13 @@ from rich.text import Text
 
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.state import LOW_BATTERY
-from appliance.sensor.wire import BATTERY_UNKNOWN, HAS_PROFILE, IS_NDOF
+from appliance.sensor.wire import BATTERY_UNKNOWN, HAS_CRYSTAL, HAS_PROFILE, IS_NDOF, signal_dbm
 from appliance.show_control.sensor_roster import UNKNOWN_S, RosterLine
 
 HIGH_LOSS = 0.05
 HIGH_ROUND_TRIP_S = 0.1
 OLD_S = 0.5
+WEAK_DBM = -75
 _COLOURS = {"linked": "green", "greeted": "yellow", "lost": "bold red", "absent": "dim"}
 _NEUTRAL_COLOURS = {"wanted": "yellow", "assumed": "yellow"}
 _ANY_WIDTH = 1000
@@ -43,7 +44,10 @@ class SensorTable:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         unbounded = options.update_width(_ANY_WIDTH)
         columns = [_NAME]
+        tells_signal = any(signal_dbm(line.flags) is not None for line in self._lines)
         for column in _COLUMNS:
+            if column is _SIGNAL and not tells_signal:  # older wearables do not
+                continue
             wider = self._table([*columns, column])
             if console.measure(wider, options=unbounded).maximum > options.max_width and len(columns) > 1:
                 yield self._table(columns)
@@ -91,7 +95,13 @@ def plain_values(line: RosterLine) -> dict[str, object]:
         "imu": line.imu_id or None,
         "neutral": line.neutral or None,
         "complaint": line.complaint or None,
-    }
+    } | _told_by_newer(line)
+
+
+def _told_by_newer(line: RosterLine) -> dict[str, object]:
+    """What older wearables do not tell."""
+    dbm = signal_dbm(line.flags)
+    return {} if dbm is None else {"signal_dbm": dbm, "has_crystal": bool(line.flags & HAS_CRYSTAL)}
 
 
 def _bare_table() -> Table:
@@ -144,6 +154,12 @@ def _battery(line: RosterLine) -> Text:
     return Text(f"{line.battery} %", style="bold red" if line.battery < LOW_BATTERY else "")
 
 
+def _signal(line: RosterLine) -> Text:
+    """Of its Wi-Fi, when it was joined."""
+    dbm = signal_dbm(line.flags)
+    return _NONE if dbm is None else Text(f"{dbm} dBm", style="yellow" if dbm < WEAK_DBM else "")
+
+
 def _calibration(line: RosterLine) -> Text:
     if line.age_s < 0:
         return _NONE
@@ -163,6 +179,7 @@ class _Column(NamedTuple):
 
 
 _NAME = _Column("name", lambda line: Text(line.name, style="bold"))
+_SIGNAL = _Column("signal", _signal, "right")
 _COLUMNS = (
     _Column("state", lambda line: Text(line.state, style=_COLOURS.get(line.state, ""))),
     _Column("rate", _rate, "right"),
@@ -170,6 +187,7 @@ _COLUMNS = (
     _Column("round trip", _round_trip, "right"),
     _Column("age", _age, "right"),
     _Column("battery", _battery, "right"),
+    _SIGNAL,
     _Column("calibration", _calibration),
     _Column("neutral", lambda line: Text(line.neutral, style=_NEUTRAL_COLOURS.get(line.neutral, ""))),
     _Column("firmware", lambda line: Text(line.firmware) if line.firmware else _NONE),

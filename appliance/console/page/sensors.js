@@ -58,6 +58,7 @@ function fill(card, sensor, words) {
     ["loss", `${number(100 * sensor.loss, 1)} %`],
     ["round_trip", sensor.round_trip_s >= 0 ? `${number(1000 * sensor.round_trip_s, 1)} ms` : "–"],
     ["battery", battery],
+    ["signal", sensor.flags >> 4 ? `${4 * (sensor.flags >> 4) - 90} dBm` : words("unknown_value")], // docs/wire.md
     ["calibration", words("of_three", { gyro: grades[1], accel: grades[2] })],
     ["neutral_pose", hasWords(`neutral_${sensor.neutral}`) ? words(`neutral_${sensor.neutral}`) : sensor.neutral || words("not_worn")],
     ["way", sensor.way || "–"],

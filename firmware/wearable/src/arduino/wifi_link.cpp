@@ -3,6 +3,8 @@
 
 #include <Arduino.h>
 
+#include "../core/line_parsing.h"
+
 namespace bunraku {
 namespace {
 
@@ -38,8 +40,19 @@ bool WifiLink::join(const char* network, const char* password) {
     return false;
   }
   failed_joins_ = 0;
+  ask_radio();
   WiFi.noLowPowerMode();  // power save would hold packets back for up to a beacon interval, 100 ms
   return true;
+}
+
+// RSSI() waits for the module, up to a second: only while joining, which blocks anyway.
+void WifiLink::ask_radio() {
+  radio_ = Radio();
+  const char* version = WiFi.firmwareVersion();
+  if (version == nullptr || !parse_version(version, radio_.firmware)) return;
+  const int32_t rssi_dbm = WiFi.RSSI();
+  board_.feed_watchdog();
+  if (rssi_dbm >= INT8_MIN && rssi_dbm < 0) radio_.rssi_dbm = static_cast<int8_t>(rssi_dbm);
 }
 
 void WifiLink::leave() {

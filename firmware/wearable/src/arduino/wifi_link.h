@@ -18,12 +18,15 @@ class WifiLink final : public DatagramLink {
   bool send(const Address& to, const uint8_t* data, uint16_t count) override;
   bool broadcast(uint16_t port, const uint8_t* data, uint16_t count) override;
   uint16_t receive(uint8_t* data, uint16_t room, Address& from) override;
+  Radio radio() override { return radio_; }
 
  private:
   void disconnect();
+  void ask_radio();
 
   Board& board_;
   WiFiUDP udp_;
+  Radio radio_;
   uint16_t port_ = 0;
   bool is_started_ = false;  // else even status() starts the module, which blocks for about a second
   bool is_socket_lost_ = false;  // closed by the driver and not to be had again: down until the next join

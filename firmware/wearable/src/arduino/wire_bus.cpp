@@ -13,6 +13,11 @@ constexpr uint8_t kRecoveryClocks = 9;  // a byte and its acknowledge: whatever 
 constexpr unsigned kHalfClockUs = 5;
 constexpr unsigned kStretchUs = 1000;  // the longest that a released clock is waited for
 
+// limit_waits() sets registers of the board's SERCOM for Wire: of another one it would break what hangs there,
+// on the MKR1000 the Wi-Fi module (SERCOM2).
+constexpr bool is_same(const SERCOM& one, const SERCOM& other) { return &one == &other; }
+static_assert(is_same(PERIPH_WIRE, sercom0), "on this board Wire is not on SERCOM0: set limit_waits() to its own");
+
 }  // namespace
 
 void WireBus::begin() {
@@ -75,7 +80,7 @@ void WireBus::limit_waits() {
       static_cast<uint16_t>(GCLK_CLKCTRL_ID_SERCOMX_SLOW | GCLK_CLKCTRL_GEN_GCLK1 | GCLK_CLKCTRL_CLKEN);
   while (GCLK->STATUS.reg & GCLK_STATUS_SYNCBUSY) {
   }
-  auto& i2c = SERCOM2->I2CM;
+  auto& i2c = SERCOM0->I2CM;
   i2c.CTRLA.reg &= ~SERCOM_I2CM_CTRLA_ENABLE;  // the field is locked while enabled
   while (i2c.SYNCBUSY.reg & SERCOM_I2CM_SYNCBUSY_ENABLE) {
   }

@@ -8,7 +8,7 @@ namespace bunraku {
 // What does not fit is cut off.
 class Answer {
  public:
-  static constexpr uint8_t kRoom = 253;  // its end, '\0', included
+  static constexpr uint16_t kRoom = 280;  // its end, '\0', included
 
   void clear() { count_ = 0, text_[0] = '\0'; }
   Answer& add(const char* text);
@@ -16,11 +16,11 @@ class Answer {
   Answer& add_hex(const uint8_t* bytes, uint8_t count);
   Answer& add_hex(uint32_t value);  // 8 digits
   const char* text() const { return text_; }
-  uint8_t count() const { return count_; }
+  uint16_t count() const { return count_; }
 
  private:
   char text_[kRoom] = "";
-  uint8_t count_ = 0;
+  uint16_t count_ = 0;
 };
 
 }  // namespace bunraku

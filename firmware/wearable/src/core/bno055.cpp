@@ -36,6 +36,7 @@ bool is_axis_remap(uint8_t axis_map, uint8_t axis_sign) {
 }
 
 void Bno055::start(const ImuSettings& settings, uint32_t now_us) {
+  is_crystal_new_ = has_run_ && settings.has_crystal != settings_.has_crystal;
   settings_ = settings;
   if (!is_axis_remap(settings.axis_map, settings.axis_sign)) {
     settings_.axis_map = kAxisMapPlain;

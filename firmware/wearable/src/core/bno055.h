@@ -48,7 +48,8 @@ class Bno055 {
  public:
   explicit Bno055(I2cBus& bus) : bus_(bus) {}
 
-  // Power-on or settings changed. A chip that fuses already as asked goes on: its heading is kept.
+  // Power-on or settings changed. A chip that fuses already as asked goes on: its heading is kept. Another
+  // crystal than before is told to it in any case.
   // An axis remap that is none leaves the axes as they are.
   void start(const ImuSettings& settings, uint32_t now_us);
 
@@ -191,6 +192,7 @@ class Bno055 {
   bool needs_bus_recovery_ = false;
   bool wants_restore_ = false;
   bool wants_save_ = false;
+  bool is_crystal_new_ = false;  // settings have changed it, and the chip does not tell by what it runs
 };
 
 }  // namespace bunraku

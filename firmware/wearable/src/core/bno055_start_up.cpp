@@ -93,7 +93,8 @@ void Bno055::inspect() {
   if (!read(kSystemStatus, bytes, sizeof bytes)) return;
   const uint8_t status = bytes[0], error = bytes[kSystemError - kSystemStatus];
   const uint8_t* units = bytes + (kUnits - kSystemStatus);
-  is_fusion_kept_ = status == kStatusFusion && is_as_told(units, static_cast<uint8_t>(settings_.fusion));
+  is_fusion_kept_ = status == kStatusFusion && !is_crystal_new_ &&
+                    is_as_told(units, static_cast<uint8_t>(settings_.fusion));
   if (is_fusion_kept_) return go(has_id_ ? State::kAwaitData : State::kSelectIdPage);
   if (++looks_ < kMostDoubts) return;
   if (status == kStatusError) return repair_fusion(error);
@@ -166,6 +167,7 @@ void Bno055::check_settings() {
   uint8_t bytes[kAxisSign - kUnits + 1];
   if (!read(kUnits, bytes, sizeof bytes)) return;
   if (is_as_told(bytes, kConfigMode)) {
+    is_crystal_new_ = false;
     go(is_profile_known_ ? State::kWriteOffsets : State::kEnterFusion);
   } else if (++looks_ >= kMostDoubts) {
     repair(counts_.mode_refusals);

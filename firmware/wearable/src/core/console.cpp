@@ -43,6 +43,19 @@ void identify(const Status& status, uint32_t board_number, Answer& answer) {
   answer.add(" board ").add_hex(board_number);
 }
 
+void tell(const Radio& radio, Answer& answer) {
+  answer.add(" radio ");
+  if (!radio.is_known()) {
+    answer.add("unknown");
+    return;
+  }
+  answer.add_number(radio.firmware[0]).add(".").add_number(radio.firmware[1]).add(".");
+  answer.add_number(radio.firmware[2]);
+  if (radio.rssi_dbm == 0) return;
+  answer.add(radio.rssi_dbm < 0 ? " -" : " ");
+  answer.add_number(static_cast<uint32_t>(radio.rssi_dbm < 0 ? -radio.rssi_dbm : radio.rssi_dbm)).add(" dBm");
+}
+
 void tell(const Status& status, Answer& answer) {
   answer.add("ok state ").add(state_name(status.state)).add(" way ").add(lane_name(status.lane));
   answer.add(" imu ").add(status.has_imu ? "ok" : "none");
@@ -51,6 +64,7 @@ void tell(const Status& status, Answer& answer) {
     answer.add(" ").add_number(status.calibration >> shift & 3u);
   const bool is_unsaved = status.has_profile && status.is_profile_unsaved;
   answer.add(" profile ").add(is_unsaved ? "unsaved" : set_or_none(status.has_profile));
+  tell(status.radio, answer);
   answer.add(" recoveries ").add_number(status.recoveries).add(" taps ").add_number(status.taps);
   answer.add(" sent ").add_number(status.readings);
   answer.add(" skipped ").add_number(status.skipped).add(" unsent ").add_number(status.unsent);
@@ -78,7 +92,7 @@ Request Console::execute(const char* line, const Status& status, uint32_t board_
   } else if (strcmp(line, "status") == 0) {
     tell(status, answer);
   } else if (strcmp(line, "help") == 0) {
-    answer.add("ok id, show, status, set device|key|name|network|password|port|fusion|axes <value>, save, ");
+    answer.add("ok id, show, status, set device|key|name|network|password|port|fusion|crystal|axes <value>, save, ");
     answer.add("forget, prove <nonce>, strobe, calibration save, restart");
   } else {
     return request(line, answer);
@@ -114,6 +128,7 @@ void Console::show(Answer& answer) const {
   answer.add(" key ").add(set_or_none(draft_.has_key));
   answer.add(" password ").add(set_or_none(draft_.password[0] != '\0'));
   answer.add(" port ").add_number(draft_.port).add(" fusion ").add(fusion_name(draft_.imu.fusion));
+  answer.add(" crystal ").add(crystal_name(draft_.imu.has_crystal));
   answer.add(" axes ").add_hex(&draft_.imu.axis_map, 1).add(" ").add_hex(&draft_.imu.axis_sign, 1);
   answer.add(" network ").add(draft_.network);
 }

@@ -2,13 +2,15 @@
 //
 //   id                      ok bunraku-wearable 1.0.0 wire 2d20a5df imu <32 hex|none> board <8 hex>
 //   set device <8 hex>      ok            ... name <word>, key <32 hex>, network <rest of line>,
-//   set password <rest>     ok                port <n>, fusion imuplus|ndof, axes <2 hex> <2 hex>
+//   set password <rest>     ok                port <n>, fusion imuplus|ndof, crystal yes|no, axes <2 hex> <2 hex>
 //   save                    ok saved      what was set counts from now on, and after power-off
 //   show                    ok name <word|none> device <8 hex|none> key set|none password set|none port <n>
-//                           fusion imuplus|ndof axes <2 hex> <2 hex> network <rest of line, may be empty>
+//                           fusion imuplus|ndof crystal yes|no axes <2 hex> <2 hex>
+//                           network <rest of line, may be empty>
 //   forget                  ok forgotten
 //   prove <16 hex>          ok <16 hex>   BLAKE2s-8 with the key over b"prove" and the 8 bytes
 //   status                  ok state <linked|greeting|joining|unprovisioned> way <wifi|cable|none> ...
+//                           radio <version of its firmware> <-n> dBm|unknown ...
 //   strobe                  ok
 //   calibration save        ok saving ...
 //   help                    ok <commands>

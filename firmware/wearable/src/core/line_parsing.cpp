@@ -55,6 +55,24 @@ bool parse_hex(const char* text, uint8_t* bytes, uint8_t count, char end) {
   return *text == end;
 }
 
+bool parse_version(const char* text, uint8_t (&version)[3]) {
+  uint8_t parts[3];
+  for (uint8_t i = 0; i < 3; ++i) {
+    uint32_t value = 0;
+    const char* at = text;
+    for (; *at >= '0' && *at <= '9' && value <= UINT8_MAX; ++at)
+      value = value * 10 + static_cast<uint32_t>(*at - '0');
+    if (at == text || value > UINT8_MAX || (i < 2 && *at != '.')) {
+      memset(version, 0, sizeof version);
+      return false;
+    }
+    parts[i] = static_cast<uint8_t>(value);
+    text = at + 1;
+  }
+  memcpy(version, parts, sizeof version);
+  return true;
+}
+
 bool parse_port(const char* text, uint16_t& port) {
   uint32_t value = 0;
   const char* at = text;

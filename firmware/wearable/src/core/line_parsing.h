@@ -15,6 +15,7 @@ bool is_readable(const char* text);               // no control characters; lett
 
 // Exactly `count` bytes and then `end`.
 bool parse_hex(const char* text, uint8_t* bytes, uint8_t count, char end = '\0');
+bool parse_version(const char* text, uint8_t (&version)[3]);  // 19.6.1, whatever follows; else zeros
 bool parse_port(const char* text, uint16_t& port);  // 1 to 65535
 
 // `error: unknown <kind> '<first word>'; type help`; the word only if it can be no secret.

@@ -25,6 +25,14 @@ class I2cBus {
   ~I2cBus() = default;
 };
 
+// What a Wi-Fi module tells about itself.
+struct Radio {
+  uint8_t firmware[3] = {};  // its own firmware's version; zeros: unknown
+  int8_t rssi_dbm = 0;       // how strong the access point was when it was joined; 0: unknown
+
+  bool is_known() const { return (firmware[0] | firmware[1] | firmware[2]) != 0; }
+};
+
 struct Address {
   uint32_t ip;  // as the driver has it; the core only hands it back
   uint16_t port;
@@ -40,6 +48,7 @@ class DatagramLink {
   virtual bool send(const Address& to, const uint8_t* data, uint16_t count) = 0;
   virtual bool broadcast(uint16_t port, const uint8_t* data, uint16_t count) = 0;
   virtual uint16_t receive(uint8_t* data, uint16_t room, Address& from) = 0;  // 0: nothing waits
+  virtual Radio radio() { return {}; }  // as it was at the last join
 
  protected:
   ~DatagramLink() = default;

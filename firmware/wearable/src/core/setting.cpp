@@ -56,6 +56,13 @@ bool set_fusion(const char* value, Settings& settings) {
   return true;
 }
 
+bool set_crystal(const char* value, Settings& settings) {
+  const bool is_there = strcmp(value, crystal_name(true)) == 0;
+  if (!is_there && strcmp(value, crystal_name(false)) != 0) return false;
+  settings.imu.has_crystal = is_there;
+  return true;
+}
+
 bool set_axes(const char* value, Settings& settings) {
   uint8_t map, sign;
   if (!parse_hex(value, &map, 1, ' ') || !parse_hex(value + 3, &sign, 1)) return false;
@@ -76,6 +83,7 @@ constexpr struct {
                  {"password", set_password, "a password has 8 to 63 bytes, or none for an open network"},
                  {"port", set_port, "a port is 1 to 65535"},
                  {"fusion", set_fusion, "fusion is imuplus or ndof"},
+                 {"crystal", set_crystal, "crystal is yes or no: a 32 kHz crystal beside the BNO055"},
                  {"axes", set_axes, "axes are a turn of the BNO055's axes as two registers, as in: 24 00"}};
 
 }  // namespace
@@ -94,5 +102,7 @@ void change_setting(const char* what, Settings& settings, Answer& answer) {
 }
 
 const char* fusion_name(Fusion fusion) { return fusion == Fusion::kNdof ? "ndof" : "imuplus"; }
+
+const char* crystal_name(bool has_crystal) { return has_crystal ? "yes" : "no"; }
 
 }  // namespace bunraku

@@ -10,5 +10,6 @@ namespace bunraku {
 void change_setting(const char* what, Settings& settings, Answer& answer);
 
 const char* fusion_name(Fusion fusion);
+const char* crystal_name(bool has_crystal);
 
 }  // namespace bunraku

@@ -11,6 +11,7 @@ namespace {
 enum Slot : uint8_t { kSettingsSlot, kProfileSlot, kCountSlot, kOtherCountSlot };
 
 constexpr uint8_t kRecordVersion = 1;
+constexpr uint8_t kCrystal = 0x80;  // beside the fusion mode, which has four bits: older records have it unset
 constexpr uint8_t kEnvelopeBytes = 1 + kCrcBytes;
 constexpr uint8_t kSettingsBytes =
     kLongestName + 4 + 1 + wire::kKeyBytes + kLongestNetwork + kLongestPassword + 2 + 3;
@@ -93,6 +94,8 @@ bool load_settings(FlashStore& flash, Settings& settings) {
   wire::get(at, settings.imu.axis_map);
   wire::get(at, settings.imu.axis_sign);
   settings.has_key = has_key != 0;
+  settings.imu.has_crystal = (fusion & kCrystal) != 0;
+  fusion = static_cast<uint8_t>(fusion & ~kCrystal);
   settings.imu.fusion = fusion == static_cast<uint8_t>(Fusion::kNdof) ? Fusion::kNdof : Fusion::kImuPlus;
   return true;
 }
@@ -107,7 +110,8 @@ bool save_settings(FlashStore& flash, const Settings& settings) {
   put_bytes(at, settings.network, kLongestNetwork);
   put_bytes(at, settings.password, kLongestPassword);
   wire::put(at, settings.port);
-  wire::put(at, static_cast<uint8_t>(settings.imu.fusion));
+  const uint8_t crystal = settings.imu.has_crystal ? kCrystal : uint8_t{0};
+  wire::put(at, static_cast<uint8_t>(static_cast<uint8_t>(settings.imu.fusion) | crystal));
   wire::put(at, settings.imu.axis_map);
   wire::put(at, settings.imu.axis_sign);
   return record.save(flash, kSettingsSlot);

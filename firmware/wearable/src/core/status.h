@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include "pairing.h"
+#include "ports.h"
 
 namespace bunraku {
 
@@ -22,6 +23,7 @@ struct Status {
   bool has_profile = false;
   bool is_profile_unsaved = false;  // in use, but the flash did not take it
   bool is_light_on = false;
+  Radio radio;              // at the last join
   uint8_t imu_id[16] = {};
   uint32_t boot_nonce = 0;
   uint32_t session = 0;

@@ -14,7 +14,23 @@ constexpr uint32_t kSecondUs = 1'000'000;
 constexpr uint32_t kImuStartsUs = 10'000;  // its wait for the chip begins, and passes during the first join
 constexpr uint32_t kImuFirstMs = 2'000;
 constexpr uint32_t kConsoleFirstUs = 10'000'000;  // after a hang: time to open the port, before the next one
+constexpr uint8_t kSoundFirmware[] = {19, 5, 4};  // an older radio hangs at an empty datagram from anyone
 constexpr uint32_t kUnlinkedForSavingUs = 30'000'000;  // then no dance is running: the heading may be lost
+
+bool is_older(const uint8_t (&version)[3], const uint8_t (&other)[3]) {
+  return memcmp(version, other, sizeof version) < 0;
+}
+
+// What of it has room in a packet's flags: old firmware, and how strong the access point was, 4 dB a step.
+uint8_t radio_flags(const Radio& radio) {
+  if (!radio.is_known()) return 0;
+  const uint8_t old = is_older(radio.firmware, kSoundFirmware) ? wire::kRadioIsOld : uint8_t{0};
+  if (radio.rssi_dbm == 0) return old;
+  int steps = (radio.rssi_dbm - wire::kWeakestDbm + 2) / wire::kDbmAStep;
+  if (steps < 1) steps = 1;
+  if (steps > wire::kMostSteps) steps = wire::kMostSteps;
+  return static_cast<uint8_t>(old | steps << wire::kSignalShift);
+}
 
 }  // namespace
 
@@ -165,7 +181,9 @@ Condition Wearable::condition() const {
   Condition now = {};
   now.battery = battery_.percent();
   now.flags = static_cast<uint8_t>((imu_.has_profile() ? wire::kHasProfile : 0) |
-                                   (settings_.imu.fusion == Fusion::kNdof ? wire::kIsNdof : 0));
+                                   (settings_.imu.fusion == Fusion::kNdof ? wire::kIsNdof : 0) |
+                                   (settings_.imu.has_crystal ? wire::kHasCrystal : 0) |
+                                   radio_flags(status_.radio));
   now.taps = status_.taps;
   now.recoveries = imu_.recoveries();
   if (imu_.has_id()) memcpy(now.imu_id, imu_.unique_id(), sizeof now.imu_id);

@@ -20,7 +20,7 @@ constexpr uint32_t kStrobeUs = 10'000'000;
 constexpr uint32_t kSavingUs = 2'000'000;
 constexpr char kLineEnd[] = "\r\n";
 constexpr uint8_t kLineEndBytes = sizeof kLineEnd - 1;
-constexpr uint8_t kLongestAnswer = Answer::kRoom + kLineEndBytes;
+constexpr uint16_t kLongestAnswer = Answer::kRoom + kLineEndBytes;
 
 }  // namespace
 
@@ -119,7 +119,8 @@ void Wearable::adopt(const Settings& settings, uint32_t now_us) {
                                strcmp(settings.password, settings_.password) == 0;
   const ImuSettings& imu = settings.imu;
   const bool is_same_imu = imu.fusion == settings_.imu.fusion && imu.axis_map == settings_.imu.axis_map &&
-                           imu.axis_sign == settings_.imu.axis_sign;
+                           imu.axis_sign == settings_.imu.axis_sign &&
+                           imu.has_crystal == settings_.imu.has_crystal;
   settings_ = settings;
   if (is_socket_open_ && !is_same_network) leave_network();
   start_pairing();
@@ -174,6 +175,7 @@ void Wearable::join() {
   const bool is_joined = ports_.wifi.join(settings_.network, settings_.password);  // (blocks, up to 10 s)
   ports_.board.feed_watchdog();
   is_radio_in_doubt_ = false;
+  if (is_joined) status_.radio = ports_.wifi.radio();
   is_socket_open_ = is_joined && ports_.wifi.open(kOwnPort);  // (blocks, up to 2 s)
   if (is_joined && !is_socket_open_) ports_.wifi.leave();
   const uint32_t now_us = ports_.clock.micros();

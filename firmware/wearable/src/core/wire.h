@@ -18,6 +18,9 @@ constexpr uint8_t kLargest = 66;
 constexpr uint8_t kBatteryUnknown = 255;
 constexpr uint16_t kRoundTripUnknown = 65535;
 constexpr uint8_t kHasProfile = 1, kIsNdof = 2;  // bits of `flags`
+constexpr uint8_t kRadioIsOld = 4, kHasCrystal = 8;
+constexpr uint8_t kSignalShift = 4, kMostSteps = 15;  // its upper bits
+constexpr int8_t kWeakestDbm = -90, kDbmAStep = 4;
 enum Led : uint8_t { kLedOff, kLedOn, kLedSlow, kLedFast, kLedStrobe };
 
 inline void put(uint8_t*& at, uint8_t value) { *at++ = value; }
@@ -76,7 +79,7 @@ struct Hello {
   uint8_t firmware_minor;
   uint8_t firmware_patch;
   uint8_t battery;  // percent; 255 unknown
-  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF)
+  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF); bit 2: the radio's own firmware is older than 19.5.4; bit 3: a crystal for the BNO055; bits 4 to 7: n > 0: the Wi-Fi had 4 n - 90 dBm when it was joined
   uint8_t imu_id[16];  // unique id of the BNO055; its calibration is kept under it
 
   void write(uint8_t* at) const {
@@ -136,7 +139,7 @@ struct Reading {
   uint16_t round_trip;  // newest round trip by a heartbeat's echo, 0.1 ms; 65535 unknown
   uint8_t taps;  // counts double taps since power-on; wraps
   uint8_t recoveries;  // counts restarts of the BNO055 since power-on; wraps; its heading is lost
-  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF)
+  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF); bit 2: the radio's own firmware is older than 19.5.4; bit 3: a crystal for the BNO055; bits 4 to 7: n > 0: the Wi-Fi had 4 n - 90 dBm when it was joined
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
