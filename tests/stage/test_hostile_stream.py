@@ -51,7 +51,7 @@ def test_whatever_a_live_stream_sends_no_frame_is_impossible(tmp_path: Path, cha
             heard += night.tick.live_heard is not None
             for numbers in (first.frame.positions, first.frame.pose, first.frame.world, first.frame.root):
                 assert np.isfinite(numbers).all()
-            assert np.abs(first.frame.positions[0] - before[0]).max() < 0.8  # the hips, within a tick
+            assert np.abs(first.frame.positions[0] - before[0]).max() < 2.0  # it is turned upside down
             before = first.frame.positions.copy()
     assert heard > 200
     assert first.figures_refused == 0
