@@ -14,6 +14,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from appliance.pose.file_trouble import sentence
+from appliance.pose.idle_options import refuse_idle
 from hw_sim import motions
 from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
 from hw_sim.device import Lane
@@ -42,6 +43,7 @@ class NetworkKind(StrEnum):
 
 @app.command()
 def emulate(
+    context: typer.Context,
     sensor: Annotated[
         list[str] | None,
         typer.Option(
@@ -129,9 +131,15 @@ def emulate(
             case _:
                 return motions.still()
 
+    if serial is None:
+        refuse_idle(context, ("baud",), "without --serial")
+    else:
+        refuse_idle(context, ("host", "port"), "with --serial")
     try:
         wanted = [name_and_motion(words) for words in sensor or []]
         kinds = dict(wanted)
+        if MotionKind.trace not in (motion, *kinds.values()):
+            refuse_idle(context, ("trace", "joint"), "without the motion 'trace'")
         chosen = choose_keys(
             keys, [name for name, _ in wanted], count, lambda words: typer.echo(words, err=True)
         )

@@ -25,6 +25,7 @@ from appliance.cli.examples import ORDER, OTHER_WORDS  # noqa: E402
 from appliance.cli.help_page import give_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
 from appliance.pose.file_trouble import sentence  # noqa: E402
+from appliance.pose.idle_options import refuse_idle  # noqa: E402
 from appliance.show.config_error import ConfigError, nearest  # noqa: E402
 
 PLUG_INS = "bunraku.commands"
@@ -96,6 +97,7 @@ def _ending(command: Callable[..., int | None]) -> Callable[..., None]:
 
 
 def play(
+    context: typer.Context,
     show: ShowFolder = None,
     box: BoxFile = None,
     seconds: Annotated[
@@ -126,6 +128,8 @@ def play(
     """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
     from appliance.cli.play import play_show
 
+    if alone:
+        refuse_idle(context, ("window",), "with --alone, which starts no projector")
     return play_show(show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse, chosen, cue)
 
 

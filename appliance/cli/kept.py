@@ -11,12 +11,14 @@ from appliance.cli.options import BoxFile, ShowFolder
 from appliance.dancer.material.material_file import SUFFIX, parsed_recipe, read_material
 from appliance.dancer.phrase import FPS, X, Z
 from appliance.generator.kept_motions import FOLDER
+from appliance.pose.idle_options import refuse_idle
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.config_error import did_you_mean
 
 
 def kept(
+    context: typer.Context,
     name: Annotated[str | None, typer.Argument(help="A kept motion; left out: all are listed.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write it there: .bvh, .glb, .npz or .csv. Default: NAME.bvh.")
@@ -36,6 +38,8 @@ def kept(
     from appliance.show.bundle import default_show_path
     from appliance.show.show import load_show
 
+    if name is None:
+        refuse_idle(context, ("out",), "without the NAME of a motion")
     show, box = pair_here(show, box)
     skeleton, state = load_show(show or default_show_path()).skeleton, load_box(box).state_folder
     if state is None:

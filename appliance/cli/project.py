@@ -17,6 +17,7 @@ from appliance.box.notify import Notifier
 from appliance.box.parent_death import was_told
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.options import BoxFile, ChosenFile
+from appliance.pose.idle_options import refuse_idle
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
 from appliance.projector.raw_stream import take_over_stdout
 from appliance.projector.run import Options, Run
@@ -30,6 +31,7 @@ _LOOK_S = 0.25
 
 
 def project(
+    context: typer.Context,
     box: BoxFile = None,
     window: Annotated[bool, typer.Option("--window", help="In a window, for a rehearsal.")] = False,
     fullscreen: Annotated[bool, typer.Option("--fullscreen", help="On the whole display.")] = False,
@@ -55,6 +57,8 @@ def project(
 ) -> int:
     """Show what the stage dances, on a projector: before it starts, while it dances and when it is back."""
     options = parse_options(window, fullscreen, offscreen, frames, seconds, info)
+    if not raw and frames is None:
+        refuse_idle(context, ("key",), "without --raw or --frames")
     if raw and (offscreen is None or sys.stdout.isatty()):
         raise typer.BadParameter(
             "--raw needs --offscreen WIDTHxHEIGHT and a pipe: its pictures are no text. "
