@@ -12,7 +12,7 @@ import numpy as np
 
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import content, plain_json, require_inside
-from appliance.pose.possible import FASTEST_M_S, impossible_frames
+from appliance.pose.possible import FARTHEST_M, FASTEST_M_S, impossible_frames
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import (
@@ -108,6 +108,7 @@ def _show(directory: Path) -> Iterator[Finding]:
     except ConfigError as error:
         yield from map(_error, error.problems)
         return
+    yield from _bones(show)
     joints, complaints = inspect_network(show.network, show.skeleton.names)
     for message, cure in complaints:
         yield Finding(show.network, 0, message, cure)
@@ -120,6 +121,15 @@ def _show(directory: Path) -> Iterator[Finding]:
         yield Finding(problem.file, problem.line, problem.message, problem.cure, "warning")
     for name, path in show.phrases.items():
         yield from _phrase(show, name, path)
+
+
+def _bones(show: Show) -> Iterator[Finding]:
+    """Bones that are longer than any stage: their figure would never leave the box."""
+    for joint, offset in zip(show.skeleton.names, show.skeleton.offsets, strict=True):
+        if not np.abs(offset).max() <= FARTHEST_M:
+            message = f"The joint '{joint}' is {np.abs(offset).max():.3g} m from the one above it."
+            cure = "Mend its OFFSET, and pack the phrases with that skeleton."
+            yield Finding(show.directory / "skeleton.bvh", 0, message, cure)
 
 
 def _phrase(show: Show, name: str, path: Path) -> Iterator[Finding]:

@@ -167,6 +167,17 @@ def test_a_phrase_of_another_skeleton_is_refused(bundle: Path) -> None:
     assert "not as long as those" in only(bundle).message
 
 
+@pytest.mark.parametrize("far", [2e3, 1e30])
+def test_a_bone_longer_than_any_stage_is_refused_by_its_name(bundle: Path, far: float) -> None:
+    bones = skeleton()
+    bones.offsets[2, 0] = far
+    for name, frames in (("skeleton", 1), ("phrase", 60)):
+        write_bvh(bundle / f"{name}.bvh", recording(frames, bones))
+    finding = only(bundle)
+    assert (finding.level, finding.file.name) == ("error", "skeleton.bvh")
+    assert f"'{bones.names[2]}'" in finding.message
+
+
 def test_a_phrase_at_another_rate_is_a_warning(bundle: Path) -> None:
     write_bvh(bundle / "phrase.bvh", recording(60, fps=60.0))
     finding = only(bundle)
