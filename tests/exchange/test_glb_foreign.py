@@ -131,7 +131,7 @@ HAT = {"name": "Hat", "translation": [1, 1, 1]}
         ([{"joints": [5], "name": "Hat"}, {"joints": [1, 2, 3, 4]}], (HAT,), None, ALL, "out: Hat (1 joint)"),
         ([{"joints": [2, 3], "name": "Face"}, {"joints": [1, 2, 3, 4]}], (), "face", ("Chest", "Head"), ""),
         ([{"joints": [2, 3]}, {"joints": [1, 2, 3, 4]}], (), "0", ("Chest", "Head"), ""),
-        ([{"joints": [3]}, {"joints": [1, 4]}], ({"name": "Kilt", "skin": 1},), "kilt", ("Hips", "LeftLeg"), ""),
+        ([{"joints": [3]}, {"joints": [2]}], ({"name": "Vest", "skin": 1},), "vest", ("Chest",), ""),
     ],
 )  # fmt: skip
 def test_all_skins_of_a_figure_are_read_and_others_are_named(
