@@ -132,8 +132,16 @@ class CommandHandler:
             except ValueError as error:
                 self._reply(asker, address, False, str(error))
             except Exception as error:
-                self._note_failure(address, error, now)
+                self.note_failure(address, error, now)
                 self._reply(asker, address, False, COMMAND_FAILED.words)
+
+    def note_failure(self, address: str, error: Exception, now: float) -> None:
+        """An error of this program, in a command or between two (""), ends no process on which PANIC hangs."""
+        about = readable(address[:LONGEST_NAME])
+        self.failed += 1
+        self.failure = readable(f"{about} {type(error).__name__}: {error}".lstrip())
+        self._observer.own.count(COMMAND_FAILED.name, now)
+        self._observer.own.concern(COMMAND_FAILED.name, filter(None, [about]))
 
     def follow_stage(self, now: float) -> None:
         """What has to be done without any command; call it often."""
@@ -260,13 +268,6 @@ class CommandHandler:
         missing = self._live.partial(now) if self._takes_live else ""
         self._observer.own.set(LIVE_PARTIAL.name, bool(missing))
         self._observer.own.concern(LIVE_PARTIAL.name, filter(None, [missing]))
-
-    def _note_failure(self, address: str, error: Exception, now: float) -> None:
-        """An error of this program ends no process on which PANIC hangs."""
-        self.failed += 1
-        self.failure = readable(f"{address[:LONGEST_NAME]}: {type(error).__name__}: {error}")
-        self._observer.own.count(COMMAND_FAILED.name, now)
-        self._observer.own.concern(COMMAND_FAILED.name, [readable(address[:LONGEST_NAME])])
 
     def _refuse(self, reason: str) -> None:
         self.refused += 1

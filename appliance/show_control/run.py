@@ -104,6 +104,18 @@ class ControlProcess:
             if (found := self._intake.take_live()) is None:
                 break
             self.handler.handle_datagram(*found, self._monotonic())
+        try:
+            self._look_after()
+        except Exception as error:  # whatever the others publish: PANIC is heard
+            self.handler.note_failure("", error, self._monotonic())
+            time.sleep(_REST_S)
+        if words := self._failures(self._monotonic()):
+            self._say(words)
+        if taken == _AT_ONCE:
+            time.sleep(_REST_S)
+
+    def _look_after(self) -> None:
+        """What is due without any datagram."""
         self._dispatch.exchange(self._monotonic())
         now = self._monotonic()
         self._count(now)
@@ -111,12 +123,9 @@ class ControlProcess:
         self._health.publish_health(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)
-        news = self.port.news(now), self._failures(now), self._news.look(self.handler.show_state, now)
-        for words in news:
+        for words in (self.port.news(now), self._news.look(self.handler.show_state, now)):
             if words:
                 self._say(words)
-        if taken == _AT_ONCE:
-            time.sleep(_REST_S)
 
     def _count(self, now: float) -> None:
         """Tell of what came to the port and was not heard."""
@@ -133,7 +142,7 @@ class ControlProcess:
         if failed == self._failures_said or now < self._failures_said_at + _SAY_EVERY_S:
             return ""
         self._failures_said, self._failures_said_at = failed, now
-        return f"A command ended in an error of this program ({failed} so far): {self.handler.failure}"
+        return f"Show control met an error of this program ({failed} so far): {self.handler.failure}"
 
     def _answer(self, asker: Address, message: Message) -> None:
         """To the sender of a command, and to every listener that waits for replies elsewhere."""

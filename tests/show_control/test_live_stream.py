@@ -131,6 +131,20 @@ def test_an_error_of_this_program_ends_no_process_and_is_told_at_a_limited_rate(
     assert failed is not None and (failed.times, failed.active, failed.about) == (3, True, "/master")
 
 
+def test_what_the_stage_publishes_cannot_end_show_control(
+    process: ControlProcess, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(process.handler, "follow_stage", lambda now: 1 / 0)
+    with closing(Asker(process.port.number)) as asker:
+        for _ in range(3):
+            asker.tell("/panic")
+            process.turn()
+            heard = asker.hear()
+            assert heard is not None and heard[:3] == ["/reply", "/panic", 1]
+    failed = of(process, "command-failed", clock.now)
+    assert failed is not None and failed.times == 3
+
+
 def test_a_stream_is_no_command_waits_by_itself_and_what_gives_way_is_told(
     process: ControlProcess, clock: Clock
 ) -> None:
