@@ -96,7 +96,7 @@ class RingFileWriter:
             failing.callback(os.close, descriptor)
             os.posix_fallocate(descriptor, 0, size)
             memory = _mapped(descriptor, size)
-            memory[:] = self._memory[:]
+            memory[:] = memoryview(self._memory)  # no third copy: the stage waits for it
             temporary.rename(self._path)
             failing.pop_all()
         for ring in self.rings:

@@ -12,6 +12,7 @@ import pytest
 
 from appliance.box.block import BlockReader, BlockWriter
 from appliance.box.runtime_folder import AlreadyHereError, Claim, kept_file, renew_lost
+from appliance.recorder.reading import read_journal
 from appliance.show_control.orders import Order, OrderInbox, OrderSender
 from tests.bundles import write_show
 from tests.console.page import box_with_page
@@ -82,7 +83,7 @@ def test_a_folder_that_is_deleted_comes_back_and_commands_with_it(tmp_path: Path
     with box_with_page(show, tmp_path, *night, has_sensors=False) as (box, page):
         page.unlock()
         assert page.command("/panic").value["done"]
-        shutil.rmtree(box.runtime)
+        shutil.rmtree(box.runtime, ignore_errors=True)  # meanwhile it may be there again
         wait_until(lambda: (box.runtime / "frame").exists() and (box.runtime / "control.health").exists())
         wait_until(lambda: "was deleted" in box.words)
         wait_until(lambda: any(one["name"] == "folder-lost" for one in page.status()["fallbacks"]))
@@ -95,3 +96,7 @@ def test_a_folder_that_is_deleted_comes_back_and_commands_with_it(tmp_path: Path
         box.pause()
         time.sleep(0.1)
         assert box.frames(5)
+        assert box.end() == 0
+    (run,) = read_journal(tmp_path / "night").runs
+    ticks, skipped = run.ticks["tick"].astype(int), int(run.ticks["skipped"].sum())
+    assert ticks[-1] - ticks[0] + 1 - len(ticks) == skipped, "the journal lost no tick that was danced"
