@@ -136,7 +136,7 @@ class CommandHandler:
                 self._reply(asker, address, False, COMMAND_FAILED.words)
 
     def note_failure(self, address: str, error: Exception, now: float) -> None:
-        """An error of this program, in a command or between two (""), ends no process on which PANIC hangs."""
+        """An error of this program, in a command or between two (""): the process goes on, it hears PANIC."""
         about = readable(address[:LONGEST_NAME])
         self.failed += 1
         self.failure = readable(f"{about} {type(error).__name__}: {error}".lstrip())
