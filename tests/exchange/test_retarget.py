@@ -8,10 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.cli.pictures import load_dance
 from appliance.exchange.formats import read_as_told
 from appliance.exchange.retargeting import leg_m, lowest_m, retarget
-from appliance.pose.bvh import write_bvh
+from appliance.pose import quaternion
+from appliance.pose.body_facts import fronts
+from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.quaternion import Array
+from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.stage_frame import in_stage_frame
 from tests.command import Command
@@ -70,3 +74,26 @@ def test_the_command_writes_it_and_refuses_unknown_names(tmp_path: Path, bunraku
     refused = bunraku("retarget", phrase, "--to", other, "--out", tmp_path / "no.bvh", status=2)
     assert "no joint that is known as" in refused.err
     assert not (tmp_path / "no.bvh").exists()
+
+
+def test_every_command_turns_a_dance_as_inspect_says(tmp_path: Path, bunraku: Command) -> None:
+    dance = dance_of("Mixamo", seconds=2.0)
+    half = quaternion.from_axis_angle([0.0, 1.0, 0.0], np.pi)
+    dance.poses[:, 0] = quaternion.multiply(half, dance.poses[:, 0])
+    file, other, out = (tmp_path / name for name in ("away.bvh", "other.bvh", "out.bvh"))
+    write_bvh(file, dance)
+    write_bvh(other, dance_of("CMU", seconds=1.0))
+
+    def ahead(recording: Recording) -> float:
+        positions, _ = recording.skeleton.forward_kinematics(recording.poses, recording.roots)
+        front = fronts(recording.skeleton, positions)
+        assert front is not None
+        return float(front[:, 1].mean())
+
+    for command in (("convert", file, out), ("retarget", file, "--to", other, "--out", out)):
+        assert "turned to the audience (otherwise: --facing z)" in bunraku(*command).err
+        assert ahead(read_bvh(out)) > 0.9
+        bunraku(*command, "--facing", "z")
+        assert ahead(read_bvh(out)) < -0.9
+    assert ahead(load_dance(file).recording) > 0.9
+    assert ahead(load_dance(file, ReadingOptions(facing={"*": "z"})).recording) < -0.9
