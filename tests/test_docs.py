@@ -18,6 +18,7 @@ from appliance.show import describe
 from appliance.show.box import BoxConfig
 from appliance.show.section import Section
 from appliance.show.show import ShowConfig
+from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.data.catalogue import CatalogueFile
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -155,6 +156,14 @@ def test_a_key_of_the_reference_loads_with_the_default_that_it_names(
     own = keys_of(model)[key].get_default(call_default_factory=True, validated_data={})
     if "`" in default and default not in ("`{}`", "`[{}]`"):
         assert written == json.loads(json.dumps(own, default=str))
+
+
+def test_the_page_on_training_has_each_loss_of_the_default_network() -> None:
+    page = (ROOT / "docs" / "training.md").read_text("utf-8")
+    table = page.partition("| loss | what it compares |")[2].partition("\n\n")[0]
+    named = set(re.findall(r"(?m)^\| ([a-z ]+) \|", table))
+    weights = LossWeights(speed=0.0, squared=0.0, divergence=0.0)  # those of other models
+    assert named == {name.replace("_", " ") for name, weight in vars(weights).items() if weight}
 
 
 COMMAND = re.compile(r"(?:^|\$|sudo|&&|;|\||\() *bunraku((?: +[^\s`|&;>()]+)+)")
