@@ -11,6 +11,7 @@ import pytest
 from appliance.cli.doctor import box_state, processor, storage
 from appliance.cli.doctor.doctor_command import CHECKS, findings
 from appliance.cli.doctor.host_view import HostView, RunningStage
+from hw_sim.peers import free_ports
 from tests.bundles import write_show
 from tests.system.box import playing
 from tests.system.machine_of_files import STAGE_PID, Check, lay, only
@@ -99,6 +100,21 @@ def test_beside_a_dancing_box_it_finds_the_box_and_costs_it_no_frame(tmp_path: P
         assert box.frames(1)[0][0] > first[0]
         assert box.process.poll() is None
     assert done.returncode == any(one["verdict"] == "wrong" for one in found.values())
+
+
+@pytest.mark.realtime
+def test_a_show_without_its_sensor_and_its_receiver_is_wrong(tmp_path: Path) -> None:
+    (nobody,) = free_ports(1)
+    settings = {"outputs": {"osc": [{"port": nobody}], "dmx": [{"universe": 1, "wire": "udmx"}]}}
+    with playing(write_show(tmp_path / "show"), tmp_path, settings=settings) as box:
+        box.await_words(f"Receiver 127.0.0.1:{nobody}")
+        done = run_bunraku("doctor", "--box", box.box_file, "--json")
+        found = {one["what"]: one for one in json.loads(done.stdout)}
+    assert done.returncode == 1
+    assert found["sensor left-wrist"]["verdict"] == "wrong"
+    (receiver,) = [one for what, one in found.items() if what.startswith(f"receiver 127.0.0.1:{nobody}")]
+    assert receiver["verdict"] == "wrong" and "no program listens on that port" in receiver["words"]
+    assert found["lights"]["verdict"] == "ok", "this show has no lamps"
 
 
 def test_a_broken_box_file_is_one_more_finding(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ class RunningStage:
     health: dict[str, Any]
     fallbacks: tuple[tuple[str, Fallen], ...] = ()  # of all processes of the box: the process, the fallback
     members: tuple[Member, ...] = ()  # the processes beside it
+    show: Path | None = None  # the folder of what it dances
 
 
 @dataclass(frozen=True)
@@ -106,4 +107,4 @@ def running_stage(box: BoxConfig) -> RunningStage | None:
         with contextlib.closing(ProcessHealth(folder)) as shared:
             told = [("stage", one) for one in fallen(health.get("fallbacks"))] + shared.fallbacks(now)
             members = tuple(shared.members(now))
-        return RunningStage(reader.facts.pid, health, tuple(told), members)
+        return RunningStage(reader.facts.pid, health, tuple(told), members, reader.facts.show_directory)

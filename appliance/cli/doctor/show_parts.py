@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
@@ -10,6 +11,8 @@ from appliance.cli.doctor.host_view import HostView
 from appliance.cli.sensors.table import HIGH_LOSS
 from appliance.sensor.state import LOW_BATTERY
 from appliance.sensor.wire import BATTERY_UNKNOWN
+from appliance.show.config_error import ConfigError
+from appliance.show.show import load_show
 from appliance.show_control.sensor_roster import RosterLine
 
 _SPARE = "Or put a spare in its place: `bunraku sensors replace {name} SPARE`."
@@ -87,6 +90,9 @@ def wires(host: HostView) -> Iterator[Finding]:
     if host.stage is None or not host.box.outputs.dmx:
         return
     lights = next((one for one in host.stage.members if one.process == "lights"), None)
+    if lights is None and not _has_fixtures(host.stage.show):
+        yield ok("lights", "This show has no lamps: the wires of the box file rest.")
+        return
     if lights is None or lights.late:
         yield wrong(
             "lights",
@@ -99,3 +105,11 @@ def wires(host: HostView) -> Iterator[Finding]:
             yield wrong(name, f"{trouble.removeprefix(f'{name}: ')}", "Plug it in, or switch its node on.")
         else:
             yield ok(name, "The light leaves by it.")
+
+
+def _has_fixtures(show: Path | None) -> bool:
+    """Also where the show cannot be read: then its lamps are missed."""
+    try:
+        return show is None or bool(load_show(show).config.lights.fixtures)
+    except (ConfigError, OSError):
+        return True
