@@ -32,8 +32,9 @@ DIED = {
     ),
     "projector": Fallback(
         "projector-died",
-        "The projector's process died or hangs. The wall is black, and the picture is back within two "
-        "seconds. If it goes on, look at its messages: journalctl -u bunraku-projector.",
+        "The projector's process died or hangs. The wall is black or stands still, and the picture is "
+        "back within two seconds, after a hang within ten. If it goes on, look at its messages: journalctl -u "
+        "bunraku-projector.",
     ),
     "keeper": Fallback(
         "keeper-died",
@@ -52,7 +53,7 @@ DIED = {
     ),
     "sound": Fallback(
         "sound-died",
-        "The sound's process died or hangs. The strings are silent, and it is started again within two "
+        "The sound's process died or hangs. The strings are silent, and it is started again within "
         "seconds. If it goes on, look at its messages: journalctl -u bunraku-sound.",
     ),
 }

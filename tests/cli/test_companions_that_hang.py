@@ -96,7 +96,7 @@ def test_a_show_control_that_hangs_is_started_again_and_told(tmp_path: Path) -> 
         page,
     ):
         page.unlock()
-        assert page.command("/panic").value["done"]
+        wait_until(lambda: page.does("/panic"))
         kinds = {
             "control": "appliance.show_control",
             "console": "appliance.console",
@@ -121,4 +121,4 @@ def test_a_show_control_that_hangs_is_started_again_and_told(tmp_path: Path) -> 
         health.close()
         wait_until(lambda: page.status().get("status"))
         assert page.status()["status"]["panic"] == 1, "what was in force stays in force"
-        assert page.command("/go").value["done"]
+        wait_until(lambda: page.does("/go"))

@@ -78,6 +78,11 @@ class Page:
     def command(self, address: str, *arguments: object) -> Answer:
         return self.post("/api/command", {"address": address, "arguments": list(arguments)})
 
+    def does(self, address: str, *arguments: object) -> bool:
+        """Whether a command was carried out; False too while show control starts."""
+        answer = self.command(address, *arguments)
+        return answer.status == 200 and bool(answer.value["done"])
+
     def status(self) -> dict[str, Any]:
         """What the page tells now."""
         value: dict[str, Any] = self.get("/status").value

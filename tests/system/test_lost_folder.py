@@ -82,7 +82,7 @@ def test_a_folder_that_is_deleted_comes_back_and_commands_with_it(tmp_path: Path
     night = ("--journal", str(tmp_path / "night"))
     with box_with_page(show, tmp_path, *night, has_sensors=False) as (box, page):
         page.unlock()
-        assert page.command("/panic").value["done"]
+        wait_until(lambda: page.does("/panic"))
         shutil.rmtree(box.runtime, ignore_errors=True)  # meanwhile it may be there again
         wait_until(lambda: (box.runtime / "frame").exists() and (box.runtime / "control.health").exists())
         wait_until(lambda: "was deleted" in box.words)
@@ -91,7 +91,7 @@ def test_a_folder_that_is_deleted_comes_back_and_commands_with_it(tmp_path: Path
         os.kill(control, signal.SIGKILL)
         wait_until(lambda: children_running(box.process.pid, "appliance.show_control") not in ([control], []))
         wait_until(lambda: (page.status().get("status") or {}).get("panic") == 1)
-        assert page.command("/go").value["done"]
+        wait_until(lambda: page.does("/go"))
         wait_until(lambda: page.status()["status"]["state"] == "dancing")
         box.pause()
         time.sleep(0.1)
