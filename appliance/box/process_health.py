@@ -187,7 +187,16 @@ class ProcessHealth:
 def _of_choice(refused: list[str], aside: list[list[str]]) -> list[Fallen]:
     """The preflight notes what it refused, the stage the pairs that it has put aside."""
     both = ((SHOW_REFUSED, refused), (SHOW_PUT_ASIDE, [words for _, words in aside]))
-    return [Fallen(one.name, len(words), True, " ".join(words)) for one, words in both if words]
+    return [
+        Fallen(one.name, len(words), True, " ".join(words), _files_in(words)) for one, words in both if words
+    ]
+
+
+def _files_in(sentences: list[str]) -> str:
+    """The files that sentences begin with, as in 'show.yaml:3: ...', without their folders."""
+    begun = (sentence.partition(": ") for sentence in sentences)
+    names = (Path(file).name for file, colon, _ in begun if colon)
+    return ", ".join(dict.fromkeys(name for name in names if " " not in name))
 
 
 def _record(process: str) -> Record:

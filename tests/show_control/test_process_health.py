@@ -120,6 +120,8 @@ def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
         "show-put-aside": ("preflight", 1, True),
     }
     assert [one.words for _, one in processes.fallbacks(1.0)] == ["Broken one. Broken two.", "Did not dance."]
+    Choice(refused=("/media/a stick/show.yaml:3: no such key.", "It is not danced.")).write(folder / CHOSEN)
+    assert [one.about for _, one in processes.fallbacks(1.0)] == ["show.yaml:3"]
     (folder / CHOSEN).write_bytes(b"{")
     assert told(processes, 1.0) == {}
 
