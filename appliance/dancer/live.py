@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from appliance.dancer.extrapolation import Extrapolation
 from appliance.dancer.slerp import FloatArray, Slerp
@@ -42,10 +41,12 @@ class Live:
         self._extrapolation = Extrapolation(joints, window)
         self._is_new = np.ones((joints, 1), dtype=np.bool_)
         self._before, self._newest, self._present = np.tile(quaternion.IDENTITY, (3, joints, 1))
+        self._all = np.ones(joints, dtype=np.bool_)
         self._comes = np.zeros(joints, dtype=np.bool_)  # joints of the newest pose
         self._came, self._follows = np.zeros((2, joints), dtype=np.float32)  # how far each is the stream's
         self._phrases_share = np.empty((window, joints), dtype=np.float32)
         self._joint_step = tick_s / _JOINT_FADE_S
+        self._is_whole = False  # all joints come, and all are the stream's: nothing is done joint by joint
         self._window = np.tile(quaternion.IDENTITY, (window, joints, 1))
         self._roots = np.zeros((window, 3), dtype=np.float32)
         self._root = np.zeros((2, 3), dtype=np.float32)  # of the pose before, and of the newest
@@ -83,16 +84,19 @@ class Live:
         of this moment, whose signs the stream takes over.
         """
         lengths = np.sqrt(np.einsum("jk,jk->j", pose, pose))
-        comes: NDArray[np.bool_] = np.logical_not(np.isnan(pose).all(axis=1))
-        if not comes.any() or not (np.abs(lengths[comes] - 1.0) < _UNIT).all():
-            return False
+        comes = self._all
+        if not (np.abs(lengths - 1.0) < _UNIT).all():
+            comes = np.logical_not(np.isnan(pose).all(axis=1))
+            if not comes.any() or not (np.abs(lengths[comes] - 1.0) < _UNIT).all():
+                return False
         interval_s, was_silent = arrival - self._arrival, self.silent_s(arrival) > SILENT_S
         if not was_silent:
             self._interval_s += _FOLLOW * (min(max(interval_s, SHORTEST_S), LONGEST_S) - self._interval_s)
         np.copyto(self._before, self._newest)
         np.divide(pose, lengths[:, None], out=self._newest, where=comes[:, None])
-        from_phrase = (self._came == 0.0) | (was_silent and not self._share)
-        reference = np.where(from_phrase[:, None], phrase, self._before)
+        reference = phrase if was_silent and not self._share else self._before
+        if not self._is_whole:
+            reference = np.where((self._came == 0.0)[:, None], phrase, reference)
         signs = np.where(np.einsum("jk,jk->j", self._newest, reference) < 0.0, -1.0, 1.0)
         self._newest *= signs[:, None].astype(np.float32)
         knows_root = bool((np.abs(root) <= FARTHEST_M).all())
@@ -102,13 +106,14 @@ class Live:
             self._carry_on(root, min(max(interval_s, SHORTEST_S), LONGEST_S))
         self._root[0] = self._root[1]
         self._root[1] = root if knows_root else 0.0
-        fresh = comes & (not was_silent) & ~self._comes
         if was_silent:
             np.copyto(self._before, self._newest)
             self._is_new[:] = True
-        elif fresh.any():
+        elif not self._is_whole:
+            fresh = comes & ~self._comes
             self._before[fresh], self._is_new[fresh] = self._newest[fresh], True
         self._comes[:] = comes
+        self._is_whole = self._is_whole and comes is self._all
         if was_silent or not self._has_root:
             self._root[0] = self._root[1]
             self._offset[:] = np.nan  # taken when the next window is laid over
@@ -122,19 +127,17 @@ class Live:
         if not self._share:
             self._offset[:] = np.nan
             self._came[:] = self._comes
+            self._is_whole = bool(self._comes.all())
             return window, roots
-        np.clip(self._comes, self._came - self._joint_step, self._came + self._joint_step, out=self._came)
         share = min(max((now - self._arrival) / self._interval_s, 0.0), 1.0)
         self._slerp(self._before, self._newest, share, out=self._present)
-        stays = (self._came == 0.0)[:, None]
-        np.copyto(self._present, window[0], where=stays)
-        self._is_new |= stays
+        shares: FloatArray | float = 1.0 - self.share
+        if not self._is_whole:
+            shares = self._by_joints(window)
         self._extrapolation(self._present, self._is_new, out=self._window)
         self._is_new[:] = False
         rows = self._window.reshape(-1, 4)
-        np.multiply(self._came, self._came * (3.0 - 2.0 * self._came), out=self._follows)
-        self._phrases_share[:] = 1.0 - self.share * self._follows
-        self._over(rows, window.reshape(-1, 4), self._phrases_share.reshape(-1), out=rows)
+        self._over(rows, window.reshape(-1, 4), shares, out=rows)
         self._roots[:] = roots
         if self._has_root:
             root = self._root[0] + share * (self._root[1] - self._root[0])
@@ -142,6 +145,18 @@ class Live:
                 self._offset[:] = roots[0] - root
             self._roots += np.float32(self.share) * (root + self._offset - self._roots)
         return self._window, self._roots
+
+    def _by_joints(self, window: FloatArray) -> FloatArray:
+        """(T*J,): how much stays the phrase's while not all joints come; `_present` follows it there."""
+        came, step = self._came, self._joint_step
+        np.clip(self._comes, came - step, came + step, out=came)
+        self._is_whole = bool(came.min() == 1.0)
+        stays = (came == 0.0)[:, None]
+        np.copyto(self._present, window[0], where=stays)
+        self._is_new |= stays
+        np.multiply(came, came * (3.0 - 2.0 * came), out=self._follows)
+        self._phrases_share[:] = 1.0 - self.share * self._follows
+        return self._phrases_share.reshape(-1)
 
     def stand_anew(self) -> None:
         """Take the figure from where it stands to the stream's root, as at a takeover."""
@@ -175,6 +190,7 @@ class Live:
         self._root[:], self._offset[:] = state["roots"], state["offset"]
         self._has_root, self._is_new[:] = state["has_root"], state["is_new"]
         self._comes[:], self._came[:] = state.get("comes", (True, 1.0))  # of another release: all came
+        self._is_whole = bool(self._comes.all() and self._came.min() == 1.0)
         self._arrival, self._interval_s = state["times"]
         self._chosen, self._share, self._step = state["chosen"]
         self._extrapolation.restore(state["extrapolation"])
