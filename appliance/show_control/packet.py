@@ -60,7 +60,7 @@ def datagram(message: Message) -> bytes:
         for argument in message[1:]:
             builder.add_arg(argument)
         return bytes(builder.build().dgram)
-    except (BuildError, osc_types.BuildError, ValueError) as error:
+    except (BuildError, osc_types.BuildError, ValueError, OverflowError) as error:  # a fraction above 3.4e38
         raise ValueError(f"This is no OSC: {error}") from None
 
 

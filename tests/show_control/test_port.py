@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from contextlib import closing
 from pathlib import Path
 
@@ -121,6 +122,12 @@ def test_over_a_network_the_listed_are_heard_and_strangers_change_nothing(
         assert control.process.handler.show_state.panic == may
         assert control.process.port.strangers == (0 if may else 50)
         until(lambda: may or bool(control.said))
+        told = {one.name: one for one in control.process.observer.own.happened(time.monotonic())}
+        assert ("sender-not-listed" in told) == (not may)
+        assert may or (told["sender-not-listed"].about, told["sender-not-listed"].active) == (
+            "10.77.0.2",
+            True,
+        )
         strangers = ["10.77.0.2" in words for words in control.said if "Panic" not in words]
         assert strangers == ([] if may else [True])
         if not may:
@@ -138,7 +145,9 @@ def test_a_taken_port_raises_and_a_closed_one_is_free_again() -> None:
     open_port("127.0.0.1", number).close()
 
 
-@pytest.mark.parametrize("unsendable", [("/x", "\udcff"), ("", 1), ("/x", object())])
+@pytest.mark.parametrize(
+    "unsendable", [("/x", "\udcff"), ("", 1), ("/x", object()), ("/x", 1e39), ("/x", 1 << 70)]
+)
 def test_what_osc_cannot_carry_is_not_sent(unsendable: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="no OSC"):
         datagram(unsendable)
