@@ -102,7 +102,7 @@ def _with_zeros_as_gaps(
     zero = (points == 0.0).all(axis=2)
     if not zero.any():
         return points
-    size, places, found = figure_size(points), places_of(names), points.copy()
+    size, places, found, told = figure_size(points), places_of(names), points.copy(), list[str]()
     for joint in np.flatnonzero(zero.any(axis=0)).tolist():
         always = bool(zero[:, joint].all())
         place = places[joint]
@@ -117,7 +117,11 @@ def _with_zeros_as_gaps(
                 found[gap.first : gap.last + 1, joint] = np.nan
                 if not always:
                     frames = place_words(range(gap.first, gap.last + 1), "frame")
-                    say(f"{names[joint]} is 0, 0, 0 in {frames}: taken as not seen.")
+                    told.append(f"{names[joint]} is 0, 0, 0 in {frames}: taken as not seen.")
+    for line in told[:_SHOWN_GAPS]:
+        say(line)
+    if len(told) > _SHOWN_GAPS:
+        say(f"And {len(told) - _SHOWN_GAPS} more such points and times.")
     return found
 
 

@@ -157,7 +157,7 @@ def _is_number(word: str) -> bool:
 def _read_hierarchy(lines: _Lines) -> tuple[list[BvhJoint], list[tuple[int, tuple[float, float, float]]]]:
     words = lines.next("the word HIERARCHY")
     if words[0].upper() != "HIERARCHY":
-        lines.fail("the first word is not HIERARCHY: this is not a BVH file.")
+        lines.fail("the first word is not HIERARCHY: this is not a BVH file. See `bunraku convert`.")
     joints: list[BvhJoint] = []
     ends: list[tuple[int, tuple[float, float, float]]] = []
     open_joints: list[int] = []  # -1 stands for an End Site

@@ -322,6 +322,15 @@ def test_a_root_that_sets_out_from_the_origin_is_there(tmp_path: Path) -> None:
     assert "0, 0, 0" not in imported(tmp_path, points, meant.skeleton.names)[1]
 
 
+def test_many_zeros_are_counted_after_some(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=2.0)
+    holed = points_of(meant)
+    for first in range(10, 85, 5):
+        holed[first : first + 2, 7] = 0.0
+    said = imported(tmp_path, holed, meant.skeleton.names)[1]
+    assert said.count("taken as not seen") == 10 and "And 5 more such points and times." in said
+
+
 def test_infinite_places_are_gaps(tmp_path: Path) -> None:
     meant = moved(body(), seconds=1.0)
     holed = points_of(meant)
