@@ -6,6 +6,10 @@ import os
 import socket
 from pathlib import Path
 
+import pytest
+from serial.tools import list_ports
+from serial.tools.list_ports_common import ListPortInfo
+
 from appliance.cli.doctor import venue
 from appliance.cli.doctor.host_view import HostView
 from appliance.show.box import BoxConfig
@@ -22,6 +26,20 @@ def test_radios(tmp_path: Path) -> None:
     (tmp_path / "sys/class/net/wlan0/device/driver").symlink_to(tmp_path / "sys/drivers/brcmfmac")
     lay(tmp_path, "/data/network/sensors.nmconnection")
     assert verdicts(venue.radios(HostView(tmp_path))) == [("bluetooth", "better"), ("wi-fi", "better")]
+
+
+def test_an_access_point_that_is_not_on_the_air_is_wrong(tmp_path: Path) -> None:
+    lay(tmp_path, "/data/network/sensors.nmconnection", "[connection]\ninterface-name=wlan7\n")
+    found = only(venue.radios(HostView(tmp_path)))
+    assert found.verdict == "wrong" and "wlan7 is not plugged in" in found.words
+    lay(tmp_path, "/sys/class/net/wlan7/phy80211/name", "phy7\n")
+    assert list(venue.radios(HostView(tmp_path))) == []
+    lay(tmp_path, "/sys/class/rfkill/rfkill0/type", "wlan\n")
+    lay(tmp_path, "/sys/class/rfkill/rfkill0/name", "phy7\n")
+    lay(tmp_path, "/sys/class/rfkill/rfkill0/soft", "1\n")
+    assert only(venue.radios(HostView(tmp_path))).verdict == "wrong"
+    (tmp_path / "data/network/sensors.nmconnection").unlink()
+    assert only(venue.radios(HostView(tmp_path))).verdict == "ok", "sensors by a router"
 
 
 def test_a_network_without_a_cable(tmp_path: Path) -> None:
@@ -53,6 +71,20 @@ def test_cables_and_adapters(tmp_path: Path) -> None:
     assert here[1] == "wrong"  # the path that the box file names is not there
     (tmp_path / "tty").touch()
     assert [one.verdict for one in venue.adapters(HostView(Path("/"), box))][1] == "ok"
+
+
+def test_adapters_that_are_left_out_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    cables = []
+    for number in range(2):
+        cable = ListPortInfo(f"/dev/ttyUSB{number}", skip_link_detection=True)
+        cable.vid, cable.pid, cable.serial_number = 0x0403, 0x6015, f"D{number}"
+        cables.append(cable)
+    monkeypatch.setattr(list_ports, "comports", lambda: cables)
+    wires = [{"universe": 1, "wire": "open-dmx"}]
+    box = BoxConfig.model_validate({"outputs": {"dmx": wires}}, context={})
+    found = only(venue.adapters(HostView(box=box)))
+    assert found.verdict == "better"
+    assert "It takes /dev/ttyUSB0" in found.words and "/dev/ttyUSB1 (serial: D1)" in found.words
 
 
 def test_displays(tmp_path: Path) -> None:

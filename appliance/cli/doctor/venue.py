@@ -102,10 +102,23 @@ def radios(host: HostView) -> Iterator[Finding]:
                 f"{name} is on. It shares 2.4 GHz with the sensors.",
                 "`sudo rfkill block bluetooth`",
             )
+        elif kind == "wlan" and blocked and _is_access_point(host):
+            yield wrong(
+                "wi-fi",
+                f"{name} is switched off, and this box is the sensors' access point: none of them joins.",
+                "`sudo bunraku-access-point --country CC`, with the country's two letters, or the adapter's "
+                "own switch.",
+            )
         elif kind == "wlan" and blocked:
             yield ok(
                 "wi-fi", f"{name} is switched off here: the sensors need a router, which is better anyway."
             )
+    if (wanted := _access_point_card(host)) and not host.at(f"/sys/class/net/{wanted}").exists():
+        yield wrong(
+            "wi-fi",
+            f"{wanted} is not plugged in, and this box is the sensors' access point on it: none joins.",
+            "Plug the adapter in, or `sudo bunraku-access-point --remove` and use a router.",
+        )
     for card in (path.parent for path in host.found("/sys/class/net/*/phy80211")):
         driver = host.at(card / "device/driver").resolve().name
         if driver.startswith("brcmf") and _is_access_point(host):
@@ -125,6 +138,12 @@ def radios(host: HostView) -> Iterator[Finding]:
 def _is_access_point(host: HostView) -> bool:
     """Whether `bunraku-access-point` has made one."""
     return bool(host.found("/data/network/sensors.nmconnection"))
+
+
+def _access_point_card(host: HostView) -> str:
+    """The card that `bunraku-access-point` was told to use; "" where it was not."""
+    lines = (host.text("/data/network/sensors.nmconnection") or "").splitlines()
+    return next((line.partition("=")[2] for line in lines if line.startswith("interface-name=")), "")
 
 
 def _output_of(*command: str) -> str:
