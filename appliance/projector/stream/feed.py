@@ -10,11 +10,13 @@ from contextlib import suppress
 
 from appliance.box.parent_death import PARENT
 from appliance.projector.raw_stream import RawStream
-from appliance.projector.stream.pipe import head
+from appliance.projector.stream.pipe import WANTED, head
 from appliance.projector.window import Size
 from appliance.show.stream import StreamConfig
 
 AGAIN_S = 5.0  # before a process that ended is started once more
+HUNG_S = 5.0  # without a sign, of which it gives one a second
+_STARTS_WITHIN_S = 20.0
 _LAST_WORDS_S = 1.0
 
 
@@ -25,7 +27,7 @@ class Feed:
         self._config, self._say = config, say
         self._process: subprocess.Popen[bytes] | None = None
         self._pictures: RawStream | None = None
-        self._begun_at = 0.0
+        self._begun_at = self._hangs_at = 0.0
         self._is_said = False
 
     def offer(self, now: float, size: Size, read: Callable[[], bytes]) -> None:
@@ -34,7 +36,12 @@ class Feed:
             if self._process is None or now - self._begun_at >= AGAIN_S:
                 self._begin(now)
             return
-        if self._is_wanted():
+        asked = self._asked()
+        if asked:
+            self._hangs_at = now + HUNG_S
+        elif now >= self._hangs_at and self._process is not None:
+            self._process.kill()
+        if WANTED in asked:
             self._pictures.offer(read(), size)
 
     def close(self) -> None:
@@ -56,12 +63,12 @@ class Feed:
         if self._process is not None and not self._is_said:
             self._is_said = True
             self._say(
-                f"The stream on port {self._config.port} has ended. The audience sees the picture; media "
-                f"servers and mixers do not. It is started again every {AGAIN_S:g} s: is the port another "
-                "program's?"
+                f"The stream on port {self._config.port} has ended, or hung. The audience sees the picture; "
+                f"media servers and mixers do not. It is started again every {AGAIN_S:g} s: is the port "
+                "another program's?"
             )
         self.close()
-        self._begun_at = now
+        self._begun_at, self._hangs_at = now, now + _STARTS_WITHIN_S
         pictures, into = os.pipe()
         self._process = subprocess.Popen(
             [sys.executable, "-m", "appliance.projector.stream", self._config.model_dump_json()],
@@ -77,9 +84,10 @@ class Feed:
     def _is_over(self) -> bool:
         return self._process is None or self._process.poll() is not None
 
-    def _is_wanted(self) -> bool:
+    def _asked(self) -> bytes:
+        """What it said since the last picture: that it lives, and whether it wants one."""
         assert self._process is not None and self._process.stdout is not None
         try:
-            return bool(os.read(self._process.stdout.fileno(), 64))
+            return os.read(self._process.stdout.fileno(), 64)
         except BlockingIOError:
-            return False
+            return b""

@@ -7,6 +7,7 @@ from typing import BinaryIO
 
 HEAD = struct.Struct("<II")  # width and height, before each picture's bytes: four a pixel, top row first
 WANTED = b"w"  # a byte for each picture that is wanted
+ALIVE = b"."  # its other end: the process that serves works
 MOST_PIXELS = 16384 * 16384
 
 Picture = tuple[int, int, bytes]

@@ -21,13 +21,14 @@ from appliance.box.open_files import open_more_files
 from appliance.box.served import OwnNames, listening, plain_address
 from appliance.projector.stream.keying import keyed
 from appliance.projector.stream.ndi import NdiSource
-from appliance.projector.stream.pipe import WANTED, Picture, read_picture
+from appliance.projector.stream.pipe import ALIVE, WANTED, Picture, read_picture
 from appliance.show.stream import StreamConfig
 
 BOUNDARY = "picture"
 MOST_CLIENTS = 8
 _BUFFER = 1 << 18  # bytes that the system keeps for a slow client: more would be old pictures
 _UNANSWERED_S = 1.0  # before a picture that did not come is asked for again
+_SIGN_S = 1.0
 _STUCK_S = 10.0  # before a client that takes nothing makes room for another: its machine may be gone
 _HEAD = "--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n"
 
@@ -65,10 +66,17 @@ class Newest:
             self.watching -= 1
 
     async def ask(self) -> None:
-        """Ask the projector for pictures, as often as the box file says, while a client waits."""
-        loop = asyncio.get_running_loop()
+        """Ask the projector for pictures, as often as the box file says, while a client waits.
+
+        Once a second it hears that this process lives: one that hangs is started again.
+        """
+        loop, sign_at = asyncio.get_running_loop(), 0.0
         while True:
             await asyncio.sleep(1.0 / self._config.rate)
+            if loop.time() >= sign_at:
+                sign_at = loop.time() + _SIGN_S
+                self._asks.write(ALIVE)
+                self._asks.flush()
             is_wanted = self.watching or (self._ndi is not None and self._ndi.receivers)
             if is_wanted and loop.time() - self._asked_at > _UNANSWERED_S:
                 self._asked_at = loop.time()
