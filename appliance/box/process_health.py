@@ -33,8 +33,8 @@ DIED = {
     "projector": Fallback(
         "projector-died",
         "The projector's process died or hangs. The wall is black or stands still, and the picture is "
-        "back within two seconds, after a hang within ten. If it goes on, look at its messages: journalctl -u "
-        "bunraku-projector.",
+        "back within two seconds, after a hang within ten. If it goes on, look at its messages: "
+        "journalctl -u bunraku-projector.",
     ),
     "keeper": Fallback(
         "keeper-died",

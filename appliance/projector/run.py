@@ -137,9 +137,7 @@ class Run:
         """Show pictures until `stopped`, the end of the seconds, or a key; returns how they came out."""
         notifier = notifier or Notifier({})
         try:
-            with guarded(
-                self._patience, lambda: self.projector.is_preparing, give_up, is_well=notifier.ping
-            ):
+            with guarded(self._patience, lambda: self.projector.is_preparing, give_up, is_well=notifier.ping):
                 self._show_pictures(stopped, notifier)
             self._health.end(time.monotonic())
         except moderngl.Error as error:
