@@ -146,6 +146,7 @@ def test_a_line_on_the_map_becomes_a_dance(
         assert (tmp_path / "map" / name).stat().st_size > 100, name
     report = json.loads((tmp_path / "map" / "map.json").read_text())
     assert "UMAP is left out: umap-learn is not installed" in result.output
+    assert "laying the recordings over the map ..." in result.output
     assert report["reach"]["is_dead"] is False and "The map is alive" in result.output
     assert set(report["projections"]) >= {"PCA, heading kept", "PCA, heading removed", "pose autoencoder"}
     assert report["apart"]["largest"] >= report["apart"]["mean"] > 0

@@ -22,6 +22,7 @@ from appliance.studio.pose_space.drawing import UNITS
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.pose_space.latent_poses import distance_over_time
 from appliance.studio.pose_space.projections import WITHOUT_UMAP, Projection, projections
+from appliance.studio.progress import doing
 from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import open_model
@@ -54,12 +55,14 @@ def run(options: MapOptions) -> None:
         file.stem: excerpt_of(file, 0.0, options.seconds, coder, dataset, options.reading)
         for file in options.files
     }
-    ground = Ground.of(autoencoder, dataset)
-    found = projections(autoencoder, list(recordings.values()), moving, ground.pose_map)
+    with doing("laying the recordings over the map", console):
+        ground = Ground.of(autoencoder, dataset)
+        found = projections(autoencoder, list(recordings.values()), moving, ground.pose_map)
     options.out.mkdir(parents=True, exist_ok=True)
-    map_pictures.draw_projections(options.out / "projections.png", list(recordings), found)
-    paths = {name: ground.path(one.poses[:, moving]) for name, one in recordings.items()}
-    frame = ground.draw(options.out / "map.png", paths)
+    with doing("drawing the pictures", console):
+        map_pictures.draw_projections(options.out / "projections.png", list(recordings), found)
+        paths = {name: ground.path(one.poses[:, moving]) for name, one in recordings.items()}
+        frame = ground.draw(options.out / "map.png", paths)
     _write_sheet(options.out / "map.svg", options.out / "map.png", frame)
     _write_page(options.out / "map.html", ground, recordings, paths)
     report: dict[str, Any] = {
