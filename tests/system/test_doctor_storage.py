@@ -17,7 +17,7 @@ def test_folders_that_cannot_be_written_or_are_not_named(tmp_path: Path) -> None
     assert only(storage.data_folders(HostView(tmp_path))).verdict == "better"
     state = BoxConfig.model_validate({"state": tmp_path / "state"}, context={"directory": tmp_path})
     assert only(storage.data_folders(HostView(box=state))).verdict == "ok"
-    nowhere = BoxConfig.model_validate({"state": "/proc/sys/state"}, context={"directory": tmp_path})
+    nowhere = state.model_copy(update={"state": Path("/proc/sys/state")})  # a box file could not name it
     assert only(storage.data_folders(HostView(box=nowhere))).verdict in ("wrong", "better")  # no room in it
 
 
