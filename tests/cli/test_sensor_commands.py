@@ -222,7 +222,7 @@ def test_without_a_box_a_change_counts_later(tmp_path: Path, bunraku: Command) -
         (["rename", "spare-1", "left-wrist"], "already"),
         (["rename", "spare-1", "two words"], "without spaces"),
         (["replace", "head", "spare-9"], "no sensor 'spare-9'"),
-        (["replace", "head"], "Name a spare"),
+        (["replace", "head"], "or the --port of a new one. Spares: spare-1."),
         (["replace", "head", "spare-1", "--port", "/dev/ttyACM0"], "Name a spare"),
         (["revoke", "head", "--keys", "other.keys"], "not both"),
     ],

@@ -129,13 +129,14 @@ def replace(
     """Put a spare, or a new wearable on a cable, in place of a broken one."""
     from appliance.cli.sensors.box_keys import box_keys_of, edit_keys
     from appliance.cli.sensors.provision import provision_sensor
-    from appliance.cli.sensors.worn import refuse_worn
+    from appliance.cli.sensors.worn import refuse_worn, spares
     from appliance.stage.stage_error import StageError
 
     box_keys = box_keys_of(box, keys)
     if (spare is None) == (port is None):
         raise StageError(
-            f"Name a spare (bunraku sensors replace {broken} SPARE), or the --port of a new one."
+            f"Name a spare (bunraku sensors replace {broken} SPARE), or the --port of a new one. "
+            f"{spares(box_keys)}".rstrip()
         )
     if spare is not None:
         refuse_worn(box_keys, spare, f"in the place of {broken} it leaves its own", anyway)

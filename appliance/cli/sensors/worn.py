@@ -51,12 +51,18 @@ def refuse_worn(box_keys: BoxKeys, name: str, loss: str, anyway: bool) -> None:
         )
 
 
+def spares(box_keys: BoxKeys) -> str:
+    """Which sensors of the key file the show does not wear, a sentence; "" where no show is known."""
+    worn = worn_sensors(box_keys)
+    return "" if worn is None else _spares(box_keys, worn)
+
+
 def _spares(box_keys: BoxKeys, worn: Mapping[str, str]) -> str:
     try:
-        spares = [name for name in load_keys(box_keys.keys) if name not in worn]
+        found = [name for name in load_keys(box_keys.keys) if name not in worn]
     except (KeyFileError, OSError):  # the change itself reports it
         return ""
-    return f"Spares: {', '.join(spares)}." if spares else "There is no spare: every sensor is in the show."
+    return f"Spares: {', '.join(found)}." if found else "There is no spare: every sensor is in the show."
 
 
 def _worn_in_chosen_show(box_keys: BoxKeys) -> Mapping[str, str] | None:
