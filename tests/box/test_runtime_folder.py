@@ -61,13 +61,18 @@ def test_one_that_is_open_to_others_is_refused(tmp_path: Path, mode: int) -> Non
         runtime_folder(BoxConfig(runtime=folder))
 
 
+def read_before(runtime: Path) -> BoxConfig:
+    """A box file that was read while the runtime's place was still a folder, or free."""
+    return BoxConfig().model_copy(update={"runtime": runtime})
+
+
 def test_a_link_or_a_file_in_its_place_is_refused(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     (tmp_path / "link").symlink_to(tmp_path / "elsewhere")
     (tmp_path / "file").touch()
     for name in ("link", "file"):
         with pytest.raises(RuntimeFolderError, match=r"is no folder.*`runtime:` in the box file"):
-            runtime_folder(BoxConfig(runtime=tmp_path / name))
+            runtime_folder(read_before(tmp_path / name))
 
 
 def test_one_of_somebody_else_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,7 +86,7 @@ def test_one_of_somebody_else_is_refused(tmp_path: Path, monkeypatch: pytest.Mon
 def test_one_that_cannot_be_made_says_so(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(RuntimeFolderError, match=r"cannot be made.*`runtime:` in the box file"):
-        runtime_folder(BoxConfig(runtime=tmp_path / "file" / "folder"))
+        runtime_folder(read_before(tmp_path / "file" / "folder"))
 
 
 def test_a_place_is_taken_once_until_it_is_given_back(tmp_path: Path) -> None:
