@@ -154,11 +154,9 @@ def test_a_recording_that_claims_many_frames_takes_no_memory_for_them(tmp_path: 
         status = Path("/proc/self/status").read_text().splitlines()
         has = next(int(line.split()[1]) << 10 for line in status if line.startswith("VmData"))
         resource.setrlimit(resource.RLIMIT_DATA, (has + (100 << 20), has + (100 << 20)))
-        with pytest.raises(BvhError, match="the file ends here, frame 6"):
-            read_bvh(path)
-        return b"refused"
+        return str(len(read_bvh(path))).encode()
 
-    assert run_with_timeout(PATIENCE_S, read) == b"refused"
+    assert run_with_timeout(PATIENCE_S, read) == b"5"
 
 
 def test_slow_frames_that_last_for_days_are_refused(tmp_path: Path) -> None:
@@ -167,9 +165,9 @@ def test_slow_frames_that_last_for_days_are_refused(tmp_path: Path) -> None:
     write_bvh(path, swaying_phrase(100.0))
     lines = path.read_text().splitlines()
     number = next(number for number, line in enumerate(lines, 1) if line.startswith("Frame Time"))
-    lines[number - 1] = "Frame Time: 10"
+    lines[number - 1] = "Frame Time: 9"  # seconds: no usual rate, and no milliseconds of one
     path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(BvhError, match=rf"slow.bvh:{number}: 5000 frames of .* \(50000 s\) are too many"):
+    with pytest.raises(BvhError, match=rf"slow.bvh:{number}: 5000 frames of .* \(45000 s\) are too many"):
         read_bvh(path)
 
 
