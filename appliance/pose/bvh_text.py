@@ -78,7 +78,7 @@ def read_bvh_text(path: Path, true_fps: float | None = None) -> BvhText:
             lines.fail("no joint has a channel: nothing can move.")
         fps = true_fps or header_fps
         assert fps is not None  # or the header was refused
-        frames, rows = _read_rows(lines, width, int(MAX_VALUES / (width * max(1.0, _STAGE_FPS / fps))))
+        frames, rows = _read_rows(lines, width, fps)
     if _count(announced) != rows.count:
         said = f"'{announced[:40]}'" if announced else "nothing"
         there = f"{counted(rows.count, 'row')} {'is' if rows.count == 1 else 'are'} there"
@@ -284,8 +284,9 @@ def _rate_that_is_no_time(time: float) -> float | None:
     return None if is_rate == is_ms else float(time if is_rate else as_ms)
 
 
-def _read_rows(lines: _Lines, width: int, most: int) -> tuple[NDArray[np.float64], KeptRows]:
-    """All whole rows up to the end. Raises BvhError where there is none, or for more than `most`."""
+def _read_rows(lines: _Lines, width: int, fps: float) -> tuple[NDArray[np.float64], KeptRows]:
+    """All whole rows up to the end. Raises BvhError where there is none, or too many at the stage's rate."""
+    most = int(MAX_VALUES / (width * max(1.0, _STAGE_FPS / fps)))
     frames = np.empty((min(lines.bytes // (2 * width) + 1, most), width))  # a value is two bytes or more
     rows = KeptRows()
     first: BvhError | None = None
@@ -303,7 +304,10 @@ def _read_rows(lines: _Lines, width: int, most: int) -> tuple[NDArray[np.float64
         if not words:
             break
         if len(rows.numbers) == most:
-            lines.fail(f"more than {most} frames of {width} values are too many to read. Cut the recording.")
+            lines.fail(
+                f"more than {most} frames of {width} values ({most / fps:.0f} s) are too many to read. "
+                "Cut the recording into pieces, or give its true rate: --true-fps 60."
+            )
         try:
             if len(words) != width:
                 lines.fail(f"frame {rows.count + 1} has {len(words)} values, the channels need {width}.")

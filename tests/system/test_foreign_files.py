@@ -164,10 +164,10 @@ def test_slow_frames_that_last_for_days_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "slow.bvh"
     write_bvh(path, swaying_phrase(100.0))
     lines = path.read_text().splitlines()
-    number = next(number for number, line in enumerate(lines, 1) if line.startswith("Frame Time"))
-    lines[number - 1] = "Frame Time: 9"  # seconds: no usual rate, and no milliseconds of one
+    number = next(number for number, line in enumerate(lines) if line.startswith("Frame Time"))
+    lines[number] = "Frame Time: 9"  # seconds: no usual rate, and no milliseconds of one
     path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(BvhError, match=rf"slow.bvh:{number}: 5000 frames of .* \(45000 s\) are too many"):
+    with pytest.raises(BvhError, match=r"slow.bvh:\d+: more than 4115 frames of 27 values \(37035 s\)"):
         read_bvh(path)
 
 

@@ -140,9 +140,10 @@ def test_positions_reach_a_media_server(show: Path, tmp_path: Path) -> None:
 
 def test_a_tracker_that_is_not_in_the_skeleton_is_refused_with_its_line(show: Path, tmp_path: Path) -> None:
     path = tmp_path / "box.yaml"
+    tracked = {"outputs": {"posistagenet": [{"joints": ["lShouldr"]}]}}
     path.write_text(
-        "runtime: runtime\noutputs:\n  posistagenet:\n    - joints:\n        - lShouldr\nsensors: {udp: null}\n"
+        yaml.safe_dump({"runtime": "runtime", "sensors": {"udp": None}}) + yaml.safe_dump(tracked)
     )
     ran = run([*PLAY, "--show", show, "--box", path])
     assert ran.returncode == 2
-    assert f"{path}:5: The show's skeleton has no joint 'lShouldr'. Did you mean 'lShldr'?" in ran.stderr
+    assert f"{path}:7: The show's skeleton has no joint 'lShouldr'. Did you mean 'lShldr'?" in ran.stderr
