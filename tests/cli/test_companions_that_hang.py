@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import os
 import signal
-import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,32 +16,18 @@ from appliance.box.process_health import DIED, ProcessHealth
 from appliance.cli import companions
 from appliance.cli.companions import Companion, Companions
 from tests.bundles import write_show
+from tests.cli.test_companions import Diary
 from tests.console.page import box_with_page
 from tests.show_control.doubles import until
 from tests.system.processes import children_running, wait_until
 
 PERIOD_S = 0.8
-PINGS = (
-    "import os, sys, time; from appliance.box.notify import Notifier; notifier = Notifier(); "
-    "open(sys.argv[1], 'a').write(f'{os.getpid()}\\n'); "
-)
+PINGS = "from appliance.box.notify import Notifier; notifier = Notifier(); "
 LOOP = "[(notifier.ping(time.monotonic()), time.sleep(0.05)) for _ in range(2000)]"
 
 
-class Diary:
-    """A file in which each start of a child leaves its process id."""
-
-    def __init__(self, folder: Path) -> None:
-        self.path = folder / "diary.txt"
-        self.path.touch()
-
-    @property
-    def pids(self) -> list[int]:
-        return [int(line) for line in self.path.read_text().splitlines()]
-
-    def child(self, script: str, watchdog_s: float = PERIOD_S) -> Companion:
-        command = (sys.executable, "-c", PINGS + script, str(self.path))
-        return Companion("The child", command, "Something is missing.", watchdog_s=watchdog_s)
+def pinging(diary: Diary, script: str, watchdog_s: float = PERIOD_S) -> Companion:
+    return replace(diary.child(PINGS + script), watchdog_s=watchdog_s)
 
 
 @pytest.fixture
@@ -51,14 +37,15 @@ def diary(tmp_path: Path) -> Diary:
 
 def test_one_that_stands_still_is_killed_said_and_started_again(diary: Diary) -> None:
     said: list[str] = []
-    with Companions([diary.child(f"notifier.ready(); {LOOP}")], said.append, lambda: True):
+    with Companions([pinging(diary, f"notifier.ready(); {LOOP}")], said.append, lambda: True):
         until(lambda: len(diary.pids) == 1)
         time.sleep(3 * PERIOD_S)
         assert len(diary.pids) == 1 and said == [], "one that pings is left in peace"
         os.kill(diary.pids[0], signal.SIGSTOP)
         until(lambda: len(diary.pids) == 2)
     assert said == [
-        f"The child hung: it gave no sign for {PERIOD_S:g} s. Something is missing. It is restarted."
+        f"The child hung: it gave no sign for {PERIOD_S:g} s. Something is missing for a moment. "
+        "It is restarted."
     ]
 
 
@@ -72,7 +59,7 @@ def test_signs_count_from_the_process_itself_alone(
 ) -> None:
     monkeypatch.setattr(companions, "READY_S", 1.0)
     said: list[str] = []
-    with Companions([diary.child(script)], said.append, lambda: True):
+    with Companions([pinging(diary, script)], said.append, lambda: True):
         until(lambda: len(diary.pids) >= 2)
     assert said[0].startswith("The child hung")
 
@@ -83,7 +70,7 @@ def test_one_without_a_watchdog_is_told_nothing_of_one(diary: Diary, monkeypatch
     monkeypatch.setenv("WATCHDOG_USEC", "1000000")
     noted = diary.path.with_name("environ.txt")
     script = f"open({str(noted)!r}, 'w').write(repr(os.environ.get('NOTIFY_SOCKET'))); time.sleep(60)"
-    with Companions([diary.child(script, math.inf)], print, lambda: True):
+    with Companions([pinging(diary, script, math.inf)], print, lambda: True):
         until(lambda: noted.exists() and noted.read_text() != "")
     assert noted.read_text() == "None"
 
