@@ -232,7 +232,7 @@ def test_a_place_in_memory_is_seen_for_what_it_is(tmp_path: Path, mounted: str, 
     data, above = tmp_path / "data", tmp_path / "above"
     for made in (data, above):
         made.mkdir()
-    words = [f"source <(sed '/^main /d' {INSTALL})"]
+    words = [f"source <(sed '/^main /d' '{INSTALL}')"]
     if mounted in ("tmpfs", "overlay on tmpfs"):
         words.append(f"mount -t tmpfs tmpfs {data if mounted == 'tmpfs' else above}")
     if mounted.startswith("overlay"):
@@ -249,10 +249,11 @@ def test_a_place_in_memory_is_seen_for_what_it_is(tmp_path: Path, mounted: str, 
 
 @pytest.mark.parametrize(("memory", "status"), [("tmpfs", 1), ("", 0)])
 def test_nothing_is_installed_on_a_box_that_would_forget_its_sensors(memory: str, status: int) -> None:
-    words = f"source <(sed '/^main /d' {INSTALL}); memory_of() {{ echo {memory}; }}; check_lasts; exit 0"
+    words = f"source <(sed '/^main /d' '{INSTALL}'); memory_of() {{ echo {memory}; }}; check_lasts; exit 0"
     done = subprocess.run(["bash", "-c", words], capture_output=True, text=True, check=False)
     assert done.returncode == status
     assert ("/data is in memory (tmpfs): sensors' keys" in done.stderr) == bool(status)
+    assert bool(done.stderr) == bool(status)
 
 
 def _is_untouched(box: BoxRoot) -> None:
