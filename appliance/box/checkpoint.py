@@ -21,7 +21,7 @@ _NUMBERS = struct.Struct("<q9d4HBB")
 _OTHER = struct.Struct("<9d2H")  # of another puppet: its places as above, its iterations
 _ENDED = 1
 _MOST = 0xFFFF
-_MOST_NUMBER = 1 << 62  # of ticks and seeds; parameters and seconds stay far below it
+_MOST_NUMBER = 1 << 62  # ticks and seeds may get this large; seconds and parameters stay far below
 
 
 class Standing(NamedTuple):
@@ -118,7 +118,7 @@ def packed(place: Checkpoint) -> bytes:
 
 
 def unpacked(payload: bytes) -> Checkpoint | None:
-    """The place in these bytes; None when they are none that this program knows, or where no stage stands."""
+    """The place in these bytes; None for an unknown format and for numbers that no stage can have."""
     try:
         tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
             _NUMBERS.unpack_from(payload)
@@ -218,7 +218,7 @@ class CheckpointWriter:
 class CheckpointReader:
     """Reads the place in memory; the stage may be there or not.
 
-    dropped: whether what was read last is none that a stage could go on from.
+    dropped: whether the last read found bytes that no stage can go on from.
     """
 
     dropped = False

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 from appliance.box.served import plain_address
 
 MOST = 256  # connections at once
-MOST_STRANGERS = 160  # of them, of strangers: the rest is for known devices
-MOST_FROM_ONE = 96  # of strangers, from one address
+MOST_STRANGERS = 160  # strangers' connections; the rest is for known devices
+MOST_FROM_ONE = 96  # strangers' connections from one address
 IDLE_S = 30.0  # after its last request a stranger's connection is closed, unless it watches
 _LOOK_S = 1.0
 _RETRY_S = 0.1  # after the system refused a connection
