@@ -74,7 +74,7 @@ PATTERNS: dict[str, re.Pattern[str]] = {
 
 @dataclass(frozen=True)
 class Text:
-    """What people read, in one piece: a paragraph, a cell of a table, a docstring, a comment, a message."""
+    """A piece of text that people read: a paragraph, a cell of a table, a docstring, a comment, a message."""
 
     line: int
     kind: Kind
