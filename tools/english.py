@@ -108,8 +108,8 @@ def tics_in(text: str, kind: Kind = "docstring") -> list[tuple[str, str]]:
 
 
 def longest_part(sentence: str) -> int:
-    """Words of the longest part between semicolons."""
-    return max(len(re.findall(r"[\w'-]+", part)) for part in sentence.split(";"))
+    """Words of the longest part between semicolons and colons."""
+    return max(len(re.findall(r"[\w'-]+", part)) for part in re.split("[;:]", sentence))
 
 
 def sentences(text: str) -> Iterator[str]:
