@@ -119,9 +119,9 @@ def sentences(text: str) -> Iterator[str]:
     text = re.sub(r"\*\*|__", "", text)
     for paragraph in re.split(r"\n\s*\n|\n\s*(?:[-*|]|\d+\.) ", text):
         joined = " ".join(paragraph.split())
-        for sentence in re.split(r"(?<=[.!?])[)'\"]* +(?=[A-Z`'(\"\d])", joined):
+        for sentence in re.split(r"(?<=[.!?])[)'\"]* +(?=[A-Z`'(\"*\d])", joined):
             if len(sentence.split()) > 1:
-                yield sentence.lstrip("-*#( '\"")
+                yield sentence.lstrip("-#( '\"")
 
 
 def texts_of_page(source: str) -> Iterator[Text]:
