@@ -32,7 +32,7 @@ def draw_dancers(folder: Path) -> list[Path]:
         first = show.config.looks[0] if show.config.looks else LookConfig(name="plaster", style="plaster")
         look = first.model_copy(update={"camera": CAMERA, "vignette": 0.0})
         with offscreen(size) as ctx:
-            renderer = Renderer(ctx, size, phrase.skeleton, {look.name: look})
+            renderer = Renderer(ctx, phrase.skeleton, {look.name: look})
             moments = [moment_of(phrase, BEGINS_S + APART_S * number) for number in range(INSTANTS)]
             pictures = [shrink(draw_still(ctx, renderer, moment, look.name, size)) for moment in moments]
             renderer.release()

@@ -43,9 +43,7 @@ def draw_looks(folder: Path) -> list[Path]:
     size = SIZE[0] * FINER, SIZE[1] * FINER
     paths = []
     with offscreen(size) as ctx:
-        renderer = Renderer(
-            ctx, size, recording.skeleton, {name: look for name, (look, _) in PICTURES.items()}
-        )
+        renderer = Renderer(ctx, recording.skeleton, {name: look for name, (look, _) in PICTURES.items()})
         for name, (_, time_s) in PICTURES.items():
             image = shrink(draw_still(ctx, renderer, moment_of(recording, time_s), name, size))
             paths.append(folder / f"look-{name}.png")
@@ -67,7 +65,7 @@ def _side_by_side(ctx: moderngl.Context, recording: Recording, holds: Floats | N
     looks: dict[str, LookConfig] = {
         style: LookConfig(name=style, style=style, vignette=0.2) for style in STYLES[:4]
     }
-    renderer = Renderer(ctx, size, recording.skeleton, looks)
+    renderer = Renderer(ctx, recording.skeleton, looks)
     moment = moment_of(recording, TOGETHER_S, holds)
     pictures = [shrink(draw_still(ctx, renderer, moment, style, size)) for style in looks]
     renderer.release()

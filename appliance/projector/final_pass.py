@@ -14,7 +14,6 @@ from appliance.projector.corners import homography
 from appliance.projector.masks import Masks
 from appliance.projector.page import page
 from appliance.projector.picture.drawing import Drawing
-from appliance.projector.picture.tally import Cost, Tally
 from appliance.projector.picture.wall import DETAILS, FLAT, Detail, Wall, flat
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
@@ -65,7 +64,6 @@ class FinalPass:
             for parts in ([], [*fixed, "DIM"], [*fixed, "DIM", "MARKS"])
         )
         self._masks = Masks(gl, config.masks)
-        self._tally = Tally()
         self._text = gl.texture((1, 1), 1)
         self._written: tuple[object, ...] = ()
         self._pictures = 0
@@ -86,7 +84,6 @@ class FinalPass:
         That is the display itself if nothing is left to do, which saves a small computer from writing the
         picture to memory and reading it back; else a texture.
         """
-        self._tally.clear()
         scale, gamma = level * controls.alignment.brightness, self._config.gamma
         self._is_graded = self._config.edge_blend is None and not lines and not controls.shows_grid
         if self._is_graded and size == display:
@@ -125,28 +122,20 @@ class FinalPass:
             "part": (self._part.begin, self._part.width),
             **self._light(scale),
         }
-        pixels = display[0] * display[1]
         if has_marks:
             inputs |= self._place(display, controls) | self._mark(lines, display, controls)
-            self._marked.draw(self._tally, pixels, inputs)
+            self._marked.draw(inputs)
         else:
             inputs["clip_from_part"] = self._clip_from_part(controls)
             drawing = self._unchanged if self._is_graded else self._dimmed
-            drawing.draw(self._tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 4)
-        self._tally.count_bytes(4 * pixels)
+            drawing.draw(inputs, moderngl.TRIANGLE_STRIP, 4)
 
     def mask(self, screen: moderngl.Framebuffer, display: Size, controls: Controls) -> None:
         """Darken what the box file's masks cover; the very last step of a picture."""
         self._masks.draw(screen, display, self._flips(controls), controls.shows_grid)
 
-    def cost(self) -> Cost:
-        """The cost of the last picture's last step; nothing if a look did that itself."""
-        width, height = self.picture.size
-        return self._tally.cost(width * height, 4 * width * height)
-
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
         """Clear the display: no picture, no figures, no marks."""
-        self._tally.clear()
         screen.use()
         screen.viewport = (0, 0, *display)
         screen.clear(0.0, 0.0, 0.0, 0.0)

@@ -11,7 +11,6 @@ from PIL import Image as Files
 from PIL import ImageDraw, ImageFilter
 
 from appliance.projector.picture.drawing import Drawing
-from appliance.projector.picture.tally import Tally
 from appliance.projector.window import Size
 from appliance.show.projector import MaskConfig
 
@@ -23,7 +22,7 @@ class Masks:
     """Darkens the display where the masks of a box file lie, after the picture's corners were placed."""
 
     def __init__(self, gl: moderngl.Context, masks: Sequence[MaskConfig]) -> None:
-        self._gl, self._masks, self._tally = gl, masks, Tally()
+        self._gl, self._masks = gl, masks
         self._drawing = Drawing(gl, "screen", "mask") if masks else None
         self._texture: moderngl.Texture | None = None
 
@@ -39,9 +38,8 @@ class Masks:
         screen.viewport = (0, 0, *display)
         self._gl.enable_only(moderngl.BLEND)
         self._gl.blend_func = moderngl.ZERO, moderngl.ONE_MINUS_SRC_ALPHA
-        self._tally.clear()
         inputs = {"dark": self._texture, "flips": flips, "strength": GHOST if is_ghost else 1.0}
-        self._drawing.draw(self._tally, display[0] * display[1], inputs)
+        self._drawing.draw(inputs)
 
     def release(self) -> None:
         """Give the GPU's memory back."""

@@ -64,7 +64,7 @@ def _render(
     """Pictures (height, width, 3), top row first."""
     size = FINER * PICTURE[0], FINER * PICTURE[1]
     with offscreen(size) as gl:
-        renderer = Renderer(gl, size, skeleton, looks)
+        renderer = Renderer(gl, skeleton, looks)
         for moment in moments:
             yield shrink(draw_still(gl, renderer, moment, look, size))
         renderer.release()

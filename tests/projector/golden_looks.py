@@ -43,10 +43,9 @@ def renderer(
     ctx: moderngl.Context,
     skeleton: Skeleton,
     looks: Mapping[str, LookConfig] | None = None,
-    size: tuple[int, int] = SIZE,
 ) -> Iterator[Renderer]:
     """A renderer of the built-in looks, or of others."""
-    made = Renderer(ctx, size, skeleton, looks or looks_by_name(()))
+    made = Renderer(ctx, skeleton, looks or looks_by_name(()))
     yield made
     made.release()
 

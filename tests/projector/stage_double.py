@@ -55,9 +55,9 @@ class TellingPainter:
     made = 0
     released = 0
 
-    def __init__(self, gl: moderngl.Context, size: tuple[int, int], skeleton: Skeleton, looks: Looks) -> None:
+    def __init__(self, gl: moderngl.Context, skeleton: Skeleton, looks: Looks) -> None:
         type(self).made += 1
-        self.looks, self.sizes, self._joints = looks, [size], len(skeleton)
+        self.looks, self._joints = looks, len(skeleton)
 
     def draw(
         self,
@@ -69,7 +69,6 @@ class TellingPainter:
         cued: CuedCamera = NOT_CUED,
     ) -> None:
         wall = target if isinstance(target, Wall) else flat(target)
-        self.sizes.append(wall.picture)
         colours = float(moment.positions[0, 1]), 0.1 * self._joints, mix
         wall.framebuffer.clear(*(wall.level * colour for colour in colours), 1.0)
 

@@ -16,10 +16,12 @@ from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import STYLES, LookConfig, looks_by_name
 from tests.projector.golden_looks import AT_S, FOLDER, MEAN_LIMIT, P99_LIMIT, SIZE, difference, renderer
+from tests.projector.gpu_cost import GpuCost
 from tests.projector.skeletons import mixamo, point, toy
 
 MOST_GPU_BYTES = 25e6
 MOST_DRAW_CALLS = 20
+MOST_TRIANGLES = 70_000
 MOST_STEP = 165  # of 255 from one pixel to the next across an outline
 
 
@@ -91,7 +93,7 @@ def test_outline_of_ink_is_smooth(dance: Recording, gl: moderngl.Context) -> Non
     """Along an outline there are tones between ink and paper; a hard edge has nearly none."""
     plain = {"ink": LookConfig(name="ink", style="ink", trail_s=0.0, figure="#000000", background="#ffffff")}
     size = 1280, 720
-    with renderer(gl, dance.skeleton, plain, size) as made:
+    with renderer(gl, dance.skeleton, plain) as made:
         picture = draw_still(gl, made, moment_of(dance, AT_S), "ink", size)[100:620, 500:900, 1].astype(int)
     step = np.abs(np.diff(picture, axis=1)).max(axis=1)
     assert picture.min() < 60 and picture.max() > 200
@@ -193,12 +195,14 @@ def contrast(picture: np.ndarray) -> int:
 
 
 def test_cost_at_1080p(dance: Recording, gl: moderngl.Context) -> None:
-    """GPU memory with the target counted, draw calls; time on a Raspberry Pi 4 is estimated."""
-    size = 1920, 1080
-    with renderer(gl, dance.skeleton, size=size) as made:
+    """Draw calls and triangles of each look; GPU memory of all looks together, without the target."""
+    size, cost = (1920, 1080), GpuCost()
+    with cost.watching(), renderer(gl, dance.skeleton) as made:
         for style in STYLES:
-            draw_still(gl, made, moment_of(dance, AT_S), style, size)
-            cost = made.cost()
-            assert cost.draw_calls <= MOST_DRAW_CALLS
-            assert cost.gpu_bytes < MOST_GPU_BYTES
-            assert 1.0 < cost.overdraw < 3.0 and cost.pi4_ms > 0
+            cost.draw_calls = 0
+            with gl.query(primitives=True) as triangles:
+                draw_still(gl, made, moment_of(dance, AT_S), style, size)
+            assert 0 < cost.draw_calls <= MOST_DRAW_CALLS, style
+            assert 0 < triangles.primitives < MOST_TRIANGLES, style
+        assert 0 < cost.memory_bytes < MOST_GPU_BYTES
+    assert cost.memory_bytes == 0

@@ -39,11 +39,6 @@ class BodyBuffers:
         vertices, indices = self._coarse if coarse else self._fine
         return [(vertices, *layout(PARTS))], indices
 
-    @property
-    def gpu_bytes(self) -> int:
-        """What they take on the GPU."""
-        return sum(buffer.size for pair in (self._fine, self._coarse) for buffer in pair)
-
     def release(self) -> None:
         for buffer in (*self._fine, *self._coarse):
             buffer.release()

@@ -13,7 +13,6 @@ from appliance.box.show_state import ShowState
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import LINES, Image, read_image, texture_of
 from appliance.projector.picture.lettering import lettered, letters_without_font
-from appliance.projector.picture.tally import Tally
 from appliance.projector.picture.wall import Wall
 from appliance.show.card import CardConfig
 
@@ -52,7 +51,7 @@ class Cards:
         directory: Path,
         say: Callable[[str], None],
     ) -> None:
-        self._gl, self._tally = gl, Tally()
+        self._gl = gl
         self._nothing = gl.texture((1, 1), 4, bytes(4))
         self._drawings = {
             gamma: Drawing(gl, "laid", "card", parts=["GAMMA"] * gamma) for gamma in (False, True)
@@ -94,8 +93,7 @@ class Cards:
             "level": wall.level,
             "inverse_gamma": 1.0 / wall.gamma,
         }
-        self._tally.clear()
-        self._drawings[wall.gamma != 1.0].draw(self._tally, wall.pixels, inputs, moderngl.TRIANGLE_STRIP, 4)
+        self._drawings[wall.gamma != 1.0].draw(inputs, moderngl.TRIANGLE_STRIP, 4)
 
     def release(self) -> None:
         """Give the GPU's memory back."""

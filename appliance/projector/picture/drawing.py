@@ -1,4 +1,4 @@
-"""Drawing: a shader program with what it draws; each use is counted towards the cost of a picture."""
+"""Drawing: a shader program with what it draws."""
 
 from __future__ import annotations
 
@@ -9,12 +9,9 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from appliance.projector.picture.tally import Tally, Use
-
 _SHADERS = Path(__file__).parents[1] / "shaders"
 _HEAD = "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
 _SAMPLER_2D = 0x8B5E  # OpenGL's name for the type of a texture in a shader
-_BYTES = {"f1": 1, "f4": 4}
 
 
 class Drawing:
@@ -34,10 +31,8 @@ class Drawing:
         index: moderngl.Buffer | None = None,
         parts: Sequence[str] = (),
     ) -> None:
-        self._names = vertex, " ".join([fragment, *parts])
         content = list(content)
         self._count = index.size // 4 if index else 3
-        self._vertices = content[0][0].size // _stride(content[0][1]) if index else None
         head = _HEAD + "".join(f"#define {part}\n" for part in parts)
         self._program = ctx.program(
             vertex_shader=head + source(f"{vertex}.vert"), fragment_shader=head + source(f"{fragment}.frag")
@@ -55,29 +50,16 @@ class Drawing:
         self._sent: dict[str, Any] = {}  # what each uniform holds: sending it again would waste time
 
     def draw(
-        self,
-        tally: Tally,
-        pixels: float,
-        inputs: dict[str, Any],
-        mode: int = moderngl.TRIANGLES,
-        vertices: int = 0,
-        instances: int = 1,
+        self, inputs: dict[str, Any], mode: int = moderngl.TRIANGLES, vertices: int = 0, instances: int = 1
     ) -> None:
         """Draw with textures and uniforms by name; the shader takes those that it knows.
 
-        pixels: about how many it will shade; vertices: draw only the first of them. Matrices are numpy's,
-        for column vectors.
+        vertices: draw only the first of them. Matrices are numpy's, for column vectors.
         """
         for unit, name in enumerate(self._textures):
-            texture = inputs[name]
-            texture.use(unit)
-            tally.count_bytes(texture.width * texture.height * texture.components * _BYTES[texture.dtype])
+            inputs[name].use(unit)
         self._send(inputs)
-        count = vertices or self._count
-        self._array.render(mode, count, instances=instances)
-        per_vertex = {moderngl.TRIANGLES: 1 / 3, moderngl.TRIANGLE_STRIP: 1.0, moderngl.POINTS: 2.0}[mode]
-        placed = round(self._vertices * count / self._count) if self._vertices else count * instances
-        tally.count_draw_call(Use(*self._names, placed, round(count * instances * per_vertex), pixels))
+        self._array.render(mode, vertices or self._count, instances=instances)
 
     def _send(self, inputs: dict[str, Any]) -> None:
         """The uniforms that have changed."""
@@ -93,11 +75,6 @@ class Drawing:
     def release(self) -> None:
         self._array.release()
         self._program.release()
-
-
-def _stride(layout: str) -> int:
-    """Bytes of a vertex of a layout such as '3f4 4u1'."""
-    return sum(int(part[0]) * int(part[-1]) for part in layout.split())
 
 
 def source(name: str) -> str:

@@ -35,7 +35,7 @@ class Glow:
         first, second = easel.canvas(name, size), easel.canvas(name + " half", size)
         first.start()
         inputs = {"source": picture.texture, "texel": (0.25 / size[0], 0.25 / size[1]), "gain": gain}
-        self._shrink.draw(easel.tally, first.pixels, inputs)
+        self._shrink.draw(inputs)
         easel.blur(self._blur, first, second, (1 / size[0], 1 / size[1]))
         return first
 
@@ -73,5 +73,5 @@ class Glow:
             "exposure": look.exposure,
         }
         air.start()
-        self._air.draw(easel.tally, air.pixels, inputs)
+        self._air.draw(inputs)
         easel.lay("light_finish", wall, opacity, inputs)

@@ -119,10 +119,5 @@ class PoseTexture:
         texels = dual_quaternions(*self._bind, poses.positions, poses.world)
         self.texture.write(np.ascontiguousarray(texels, np.float32))
 
-    @property
-    def gpu_bytes(self) -> int:
-        """What it takes on the GPU."""
-        return self.texture.width * self.texture.height * 16
-
     def release(self) -> None:
         self.texture.release()

@@ -17,7 +17,6 @@ from appliance.projector.picture.looks.plaster import Plaster
 from appliance.projector.picture.looks.veil import Veil
 from appliance.projector.picture.poses import poses_of, together
 from appliance.projector.picture.scene import Easel, Scene
-from appliance.projector.picture.tally import Cost
 from appliance.projector.picture.wall import Wall, flat
 from appliance.show.look import LookConfig, Style
 
@@ -40,19 +39,12 @@ _LOOKS: dict[Style, Callable[[Easel], _Look]] = {
 class Renderer:
     """Owns what the looks need on the GPU; draws any of them into a framebuffer, or right onto the wall.
 
-    size: of the first picture, pixels; looks: by name, at least one, in the show's order.
+    looks: by name, at least one, in the show's order.
     The same moment makes the same picture, whatever was drawn before.
     """
 
-    def __init__(
-        self,
-        ctx: moderngl.Context,
-        size: tuple[int, int],
-        skeleton: Skeleton,
-        looks: Mapping[str, LookConfig],
-    ) -> None:
+    def __init__(self, ctx: moderngl.Context, skeleton: Skeleton, looks: Mapping[str, LookConfig]) -> None:
         self._looks = looks
-        self._pixels, self._target_bytes = size[0] * size[1], 0
         self._easel = Easel(ctx, skeleton)
         styles = dict.fromkeys(look.style for look in looks.values())
         self._styles = {style: _LOOKS[style](self._easel) for style in styles}
@@ -74,23 +66,16 @@ class Renderer:
         first = next(iter(self._looks.values()))
         now, before = self._looks.get(look, first), self._looks.get(look_before, first)
         easel = self._easel
-        easel.tally.clear()
         figures = (moment, *moment.others)
         each = [poses_of(one, easel.height, easel.sole) for one in figures]
         poses = together(each)
         wall = target if isinstance(target, Wall) else flat(target)
-        self._pixels = wall.picture[0] * wall.picture[1]
-        self._target_bytes = 0 if wall.framebuffer is easel.ctx.screen else 4 * wall.pixels
         seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect, cued)
         scene = Scene(moment.time_s, seen, poses, wall.aspect)
         easel.show(each, [one.holds for one in figures])
         layers = [(before, 1.0), (now, mix)] if 0.0 < mix < 1.0 else [(now if mix > 0 else before, 1.0)]
         for layer, opacity in layers:
             self._styles[layer.style].draw(scene, layer, opacity, wall)
-
-    def cost(self) -> Cost:
-        """The cost of the last picture."""
-        return self._easel.tally.cost(self._pixels, self._easel.gpu_bytes + self._target_bytes)
 
     def release(self) -> None:
         """Give the GPU's memory back."""

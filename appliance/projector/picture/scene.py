@@ -22,7 +22,6 @@ from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import read_image, texture_of
 from appliance.projector.picture.noise import SIDE, noise_pixels
 from appliance.projector.picture.poses import Floats, HoldTexture, Poses, PoseTexture
-from appliance.projector.picture.tally import BACKDROP, Tally
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.vertices import layout, packed
 from appliance.projector.picture.video import Video
@@ -30,7 +29,7 @@ from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 from appliance.show.section import MOST_PUPPETS
 
-BODY_AREA = 0.16  # of a figure height squared that the figure covers, about
+BACKDROP = "BACKDROP"  # the part of a look's last step that has an image behind the figure
 Box = tuple[float, float, float, float]
 WHOLE: Box = (0.0, 0.0, 1.0, 1.0)
 WIDER, SPREAD_STEP, MOST_SPREAD = 1.2, 0.5, 5.0  # in a figure height from the middle; of `spread`
@@ -86,10 +85,6 @@ class Scene:
         """Of the picture's height that a figure height takes where the dancer is."""
         return 0.5 / (self.view.slopes[1] * self.distance)
 
-    def body_pixels(self, size: tuple[int, int]) -> float:
-        """About how many pixels the figure covers in a picture of that size."""
-        return BODY_AREA * (self.share_of_picture * size[1]) ** 2
-
     def box(self, rows: int = 1, margin: float = 0.0) -> Box:
         """Where the figure is in the picture, or has been in the last `rows` of its poses: left, lower, right
         and upper edge, 0..1; margin: around it, of the picture's height."""
@@ -121,7 +116,6 @@ class Easel:
 
     def __init__(self, ctx: moderngl.Context, skeleton: Skeleton) -> None:
         self.ctx, self.skeleton = ctx, skeleton
-        self.tally = Tally()
         mesh = body_mesh(skeleton)
         self.height = mesh.height
         self.sole = float(mesh.bind_positions[:, 1].min() - mesh.vertices[:, 1].min())
@@ -148,10 +142,10 @@ class Easel:
             textures.poses.write(one)
             textures.holds.write(held)
 
-    def draw_figures(self, drawing: Drawing, pixels: float, inputs: dict[str, Any], *drawn: int) -> None:
-        """Draw what belongs to a figure once for each; pixels: of one. drawn: as Drawing takes it."""
+    def draw_figures(self, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
+        """Draw what belongs to a figure once for each. drawn: as Drawing takes it."""
         for textures in self._figures[: self._shown]:
-            drawing.draw(self.tally, pixels, inputs | textures.inputs, *drawn)
+            drawing.draw(inputs | textures.inputs, *drawn)
 
     def vertices(self, parts: Mapping[str, Any], instanced: bool = False) -> list[tuple[Any, ...]]:
         """Bring vertices onto the GPU; returns what a vertex array is made of. instanced: one an instance."""
@@ -170,7 +164,7 @@ class Easel:
         if known is None or known.size != size or known.samples != samples:
             if known:
                 known.release()
-            known = self._canvases[name] = Target(self.ctx, self.tally, size, depth, samples)
+            known = self._canvases[name] = Target(self.ctx, size, depth, samples)
         return known
 
     def held(self, look: LookConfig) -> dict[str, Any]:
@@ -212,7 +206,6 @@ class Easel:
         else:
             self.ctx.enable_only(moderngl.BLEND)
             self.ctx.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-            self.tally.count_bytes(4 * wall.pixels)
         inputs |= {
             "clip_from_picture": wall.clip_from_picture,
             "box": box,
@@ -226,13 +219,9 @@ class Easel:
             across = wall.aspect * backdrop.height / backdrop.width
             inputs["cut"] = (min(1.0, across), min(1.0, 1.0 / across))
             parts = (*parts, BACKDROP)
-        inside = (box[2] - box[0]) * (box[3] - box[1])
-        strip = moderngl.TRIANGLE_STRIP
-        self._sheet(fragment, *parts).draw(self.tally, inside * wall.pixels, inputs, strip, 4)
+        self._sheet(fragment, *parts).draw(inputs, moderngl.TRIANGLE_STRIP, 4)
         if box != WHOLE:
-            frame = self._sheet(fragment, *parts, "FRAME")
-            frame.draw(self.tally, (1 - inside) * wall.pixels, inputs, strip, 10)
-        self.tally.count_bytes(4 * wall.pixels)
+            self._sheet(fragment, *parts, "FRAME").draw(inputs, moderngl.TRIANGLE_STRIP, 10)
 
     def _sheet(self, fragment: str, *parts: str) -> Drawing:
         """Made when it is first needed."""
@@ -261,17 +250,7 @@ class Easel:
         """Soften a picture across, into another canvas of its size, and upwards, back into its own."""
         for source, into, step in ((picture, other, (step_uv[0], 0.0)), (other, picture, (0.0, step_uv[1]))):
             into.start()
-            blur.draw(self.tally, into.pixels, {"source": source.texture, "step_uv": step})
-
-    @property
-    def gpu_bytes(self) -> int:
-        """What all this takes on the GPU."""
-        images = sum(4 * image.width * image.height for image in self._backdrops.values())
-        images += sum(video.gpu_bytes for video in self._videos.values())
-        canvases = sum(canvas.bytes for canvas in self._canvases.values())
-        buffers = sum(buffer.size for buffer in self._buffers)
-        poses = sum(one.poses.gpu_bytes for one in self._figures)
-        return images + canvases + buffers + self.body.gpu_bytes + poses + SIDE * SIDE * 16 // 3
+            blur.draw({"source": source.texture, "step_uv": step})
 
     def release(self) -> None:
         shared: list[Any] = [self.body, *self._figures, self.noise]

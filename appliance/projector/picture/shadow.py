@@ -13,7 +13,6 @@ from appliance.projector.picture.scene import Easel, Scene
 DEPTH_SIDE, CAST_SIDE = 384, 192  # pixels
 FIELD = 0.85  # figure heights around the dancer's middle that the lamp sees
 REACH = 1.7  # figure heights of floor around the dancer on which a shadow can fall
-BODY_SHARE = 0.1  # of the lamp's picture that the body takes, about
 SPREAD = 1.0  # pixels from one sample of the floor shadow's blur to the next
 
 
@@ -35,9 +34,7 @@ class Shadow:
         depth = easel.canvas("lamp depth", (side, side), depth=True)
         depth.start((1.0, 1.0, 1.0, 1.0))
         ctx.enable_only(moderngl.DEPTH_TEST)
-        seen = BODY_SHARE * depth.pixels / scene.spread**2
-        inputs = {"row": 0, "held": 0.0, "projection": lamp_projection}
-        easel.draw_figures(self._depth, seen, inputs)
+        easel.draw_figures(self._depth, {"row": 0, "held": 0.0, "projection": lamp_projection})
         depth.finish()
         lamps = {"lamp_depth": depth.texture, "lamp_projection": lamp_projection}
         return lamps | self.on_floor(scene, lamp)
@@ -52,8 +49,7 @@ class Shadow:
         first.start()
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.MAX, moderngl.MAX
-        covered = BODY_SHARE * first.pixels / scene.spread**2
-        easel.draw_figures(self._cast, covered, {"row": 0, "held": 0.0, **on_floor})
+        easel.draw_figures(self._cast, {"row": 0, "held": 0.0, **on_floor})
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.enable_only(moderngl.NOTHING)
         easel.blur(self._blur, first, second, (SPREAD / side, SPREAD / side))

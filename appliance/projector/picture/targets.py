@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import moderngl
 
-from appliance.projector.picture.tally import Tally
 from appliance.projector.sdl import sdl2
 
 _FRAMEBUFFER, _DEPTH = 0x8D40, 0x8D00  # GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT
@@ -17,35 +16,23 @@ class Target:
     """A texture of four bytes a pixel that can be drawn into, optionally with depth."""
 
     def __init__(
-        self,
-        ctx: moderngl.Context,
-        tally: Tally,
-        size: tuple[int, int],
-        depth: bool = False,
-        samples: int = 0,
+        self, ctx: moderngl.Context, size: tuple[int, int], depth: bool = False, samples: int = 0
     ) -> None:
         """samples: of each pixel's edges, melted into the texture by `finish`; 0: one, in its middle."""
-        self.size, self._ctx, self._tally, self.samples = size, ctx, tally, samples
+        self.size, self._ctx, self.samples = size, ctx, samples
         self.texture = ctx.texture(size, 4)
         self.texture.repeat_x = self.texture.repeat_y = False
         self._depth = ctx.depth_renderbuffer(size, samples=samples) if depth else None
         self._fine = ctx.renderbuffer(size, 4, samples=samples) if samples else None
         self._melted = ctx.framebuffer([self.texture]) if samples else None
         self.buffer = ctx.framebuffer([self._fine or self.texture], self._depth)
-        self.bytes = size[0] * size[1] * (4 + (8 * samples if samples else 4 * depth))
         self._invalidate = _invalidation() if depth else None
-
-    @property
-    def pixels(self) -> int:
-        """How many it has."""
-        return self.size[0] * self.size[1]
 
     def start(self, colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)) -> None:
         """Draw here from now on, over one colour."""
         self.buffer.use()
         self.buffer.viewport = (0, 0, *self.size)
         self.buffer.clear(*colour)
-        self._tally.count_bytes(4 * max(self.samples, 1) * self.pixels)
 
     def keep(self, channels: str, depth: bool = True) -> None:
         """Restrict drawing to these channels ('r' to 'a'), and depth only if wanted."""
@@ -59,7 +46,6 @@ class Target:
             self._invalidate(_FRAMEBUFFER, 1, ctypes.byref(ctypes.c_uint(_DEPTH)))
         if self._melted is not None:
             self._ctx.copy_framebuffer(self._melted, self.buffer)
-            self._tally.count_bytes(4 * (self.samples + 1) * self.pixels)
 
     def release(self) -> None:
         self.buffer.release()

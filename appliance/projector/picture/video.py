@@ -45,11 +45,6 @@ class Video:
             self._texture.write(pixels, alignment=1)
         return self._texture
 
-    @property
-    def gpu_bytes(self) -> int:
-        """What it takes on the GPU."""
-        return 3 * self._texture.width * self._texture.height
-
     def release(self) -> None:
         """End the process, and give the GPU's memory back."""
         self._stop()

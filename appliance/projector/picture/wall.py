@@ -51,11 +51,6 @@ class Wall:
         """Width over height of the picture."""
         return self.picture[0] / self.picture[1]
 
-    @property
-    def pixels(self) -> int:
-        """How many pixels are shaded at most to lay a picture onto it."""
-        return self.display[0] * self.display[1]
-
 
 def flat(framebuffer: moderngl.Framebuffer) -> Wall:
     """All of a framebuffer, as bright as the picture is."""

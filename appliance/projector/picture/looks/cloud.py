@@ -52,18 +52,11 @@ class Cloud:
         picture.start()
         picture.keep("")
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        easel.draw_figures(self._body, scene.body_pixels(picture.size), inputs)
+        easel.draw_figures(self._body, inputs)
         picture.keep("rgba", depth=False)
         easel.ctx.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
-        grains = round(GRAINS * look.density)
-        easel.draw_figures(
-            self._grains,
-            grains * max(2.0, inputs["pixels"] / scene.distance) ** 2,
-            inputs,
-            moderngl.POINTS,
-            grains,
-        )
+        easel.draw_figures(self._grains, inputs, moderngl.POINTS, round(GRAINS * look.density))
         picture.keep("rgba")
         picture.finish()
         self._glow.finish(scene, look, colours, picture, opacity, wall)

@@ -50,9 +50,7 @@ class Ink:
         picture.start()
         picture.keep("ra")
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        easel.draw_figures(
-            self._figure, scene.body_pixels(picture.size), inputs | {"row": 0, "level": 1.0, "hollow": 1.0}
-        )
+        easel.draw_figures(self._figure, inputs | {"row": 0, "level": 1.0, "hollow": 1.0})
         if look.trail_s > 0:
             self._leave_traces(scene, look.trail_s, inputs, picture)
         picture.keep("rgba")
@@ -81,7 +79,7 @@ class Ink:
         if wanted != self._made:
             sheet.start()
             self._easel.ctx.enable_only(moderngl.NOTHING)
-            self._sheet.draw(self._easel.tally, sheet.pixels, wanted | {"noise": self._easel.noise})
+            self._sheet.draw(wanted | {"noise": self._easel.noise})
             self._made = wanted
         return sheet
 
@@ -99,7 +97,7 @@ class Ink:
                 "hollow": 0.0,
                 "held": 0.0,
             }
-            easel.draw_figures(self._echo, 1.6 * scene.body_pixels(picture.size), inputs)
+            easel.draw_figures(self._echo, inputs)
         picture.keep("b")
         brush = max(2.0, BRUSH * scene.share_of_picture * picture.size[1])
         inputs |= {
@@ -110,7 +108,5 @@ class Ink:
             "floor_side": 1.0,
             "brightness": 0.9,
         }
-        length = trail_s * scene.share_of_picture * picture.size[1]  # at a figure height a second
-        pixels = STROKES * length * brush
-        easel.draw_figures(self._strokes, pixels, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
+        easel.draw_figures(self._strokes, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
         easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD

@@ -11,7 +11,7 @@ from appliance.projector.picture.looks.palette import Palette, palette, stored
 from appliance.projector.picture.particles import traced
 from appliance.projector.picture.poses import ROW_S, ROWS
 from appliance.projector.picture.scene import Easel, Scene
-from appliance.projector.picture.strands import POINTS, STEP, ribbons_of
+from appliance.projector.picture.strands import POINTS, ribbons_of
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
@@ -63,20 +63,12 @@ class Lines:
             "held": 0.0,
         }
         if look.trail_s > 0:
-            self._leave_traces(scene, look, colours, picture, inputs, share)
+            self._leave_traces(look, colours, inputs, share)
         inputs |= {"row": 0, "near_colour": stored(colours.figure), "brightness": 1.2 * share}
         inputs |= self._easel.held(look)
-        self._draw_strands(scene, picture, inputs, look.density)
+        self._draw_strands(inputs, look.density)
 
-    def _leave_traces(
-        self,
-        scene: Scene,
-        look: LookConfig,
-        colours: Palette,
-        picture: Target,
-        inputs: dict[str, Any],
-        share: float,
-    ) -> None:
+    def _leave_traces(self, look: LookConfig, colours: Palette, inputs: dict[str, Any], share: float) -> None:
         """Ribbons where hands and feet have gone; above the floor also some strands where they have been."""
         rows = min(ROWS, max(2, round(look.trail_s / ROW_S)))
         trail = {
@@ -87,15 +79,7 @@ class Lines:
             "old_colour": stored(colours.accent),
             "brightness": 0.8 * share,
         }
-        length = look.trail_s * scene.share_of_picture * picture.size[1]  # at a figure height a second
-        self._easel.draw_figures(
-            self._trails,
-            TRACES * length * 2 * trail["width"],
-            inputs | trail,
-            moderngl.TRIANGLE_STRIP,
-            2 * rows,
-            TRACES,
-        )
+        self._easel.draw_figures(self._trails, inputs | trail, moderngl.TRIANGLE_STRIP, 2 * rows, TRACES)
         echoes = ECHOES if inputs["floor_side"] > 0 else 0
         for echo in range(echoes, 0, -1):
             age = echo / (echoes + 1)
@@ -104,11 +88,9 @@ class Lines:
                 "near_colour": stored(colours.accent),
                 "brightness": 0.5 * share * (1 - age) ** 1.5,
             }
-            self._draw_strands(scene, picture, inputs, 0.4 * look.density)
+            self._draw_strands(inputs, 0.4 * look.density)
 
-    def _draw_strands(self, scene: Scene, picture: Target, inputs: dict[str, Any], part: float) -> None:
+    def _draw_strands(self, inputs: dict[str, Any], part: float) -> None:
         """The first part of all strands."""
-        count = round(part * self._count)
-        length = count * POINTS * STEP * scene.share_of_picture * picture.size[1]
-        pixels, triangles = length * 2 * inputs["width"], moderngl.TRIANGLES
-        self._easel.draw_figures(self._strands, pixels, inputs, triangles, count * POINTS * 6)
+        count = round(part * self._count) * POINTS * 6
+        self._easel.draw_figures(self._strands, inputs, moderngl.TRIANGLES, count)

@@ -52,7 +52,7 @@ class Plaster:
         picture = easel.picture(wall, look)
         picture.start()
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        easel.draw_figures(self._figure, scene.body_pixels(picture.size), inputs)
+        easel.draw_figures(self._figure, inputs)
         picture.finish()
         pool = np.array([view.ground[0], 0.0, view.ground[1]])
         inputs |= {
@@ -63,7 +63,7 @@ class Plaster:
         air = easel.canvas("stage", (round(AIR_LINES * scene.aspect), AIR_LINES))
         air.start()
         easel.ctx.enable_only(moderngl.NOTHING)
-        self._air.draw(easel.tally, air.pixels, inputs)
+        self._air.draw(inputs)
         inputs |= {
             "picture": picture.texture,
             "air": air.texture,

@@ -49,6 +49,6 @@ class Veil:
                 "brightness": 1.5 if echo == 0 else 0.75 * (1 - share) ** 1.3,
             }
             body = self._figure if echo == 0 else self._echo
-            easel.draw_figures(body, 1.6 * scene.body_pixels(picture.size), inputs)
+            easel.draw_figures(body, inputs)
         picture.finish()
         self._glow.finish(scene, look, colours, picture, opacity, wall)
