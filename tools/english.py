@@ -39,7 +39,7 @@ _SOLID = r"(?:floor|ground|tables?|stage|legs?|foot|feet|one leg|wall|shelf|T-po
 
 PATTERNS: dict[str, re.Pattern[str]] = {
     "what": re.compile(r"^(?:And |But )?What(?:ever)? (?!if\b)(?!\w+$)[^?]*$"),
-    "of": re.compile(r"^[Oo]f (?!course\b)[^?]*$"),
+    "of": re.compile(r"^(?:of |Of (?!course\b|\d|those\b|these\b))[^?]*$"),
     "alone": re.compile(
         r"^(?!.*\b(?:[Ll]et|[Ll]eft|[Ll]eaves?)\b.* alone).*(?<=[a-z0-9`)] )(?<!stand )(?<!stands )"
         r"(?<!is )(?<!are )(?<!was )(?<!and )(?<!dances )(?<!dance )(?<!works )(?<!work )(?<!be )(?<!goes )"
