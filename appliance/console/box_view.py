@@ -8,15 +8,18 @@ from collections.abc import Sequence
 from typing import Any
 
 from appliance.box.process_health import ProcessHealth
-from appliance.box.show_state import MOTION, ShowStateReader
+from appliance.box.show_state import ShowStateReader
 from appliance.console.desk import Answer, Desk, NoAnswerError
 from appliance.console.stage_view import StageView
 from appliance.console.verdict import Verdict, verdict
+from appliance.levers.lever import Lever
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import FEEDBACK, MADE_NUMBERS, PATH_POINTS, SPRINGS, STIFFNESS, STORM, STRINGS
 from appliance.show_control.sensor_roster import RosterLine
 from appliance.show_control.status_messages import STATUS, Status
 
 _NO_BATTERY = 255
-_KNOBS = ("stiffness", "storm", "feedback")  # of the springs
+_KNOBS = (STIFFNESS, STORM, FEEDBACK)  # of the springs
 _SAME_STAGE_S = 5.0  # a stage that seems to have started this much later is another one
 _LISTS = {"/cues/cue": "cues", "/phrases/phrase": "phrases", "/looks/look": "looks", "/cards/card": "cards"}
 
@@ -90,14 +93,19 @@ class BoxView:
         """What was declared for the show of now. motion: of what is made ahead, by `SOURCE NAME`, the value
         and its fade. springs: of springs and strings; a knob that nobody turned is left out.
         """
-        state = self._show_state.read()
-        dance = state.dance if state.show == self._stage.facts.get("show") else {}
-        motion = {name: list(part[2]) for name, part in dance.items() if name.startswith(MOTION)}
-        turned = {name: dance[name][2][0] for name in _KNOBS if name in dance}
-        setting = dance["springs"][1] if "springs" in dance else ""
+        state: ShowState = self._show_state.read()
+        if state.show != self._stage.facts.get("show"):
+            state = state.for_show("")
+        made = [lever for levers in MADE_NUMBERS.values() for lever in levers.values()]
+        motion: dict[str, list[float]] = {
+            _short(lever): [state[lever].value, state[lever].seconds] for lever in made if lever in state
+        }
+        if PATH_POINTS in state:
+            motion[_short(PATH_POINTS)] = list(state[PATH_POINTS].value)
+        turned = {lever.name: state[lever].value for lever in _KNOBS if lever in state}
         return {
-            "motion": {name.removeprefix(MOTION): values for name, values in motion.items()},
-            "springs": turned | {"setting": setting, "strings": state.strings},
+            "motion": motion,
+            "springs": turned | {"setting": state[SPRINGS].value, "strings": state[STRINGS].value},
         }
 
     def _sensor(self, line: RosterLine) -> dict[str, Any]:
@@ -118,6 +126,11 @@ class BoxView:
         elif late != self._late:
             self._since = time.time()
         self._late = late
+
+
+def _short(lever: Lever[Any]) -> str:
+    """`SOURCE NAME` of a lever of the generator's."""
+    return lever.name.partition(" ")[2]
 
 
 def _status(values: Sequence[Any]) -> Status | None:

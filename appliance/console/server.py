@@ -23,14 +23,15 @@ from appliance.console.metrics import CONTENT_TYPE, metrics
 from appliance.console.page_files import PageFiles, languages
 from appliance.console.stage_view import StageView
 from appliance.console.watchers import Watchers
-from appliance.show_control.command import FORMS, command
+from appliance.levers.addresses import FORMS, QUESTIONS
+from appliance.show_control.command import command
 from appliance.show_control.packet import is_readable
-from appliance.show_control.status_messages import QUESTIONS
 
 _YEAR_S = 365 * 24 * 3600
 _MOST_ARGUMENTS = 32  # a line over the map
 _WRONG = (web.HTTPBadRequest, web.HTTPForbidden, web.HTTPRequestEntityTooLarge, web.HTTPRequestTimeout)
-_NOT_FROM_HERE = frozenset((*QUESTIONS, "/sensors/list", "/ping"))  # answered to the page in another way
+_QUESTIONS = [question.address for question in QUESTIONS]
+_NOT_FROM_HERE = frozenset((*_QUESTIONS, "/sensors/list", "/ping"))  # answered to the page in another way
 
 
 class Server:

@@ -7,7 +7,10 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from appliance.box.show_state import ShowState
+from appliance.levers.addresses import ADDRESSES, ANSWERS, QUESTIONS, Receiver
+from appliance.levers.lever import Lever
+from appliance.levers.show_state import Change, ShowState
+from appliance.levers.table import CAMERA, CARD, CUE, LIGHTS, LOOK, PHRASE, RATE, SPRINGS, find_lever
 from appliance.show.sources import LIVE
 from appliance.show_control.acknowledgements import Acknowledgements
 from appliance.show_control.command import (
@@ -24,20 +27,14 @@ from appliance.show_control.key_file import KeyFile
 from appliance.show_control.live_input import LiveInput, is_live
 from appliance.show_control.names_of_show import joint_name
 from appliance.show_control.order_dispatch import OrderDispatch
-from appliance.show_control.orders import Order, Place
+from appliance.show_control.orders import Order
 from appliance.show_control.packet import Message, messages_in, readable
 from appliance.show_control.port import Address
 from appliance.show_control.sensor_roster import END as ROSTER_END
 from appliance.show_control.sensor_roster import SENSOR, roster_messages
-from appliance.show_control.show_state_commands import (
-    DECLARATIONS,
-    SHOWS_RATE,
-    in_cue,
-    let_go,
-    of_this_show,
-)
+from appliance.show_control.show_state_commands import declare, in_cue, let_go, of_this_show
 from appliance.show_control.stage_observer import StageObserver
-from appliance.show_control.status_messages import END, QUESTIONS, STATUS, Status, status, told
+from appliance.show_control.status_messages import END, Status, status, told
 from appliance.show_control.trackers import TRACKERS, Trackers
 
 if TYPE_CHECKING:
@@ -45,36 +42,13 @@ if TYPE_CHECKING:
     from appliance.sensor.keys import SensorKey
 
 # What a box sends is never answered: two boxes would go on answering each other for ever.
-_ANSWERS = frozenset(
-    (REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END, "/motion/is", "/motion/parameter")
-)
-_LISTED = ("/cues/", "/phrases/", "/looks/", "/cards/", "/hands/", "/fallbacks/")
-_ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
+_ANSWERS = frozenset((*ANSWERS, REPLY, SENSORS_REPLY, PONG, END, SENSOR, ROSTER_END))
+_LISTED = tuple(f"{question.address}/" for question in QUESTIONS if question.address != "/motion")
+_QUESTIONS = frozenset(question.address for question in QUESTIONS)
+_ONCE_A_BUNDLE = frozenset((*_QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
-
-ORDERS: Mapping[str, tuple[Place, str]] = {
-    "/player/jump": ("stage", "jump"),
-    "/player/excerpt": ("stage", "excerpt"),
-    "/springs/kick": ("stage", "kick"),
-    "/mocap/setjointrot": ("stage", "hold"),
-    "/mocap/setjointpos": ("stage", "place"),
-    "/mocap/releasejoint": ("stage", "release"),
-    "/sensors/neutral": ("stage", "neutral"),
-    "/sensors/heading": ("stage", "heading"),
-    "/sensors/strobe": ("stage", "strobe"),
-    "/sensors/reload": ("stage", "reload"),
-    "/motion/keep": ("generator", "keep"),
-    "/lights/walk": ("lights", "walk"),
-    "/lights/walk/stop": ("lights", "walk/stop"),
-    "/projector/corner": ("projector", "corner"),
-    "/projector/corners": ("projector", "corners"),
-    "/projector/corners/reset": ("projector", "corners/reset"),
-    "/projector/nudge": ("projector", "nudge"),
-    "/projector/brightness": ("projector", "brightness"),
-    "/projector/mirror": ("projector", "mirror"),
-    "/projector/grid": ("projector", "grid"),
-    "/projector/info": ("projector", "info"),
-}
+# Of the stage's cue; its checkpoint has the rest.
+_ADOPTED: tuple[Lever[Any], ...] = (CUE, LOOK, CARD, CAMERA, LIGHTS, SPRINGS)
 
 
 class CommandHandler:
@@ -167,20 +141,17 @@ class CommandHandler:
         Its master is left out: a box that was switched on shows something.
         """
         before: Mapping[str, list[float]] = health.get("motion") or {}
-        values = {
-            name: ("", tuple(given)) for name, given in before.items() if name not in self.show_state.dance
-        }
-        if values:
-            self._publish_changed(self.show_state.with_dance(now, values))
+        changes = [
+            Change(one, one.given("", given)[0])
+            for name, given in before.items()
+            if (one := find_lever(name)) is not None and one not in self.show_state
+        ]
         cue = next((cue for cue in facts.cues if cue["name"] == health.get("cue")), None)
         if cue is not None and not self.show_state.cue:
-            parts = [
-                part for part in ("look", "card", "camera", "lights") if not getattr(self.show_state, part)
-            ]
-            adopted = in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now)
-            if cue.get("springs"):  # the stage's checkpoint does not hold it
-                adopted = adopted.with_dance(now, {"springs": (cue["springs"], ())})
-            self._publish_changed(adopted)
+            adopted = [one for one in _ADOPTED if not self.show_state[one].value]
+            changes += [one._replace(seconds=0.0) for one in in_cue(cue, facts) if one.lever in adopted]
+        if changes:
+            self._publish_changed(self.show_state.changed(now, changes))
 
     def _carry_out(self, command: Command, asker: Address, now: float) -> None:
         """Raises ValueError for what cannot be done."""
@@ -189,15 +160,15 @@ class CommandHandler:
             self._send(asker, (PONG,))
         elif words := let_go(command):
             self._send(asker, (REPLY, address, 0, words))  # not done, and nothing was refused
-        elif address in DECLARATIONS:
-            self._declare(command, asker, now)
-        elif address in QUESTIONS:
+        elif address in _QUESTIONS:
             for message in told(address, self.show_state, observer, self.status(0, now), now):
                 self._send(asker, message)
         elif address == "/sensors/list":
             self._send_roster(asker, now)
+        elif (order := ADDRESSES[address].order) is not None:
+            self._order(*order, command, asker, now)
         else:
-            self._order(command, asker, now)
+            self._declare(command, asker, now)
 
     def _declare(self, command: Command, asker: Address, now: float) -> None:
         """Reply at once; about the dance once it follows."""
@@ -205,9 +176,9 @@ class CommandHandler:
         before = of_this_show(self.show_state, observer.facts)
         if address in ("/phrase", "/cue"):
             command = replace(command, kept=observer.kept())
-        show_state, words = DECLARATIONS[address](before, command, observer.facts, now)
+        show_state, words = declare(before, command, observer.facts, now)
         if address == "/go" and before.going and observer.state(now) == "stopped":
-            show_state = show_state.with_dance(now, SHOWS_RATE)
+            show_state = show_state.to(RATE, None, now)
         self._publish_changed(show_state)
         if show_state.generation != before.generation and self._takes_live:
             words = f"{words} {self._live.words(now)}".lstrip()
@@ -217,8 +188,7 @@ class CommandHandler:
         else:
             self.acknowledgements.expect(show_state.generation, words, now, reply)
 
-    def _order(self, command: Command, asker: Address, now: float) -> None:
-        place, name = ORDERS[command.address]
+    def _order(self, place: Receiver, name: str, command: Command, asker: Address, now: float) -> None:
         text = joint_name(command.text, self._observer.facts)
         keys = self._keys.keys() if command.address == "/sensors/reload" else _no_keys()
         order = Order(name, command.values, text, keys, quiet=command.address.startswith(STREAMS))
@@ -254,7 +224,7 @@ class CommandHandler:
         """Whether the show is to start from a live dancer."""
         show_state, facts = self.show_state, self._observer.facts
         is_ours = facts is not None and show_state.show == facts.show_name
-        return is_ours and show_state.dance.get("phrase", (0, "", ()))[1] == LIVE
+        return is_ours and show_state[PHRASE].value == LIVE
 
     def _hear_live(self, address: str, arguments: Sequence[object], now: float) -> None:
         try:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import MASTER
 
 _PAUSE_S = 0.5  # a fader that moves all the time never floods the terminal
 
@@ -16,7 +17,9 @@ def held_back(show_state: ShowState) -> str:
     if show_state.blackout:
         return "Blackout is in force. /blackout 0 lifts it."
     return (
-        "" if show_state.master > 0.0 else "Master is at 0 %: dark. /master 1 brings picture and lights back."
+        ""
+        if show_state[MASTER].value > 0.0
+        else "Master is at 0 %: dark. /master 1 brings picture and lights back."
     )
 
 

@@ -14,8 +14,9 @@ from pathlib import Path
 from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
 from appliance.box.process_health import COMMANDS_DROPPED, ProcessHealthWriter
-from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
+from appliance.box.show_state import ShowStateReader, ShowStateWriter
 from appliance.box.stop_signals import stop_signals
+from appliance.levers.show_state import ShowState
 from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.fallback import LIVE_DROPPED, SENDER_NOT_LISTED

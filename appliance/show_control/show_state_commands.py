@@ -2,40 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from appliance.box.show_state import MOTION, ShowState
+from appliance.levers.addresses import ADDRESSES
+from appliance.levers.fade import Fade
+from appliance.levers.lever import AT_ONCE, Lever
+from appliance.levers.show_state import Change, ShowState
+from appliance.levers.table import (
+    AGAIN,
+    CAMERA,
+    CUE,
+    GO_FADE_S,
+    GOING,
+    HAND,
+    LEVERS,
+    MADE_NUMBERS,
+    MOST_AGAIN,
+    PATH_POINTS,
+    PHRASE,
+    RATE,
+    STOP_FADE_S,
+    hand,
+)
 from appliance.outputs.shared_frame import Facts
 from appliance.show.config_error import did_you_mean
-from appliance.show.sources import MADE, NO_CARD, PARAMETERS, PATH, POINTS
+from appliance.show.sources import MADE, POINTS
 from appliance.show_control.command import Command
 from appliance.show_control.names_of_show import danced, held, joint_name, known, next_cue
-
-STOP_FADE_S = 2.0
-GO_FADE_S = 1.0
-LOOK_FADE_S = 2.0  # of looks, cards, camera and lights, where a command gives none
-PHRASE_FADE_S = 2.0
-STAND = ("angle_deg", "elevation_deg", "figure")  # what /camera sets
-MOST_AGAIN = 1000
-
-SPRINGS_KNOBS = ("wind", "gravity", "stiffness", "storm", "feedback")  # they last until the next setting
-
-SHOWS_RATE: dict[str, tuple[str, tuple[float, ...]]] = {"rate": ("", ())}
 
 Declared = tuple[ShowState, str]  # the next show state, and a sentence
 Declaration = Callable[[ShowState, Command, "Facts | None", float], Declared]
 
 
+def declare(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    """Carry out a command that persists. Raises ValueError with a sentence for one that cannot be."""
+    if (own := OWN.get(command.address)) is not None:
+        return own(show_state, command, facts, now)
+    lever = ADDRESSES[command.address].lever
+    if lever is None:
+        raise ValueError(f"{command.address} declares nothing.")
+    value, seconds = lever.given(str(command.text), command.values)
+    _require(lever, value, command, facts)
+    return show_state.to(lever, value, now, seconds), lever.said(value, seconds)
+
+
+def _require(lever: Lever[Any], value: Any, command: Command, facts: Facts | None) -> None:
+    """Raises ValueError where the show has no such name, or nothing that the lever moves."""
+    if lever.follower:
+        danced(facts)
+    if (need := lever.needs) is not None:
+        among = getattr(danced(facts), need.among)
+        if need.what != ("", ""):
+            known(*need.what, among)
+        elif not among:
+            raise ValueError(need.cure)
+    if lever.names != ("", "") and value:
+        names, what = lever.names
+        kept = command.kept if lever is PHRASE else ()
+        known(what, value, (*getattr(facts, names), *kept) if facts else None)
+
+
 def _go(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     dark = show_state.panic or not show_state.going
-    if not show_state.going or show_state.dance.get("rate", (0, "", ()))[2] == (0.0,):
-        show_state = show_state.with_dance(now, SHOWS_RATE)
+    if not show_state.going or show_state[RATE].value == 0.0:
+        show_state = show_state.to(RATE, None, now)
     if show_state.panic:
-        show_state = replace(show_state, panic=False, going=True, going_since=now, going_fade_s=GO_FADE_S)
+        come_back = {**show_state.settings, GOING.name: Fade(1.0, 0.0, now, GO_FADE_S)}
+        show_state = replace(show_state, panic=False, settings=come_back)
     elif not show_state.going:
-        show_state = show_state.with_going(True, now, GO_FADE_S)
+        show_state = _going(show_state, 1.0, now, GO_FADE_S)
     if show_state.blackout:
         return show_state, "The show goes on, in the dark: /blackout 0 brings picture and lights back."
     return show_state, "The show goes on: picture and lights come back." if dark else "The show goes on."
@@ -43,12 +80,17 @@ def _go(show_state: ShowState, command: Command, facts: Facts | None, now: float
 
 def _stop(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     fade_s = command.values[0] if command.values else STOP_FADE_S
-    if not show_state.going and show_state.going_level(now) <= 0.0:
+    if not show_state.going and show_state[GOING].level(now) <= 0.0:
         return show_state, "The show stands still already. /go lets it go on."
     if not show_state.going and fade_s == 0.0:  # a button let go: the fade of its press is not to be cut
         return show_state, "The show stops already, and its fade runs on. /go lets it go on."
     words = f"Picture and lights fade out over {fade_s:g} s, then the phrase stands still. /go lets it go on."
-    return show_state.with_going(False, now, fade_s), words
+    return _going(show_state, 0.0, now, fade_s), words
+
+
+def _going(show_state: ShowState, going: float, now: float, fade_s: float) -> ShowState:
+    """Stop or go on from the brightness of this moment; `fade_s` is for the whole way."""
+    return show_state.to(GOING, going, now, fade_s * abs(going - show_state[GOING].level(now)))
 
 
 def _panic(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
@@ -62,136 +104,50 @@ def _blackout(show_state: ShowState, command: Command, facts: Facts | None, now:
     return replace(show_state, blackout=False), "Picture and lights are as bright as master says."
 
 
-def _master(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    master, *fade = command.values
-    show_state = show_state.with_master(master, now, fade[0] if fade else 0.0)
-    return show_state, f"Master goes to {100 * master:.0f} %."
-
-
-def _strings(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    strings, *fade = command.values
-    show_state = show_state.with_strings(strings, now, fade[0] if fade else 0.0)
-    return show_state, f"The strings go to {100 * strings:.0f} %."
-
-
-def _look(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    name = known("look", command.text, facts.looks if facts else None)
-    fade_s = command.values[0] if command.values else LOOK_FADE_S
-    return show_state.with_look(name, now, fade_s), f"The look {name} comes over {fade_s:g} s."
-
-
-def _card(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    fade_s = command.values[0] if command.values else LOOK_FADE_S
-    if command.text == NO_CARD:
-        return show_state.with_card("", now, fade_s), f"The card goes over {fade_s:g} s."
-    name = known("card", command.text, facts.cards if facts else None)
-    return show_state.with_card(name, now, fade_s), f"The card {name} comes over {fade_s:g} s."
-
-
-def _camera(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    given = 0 if command.address == "/camera/look" else len(STAND)
-    fade_s = command.values[given] if command.values[given:] else LOOK_FADE_S
-    camera = dict(zip(STAND[:given], command.values, strict=False))
-    return show_state.with_camera(camera, now, fade_s), f"The camera moves over {fade_s:g} s."
-
-
-def _lights(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    name = known("set of light mappings", command.text, facts.lights if facts else None)
-    fade_s = command.values[0] if command.values else LOOK_FADE_S
-    return show_state.with_lights(name, now, fade_s), f"The lights {name} come over {fade_s:g} s."
-
-
 def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     facts = danced(facts)
     cues = {str(cue["name"]): cue for cue in facts.cues}
     name = known("cue", command.text, [*cues]) if command.text else next_cue(show_state.cue, [*cues])
-    cue, fade_s = cues[name], float(cues[name]["fade_s"])
-    parts: dict[str, tuple[str, tuple[float, ...]]] = {"cue": (name, ())}
-    if cue.get("phrase") is not None:
-        parts["phrase"] = cue["phrase"], (fade_s,)
-    if cue.get("hands") is not None:
-        parts |= {f"hand {joint}": (joint, (float(joint in cue["hands"]),)) for joint in held(facts)}
-    if cue.get("springs") is not None:
-        show_state, parts["springs"] = _without_knobs(show_state), (cue["springs"], (fade_s,))
+    return show_state.changed(now, in_cue(cues[name], facts)), f"Cue {name}."
+
+
+def in_cue(cue: Mapping[str, Any], facts: Facts) -> Iterator[Change[Any]]:
+    """What a cue changes."""
+    fade_s = float(cue["fade_s"])
+    yield Change(CUE, str(cue["name"]))
+    for lever in LEVERS:
+        given = cue.get(lever.cue) if lever.cue else None
+        if given is None:
+            continue
+        if lever is HAND:
+            yield from (Change(hand(joint), joint in given) for joint in held(facts))
+        else:
+            yield Change(lever, lever.kind.plain(given), 0.0 if lever.fade_s is AT_ONCE else fade_s)
     for source, changes in (cue.get("motion") or {}).items():
         for key, value in changes.items():
-            values = tuple(map(float, value)) if key == POINTS else (float(value), fade_s)
-            parts[f"{MOTION}{source} {key}"] = "", values
-    if cue.get("iterations") is not None:
-        parts["iterations"] = "", (*map(float, cue["iterations"]), fade_s)
-    if cue.get("liveliness") is not None:
-        parts["liveliness"] = "", (float(cue["liveliness"]), fade_s)
-    if cue.get("seed") is not None:
-        parts["seed"] = "", (float(cue["seed"]),)
-    return in_cue(show_state, cue, PARTS, now).with_dance(now, parts), f"Cue {name}."
+            if key == POINTS:
+                yield Change(PATH_POINTS, PATH_POINTS.kind.plain(value))
+            else:
+                yield Change(MADE_NUMBERS[source][key], float(value), fade_s)
 
 
-def _phrase(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    name = known("phrase", command.text, (*danced(facts).phrases, *command.kept))
-    return show_state.with_dance(now, {"phrase": (name, command.values or (PHRASE_FADE_S,))}), ""
-
-
-def _motion(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    _, _, source, name = command.address.split("/")
-    known("source of motion", source, danced(facts).phrases)
-    value, *fade_s = command.values
-    words = f"The {name} of {source} goes to {value:g}{f' over {fade_s[0]:g} s' if fade_s else ''}."
-    return show_state.with_dance(now, {f"{MOTION}{source} {name}": ("", command.values)}), words
+def _camera_of_look(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    fade_s = command.values[0] if command.values else CAMERA.fade_s or 0.0
+    return show_state.to(CAMERA, {}, now, fade_s), CAMERA.said({}, fade_s)
 
 
 def _points(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    known("source of motion", PATH, danced(facts).phrases)
+    _require(PATH_POINTS, (), command, facts)
     if len(command.values) % 2:
         raise ValueError("/motion/path takes x and y of each point, and the last one has no y.")
-    points = len(command.values) // 2
-    words = {0: "The path is the phrase's own again.", 1: "The path stays at this point of the map."}
-    said = words.get(points, f"The path is a line of {points} points, there and back.")
-    return show_state.with_dance(now, {f"{MOTION}{PATH} {POINTS}": ("", command.values)}), said
+    return show_state.to(PATH_POINTS, command.values, now), PATH_POINTS.said(command.values, 0.0)
 
 
 def _again(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     if not any(source in danced(facts).phrases for source in MADE):
         raise ValueError("This show has no source that is made ahead: show.yaml names them under motion.")
-    before = show_state.dance.get(f"{MOTION}again", (0, "", (0.0,)))[2][0]
-    return show_state.with_dance(
-        now, {f"{MOTION}again": ("", ((before + 1) % MOST_AGAIN,))}
-    ), "Once more, anew."
-
-
-def _iterations(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    danced(facts)
-    return show_state.with_dance(now, {"iterations": ("", command.values)}), ""
-
-
-def _liveliness(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    danced(facts)
-    words = f"The liveliness goes to {100 * command.values[0]:.0f} %."
-    return show_state.with_dance(now, {"liveliness": ("", command.values)}), words
-
-
-def _seed(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    danced(facts)
-    words = f"The answer goes over to the seed {command.values[0]:.0f}."
-    return show_state.with_dance(now, {"seed": ("", command.values)}), words
-
-
-def _springs(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    name = known("setting of springs", command.text, danced(facts).springs)
-    parts = {"springs": (name, command.values)}
-    return _without_knobs(show_state).with_dance(now, parts), f"The springs are {name}."
-
-
-def _knob(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    if not danced(facts).springs:
-        raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")
-    part = command.address.removeprefix("/springs/")
-    return show_state.with_dance(now, {part: ("", command.values)}), ""
-
-
-def _without_knobs(show_state: ShowState) -> ShowState:
-    """Another setting of the springs brings its own wind, gravity and feedback."""
-    dance = {name: part for name, part in show_state.dance.items() if name not in SPRINGS_KNOBS}
-    return replace(show_state, dance=dance)
+    times = (show_state[AGAIN].value + 1) % MOST_AGAIN
+    return show_state.to(AGAIN, times, now), "Once more, anew."
 
 
 def _hold(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
@@ -199,42 +155,27 @@ def _hold(show_state: ShowState, command: Command, facts: Facts | None, now: flo
     if joint not in joints:
         cure = did_you_mean(joint, joints) if joints else "Give it some under `hands` in its show.yaml."
         raise ValueError(f"No hand of this show holds '{joint}'. {cure}")
-    words = f"The hand of {joint} {'holds' if command.values[0] else 'lets go'}."
-    return show_state.with_dance(now, {f"hand {joint}": (joint, command.values)}), words
+    lever, holds = hand(joint), bool(command.values[0])
+    return show_state.to(lever, holds, now), lever.said(holds, 0.0)
 
 
-def _rate(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+def _start(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     danced(facts)
-    rate = (0.0,) if command.address == "/player/stop" else command.values
-    return show_state.with_dance(now, {"rate": ("", rate)}), ""
+    return show_state.to(RATE, None if command.address == "/player/start" else 0.0, now), ""
 
 
-DECLARATIONS: dict[str, Declaration] = {
+OWN: dict[str, Declaration] = {
     "/go": _go,
     "/stop": _stop,
     "/panic": _panic,
     "/blackout": _blackout,
-    "/master": _master,
-    "/look": _look,
-    "/card": _card,
-    "/camera": _camera,
-    "/camera/look": _camera,
-    "/lights": _lights,
     "/cue": _cue,
-    "/phrase": _phrase,
-    "/iterations": _iterations,
-    "/liveliness": _liveliness,
-    "/seed": _seed,
+    "/camera/look": _camera_of_look,
     "/hold": _hold,
-    "/springs": _springs,
-    "/strings": _strings,
-    **{f"/springs/{name}": _knob for name in SPRINGS_KNOBS},
     "/motion/path": _points,
     "/motion/again": _again,
-    **{f"/motion/{source}/{name}": _motion for source, names in PARAMETERS.items() for name in names},
-    "/player/start": _rate,
-    "/player/stop": _rate,
-    "/player/rate": _rate,
+    "/player/start": _start,
+    "/player/stop": _start,
 }
 
 _LET_GO = {
@@ -248,42 +189,17 @@ def let_go(command: Command) -> str:
     return _LET_GO.get(command.address, "") if command.values == (0.0,) else ""
 
 
-PARTS = ("look", "card", "camera", "lights", "master", "strings")  # what is seen and heard beside it
-
-
-def in_cue(show_state: ShowState, cue: Mapping[str, Any], parts: Iterable[str], now: float) -> ShowState:
-    """The show state in a cue, without its dance: of `parts` those that the cue names."""
-    fade_s = float(cue["fade_s"])
-    wanted = {part: cue[part] for part in parts if cue.get(part) is not None}
-    if "look" in wanted:
-        show_state = show_state.with_look(wanted["look"], now, fade_s)
-    if "card" in wanted:
-        card = wanted["card"] if wanted["card"] != NO_CARD else ""
-        show_state = show_state.with_card(card, now, fade_s)
-    if "camera" in wanted:
-        camera = {key: value for key, value in wanted["camera"].items() if value is not None}
-        show_state = show_state.with_camera(camera, now, fade_s)
-    if "lights" in wanted:
-        show_state = show_state.with_lights(wanted["lights"], now, fade_s)
-    if "master" in wanted:
-        show_state = show_state.with_master(float(wanted["master"]), now, fade_s)
-    if "strings" in wanted:
-        show_state = show_state.with_strings(float(wanted["strings"]), now, fade_s)
-    return replace(show_state, cue=cue["name"])
-
-
 def of_this_show(show_state: ShowState, facts: Facts | None) -> ShowState:
     """Without the dance of another show, and without names that this one does not know."""
     if facts is None:
         return show_state
     show_state = show_state.for_show(facts.show_name)
-    return replace(
-        show_state,
-        look=show_state.look if show_state.look in facts.looks else "",
-        look_before=show_state.look_before if show_state.look_before in facts.looks else "",
-        card=show_state.card if show_state.card in facts.cards else "",
-        card_before=show_state.card_before if show_state.card_before in facts.cards else "",
-        lights=show_state.lights if show_state.lights in facts.lights else "",
-        lights_before=show_state.lights_before if show_state.lights_before in facts.lights else "",
-        cue=show_state.cue if show_state.cue in [cue["name"] for cue in facts.cues] else "",
-    )
+    settings = dict(show_state.settings)
+    for lever in LEVERS:
+        if lever.stays and lever.names != ("", "") and lever in show_state:
+            fade, names = show_state[lever], getattr(facts, lever.names[0])
+            value, before = (one if one in names else "" for one in (fade.value, fade.before))
+            settings[lever.name] = replace(fade, value=value, before=before)
+    if show_state.cue not in [cue["name"] for cue in facts.cues]:
+        settings.pop(CUE.name, None)
+    return replace(show_state, settings=settings)

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
-from appliance.box.show_state import MOTION, ShowState
+from appliance.levers.addresses import LISTS
+from appliance.levers.lever import Lever
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import LIGHTS, LOOK, MADE_NUMBERS
 from appliance.pose.foreign_file import plain_json
-from appliance.show.sources import NO_CARD, PARAMETERS
 from appliance.show_control.packet import Message
 
 if TYPE_CHECKING:
     from appliance.show_control.stage_observer import StageObserver
 
 STATUS, END = "/bunraku/status", "/end"
-QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/cards", "/hands", "/fallbacks", "/motion")
 UNKNOWN = -1.0
 _LONGEST_WORDS = 1000  # of a sentence in an answer
 
@@ -76,8 +77,8 @@ def status(
         phrase=str(health.get("phrase", "")),
         position_s=_known(health.get("position_s")),
         cue=show_state.cue,
-        look=show_state.look or (facts.looks[0] if facts and facts.looks else ""),
-        lights=show_state.lights or (facts.lights[0] if facts and facts.lights else ""),
+        look=show_state[LOOK].value or (facts.looks[0] if facts and facts.looks else ""),
+        lights=show_state[LIGHTS].value or (facts.lights[0] if facts and facts.lights else ""),
         level=show_state.level(now),
         panic=int(show_state.panic),
         blackout=int(show_state.blackout),
@@ -95,13 +96,11 @@ def status(
 def told(
     question: str, show_state: ShowState, observer: StageObserver, now_status: Status, now: float
 ) -> Iterator[Message]:
-    """The answer to one of QUESTIONS: a message for each thing, and one to end with."""
+    """The answer to a question: a message for each thing, and one to end with."""
     if question == "/status":
         answers: list[Message] = [(STATUS, *now_status)]
-    elif question == "/cards":
-        cards = (NO_CARD, *observer.facts.cards) if observer.facts else ()
-        shown = show_state.card or NO_CARD
-        answers = [("/cards/card", name, int(name == shown)) for name in cards]
+    elif question in LISTS:
+        answers = list(_names(LISTS[question], show_state, observer))
     elif question == "/motion":
         answers = [*_made(now_status, observer), *_declared(show_state, observer)]
     else:
@@ -120,9 +119,14 @@ def _phrases(status: Status, observer: StageObserver, now: float) -> Iterator[Me
         yield "/phrases/phrase", name, int(name == status.phrase)
 
 
-def _looks(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
-    for name in observer.facts.looks if observer.facts else ():
-        yield "/looks/look", name, int(name == status.look)
+def _names(lever: Lever[str], show_state: ShowState, observer: StageObserver) -> Iterator[Message]:
+    """The names that the show has for a lever; where none is set, the first is in force."""
+    attribute, listed = lever.names[0], lever.listed
+    names: tuple[str, ...] = getattr(observer.facts, attribute) if observer.facts else ()
+    if observer.facts and lever.none:
+        names = lever.none, *names
+    for name in names:
+        yield f"/{attribute}/{listed}", name, int(name == (show_state[lever].value or names[0]))
 
 
 def _hands(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
@@ -154,17 +158,17 @@ def _made(status: Status, observer: StageObserver) -> Iterator[Message]:
 def _declared(show_state: ShowState, observer: StageObserver) -> Iterator[Message]:
     """Each parameter of the show's sources that are made ahead, with the value that it has or fades to."""
     facts = observer.facts
-    dance = show_state.dance if facts is not None and show_state.show == facts.show_name else {}
+    is_ours = facts is not None and show_state.show == facts.show_name
     for source, section in facts.motion.items() if facts is not None else ():
-        for name in PARAMETERS[source]:
-            value, *_ = dance.get(f"{MOTION}{source} {name}", (0, "", (section[name],)))[2]
+        for name, lever in MADE_NUMBERS[source].items():
+            is_set = is_ours and lever in show_state
+            value = show_state[lever].value if is_set else section[name]
             yield "/motion/parameter", source, name, float(value)
 
 
 _LISTS = {
     "/cues": _cues,
     "/phrases": _phrases,
-    "/looks": _looks,
     "/hands": _hands,
     "/fallbacks": _fallbacks,
 }

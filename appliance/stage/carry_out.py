@@ -2,9 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from appliance.dancer.held_places import RemotePlace
 from appliance.dancer.puppeteers import Remote
-from appliance.dancer.springs_parameters import KNOBS
+from appliance.dancer.springs import Springs
+from appliance.levers.lever import Lever
+from appliance.levers.table import (
+    CUE,
+    FEEDBACK,
+    GRAVITY,
+    HAND,
+    ITERATIONS,
+    LIVELINESS,
+    PHRASE,
+    RATE,
+    SEED,
+    SPRINGS,
+    STIFFNESS,
+    STORM,
+    WIND,
+)
 from appliance.pose import quaternion
 from appliance.sensor.link import SensorLink
 from appliance.show.config_error import did_you_mean
@@ -14,11 +32,10 @@ from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
 
 SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
-SPRINGS_ORDERS = frozenset(("springs", "kick", *KNOBS))
-KNOB_S = 0.5  # in which a knob's value is reached where a command gives no fade
 STROBE_S = 10.0
 
 Outcome = tuple[bool, str]
+Effect = Callable[[Order, StageParts, Iterations], str]  # a sentence, or nothing; raises ValueError
 
 
 def carry_out(
@@ -32,47 +49,18 @@ def carry_out(
 
 def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
     """Carry out an order that is not about sensors."""
-    motion, words = parts.motion, ""
+    effect = EFFECTS.get(order.name)
+    if effect is None:
+        return False, f"The stage knows no order '{order.name}'."
     try:
-        if order.name in ("hold", "place", "release"):
-            _lead(order, parts)
-        elif order.name == "hand":
-            _enable(order, parts)
-        elif order.name == "iterations":
-            coding, interaction, *fade_s = order.values
-            words = iterations.ask(int(coding), int(interaction), *fade_s)
-            if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
-                words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
-        elif order.name == "liveliness":
-            parts.liveliness.ask(*order.values)
-        elif order.name == "seed":
-            parts.liveliness.change_seed(int(order.values[0]))
-        elif order.name == "allow":
-            for puppet in parts.puppets:
-                puppet.iterations.allow(int(order.values[0]))
-        elif order.name in SPRINGS_ORDERS:
-            _spring(order, parts)
-        elif order.name == "phrase":
-            words = parts.first.play(order.text, *order.values)
-        elif order.name == "made":
-            _dance_made(order, parts)
-        elif order.name == "rate":
-            for puppet in parts.puppets:
-                puppet.motion.rate = order.values[0]
-        elif order.name == "jump":
-            motion.jump(order.values[0])
-        elif order.name == "excerpt":
-            motion.excerpt(*order.values)
-        elif order.name != "cue":  # its parts are orders of their own; the journal notes its name
-            raise ValueError(f"The stage knows no order '{order.name}'.")
+        return True, effect(order, parts, iterations)
     except ValueError as error:
         return False, str(error)
-    return True, words
 
 
 def obey_for_sensors(order: Order, parts: StageParts, wearing: SensorFit, now: float) -> Outcome:
     """Carry out one of SENSOR_ORDERS: whether it was done, and a sentence for the client."""
-    sensor = str(order.text)
+    sensor = order.text
     try:
         if order.name == "reload":
             return True, _admit(order, parts)
@@ -116,21 +104,72 @@ def _require_heard(names: list[str], link: SensorLink, now: float) -> None:
         raise ValueError(f"Sensor {', '.join(names)} is silent. Switch it on, and look at its battery.")
 
 
-def _enable(order: Order, parts: StageParts) -> None:
+def _iterate(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    (coding, interaction), seconds = ITERATIONS.given(order.text, order.values)
+    words = iterations.ask(coding, interaction, seconds)
+    if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
+        words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
+    return words
+
+
+def _allow(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    for puppet in parts.puppets:
+        puppet.iterations.allow(int(order.values[0]))
+    return ""
+
+
+def _enliven(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    parts.liveliness.ask(*LIVELINESS.given(order.text, order.values))
+    return ""
+
+
+def _change_seed(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    parts.liveliness.change_seed(SEED.given(order.text, order.values)[0])
+    return ""
+
+
+def _play(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    return parts.first.play(order.text, *order.values)  # without a fade: the show's
+
+
+def _set_rate(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    for puppet in parts.puppets:
+        puppet.motion.rate = order.values[0]
+    return ""
+
+
+def _jump(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    parts.motion.jump(order.values[0])
+    return ""
+
+
+def _excerpt(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    parts.motion.excerpt(*order.values)
+    return ""
+
+
+def _note(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    return ""  # a cue's parts are orders of their own; the journal notes its name
+
+
+def _enable(order: Order, parts: StageParts, iterations: Iterations) -> str:
     """Let a hand hold or let go; one by OSC that was told nothing yet holds its joint where it is."""
+    holds, _ = HAND.given(order.text, order.values)
     for puppeteer in parts.hands.puppeteers:
         if puppeteer.joint == order.text:
-            puppeteer.enabled = bool(order.values[0])
+            puppeteer.enabled = holds
             if puppeteer.enabled and isinstance(puppeteer, Remote):
                 puppeteer.hold_here(_orientation(puppeteer.joint, parts).tolist())
             if puppeteer.enabled and isinstance(puppeteer, RemotePlace):
                 puppeteer.hold_here(parts.first.frame.positions[puppeteer.number].tolist())
+    return ""
 
 
-def _dance_made(order: Order, parts: StageParts) -> None:
+def _dance_made(order: Order, parts: StageParts, iterations: Iterations) -> str:
     """Let a puppet go over to what the generator made for it; the first, where no number follows the fade."""
     fade_s, *number = order.values
-    parts.puppets[int(number[0]) if number else 0].play_made(str(order.text), fade_s)
+    parts.puppets[int(number[0]) if number else 0].play_made(order.text, fade_s)
+    return ""
 
 
 def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
@@ -145,28 +184,50 @@ def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
     return here
 
 
-def _spring(order: Order, parts: StageParts) -> None:
-    """The first puppet's springs get a setting, a kick (m/s), a turned knob; the gate is of them all."""
-    if order.name == "gate":
-        for each in parts.springs:
-            each.turn("gate", order.values[:1], *order.values[1:])
-        return
-    springs = parts.first.springs
-    if springs is None:
+def _gate(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    """Whether the strings of all puppets drive their joints."""
+    opened, seconds = order.values
+    for springs in parts.springs:
+        springs.turn("gate", (opened,), seconds)
+    return ""
+
+
+def _call_springs(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    springs = _springs(parts)
+    setting, seconds = SPRINGS.given(order.text, order.values)
+    if setting not in springs.settings:
+        raise ValueError(f"There is no setting of springs '{setting}' in this show.")
+    springs.call(setting, seconds)
+    return ""
+
+
+def _turn(knob: Lever[float]) -> Effect:
+    def turn(order: Order, parts: StageParts, iterations: Iterations) -> str:
+        value, seconds = knob.given(order.text, order.values)
+        _springs(parts).turn(knob.name, (value,), seconds)
+        return ""
+
+    return turn
+
+
+def _blow(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    _springs(parts).turn(WIND.name, WIND.given(order.text, order.values)[0])
+    return ""
+
+
+def _kick(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    _springs(parts).kick(order.values)
+    return ""
+
+
+def _springs(parts: StageParts) -> Springs:
+    """The first puppet's. Raises ValueError where it has none."""
+    if parts.first.springs is None:
         raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")
-    if order.name == "kick":
-        springs.kick(order.values)
-    elif order.name in ("wind", "gravity"):
-        springs.turn(order.name, order.values)
-    elif order.name in KNOBS:
-        springs.turn(order.name, order.values[:1], *(order.values[1:] or (KNOB_S,)))
-    elif str(order.text) in springs.settings:
-        springs.call(str(order.text), order.values[0] if order.values else 0.0)
-    else:
-        raise ValueError(f"There is no setting of springs '{order.text}' in this show.")
+    return parts.first.springs
 
 
-def _lead(order: Order, parts: StageParts) -> None:
+def _lead(order: Order, parts: StageParts, iterations: Iterations) -> str:
     """Give a joint that is held by OSC its orientation or place, or back: of each puppet with such a hand."""
     puppeteers = [one for puppet in parts.puppets for one in puppet.hands.puppeteers]
     led = [one for one in puppeteers if isinstance(one, Remote | RemotePlace) and one.joint == order.text]
@@ -178,7 +239,7 @@ def _lead(order: Order, parts: StageParts) -> None:
     if order.name == "release":
         for puppeteer in led:
             puppeteer.release()
-        return
+        return ""
     wanted = RemotePlace if order.name == "place" else Remote
     led = [one for one in led if isinstance(one, wanted)]
     if not led:
@@ -194,3 +255,27 @@ def _lead(order: Order, parts: StageParts) -> None:
         else:
             x, y, z, angle = order.values
             puppeteer.hold_axis_angle((x, y, z), angle)
+    return ""
+
+
+EFFECTS: dict[str, Effect] = {
+    PHRASE.name: _play,
+    RATE.name: _set_rate,
+    HAND.name: _enable,
+    ITERATIONS.name: _iterate,
+    LIVELINESS.name: _enliven,
+    SEED.name: _change_seed,
+    SPRINGS.name: _call_springs,
+    WIND.name: _blow,
+    **{knob.name: _turn(knob) for knob in (STIFFNESS, STORM, FEEDBACK, GRAVITY)},
+    CUE.name: _note,
+    "hold": _lead,
+    "place": _lead,
+    "release": _lead,
+    "jump": _jump,
+    "excerpt": _excerpt,
+    "kick": _kick,
+    "gate": _gate,
+    "made": _dance_made,
+    "allow": _allow,
+}

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from appliance.dancer.grounding import Grounding
 from appliance.dancer.held_places import FixedPlace, HeldPlace, RemotePlace
-from appliance.dancer.played import Played
+from appliance.dancer.motion_source import Playback
 from appliance.dancer.puppet import Puppet
 from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
 from appliance.dancer.reach import reach_in
@@ -20,7 +20,7 @@ from appliance.stage.stage_error import StageError
 
 
 def puppeteers_of(
-    show: Show, hands: Sequence[HandConfig], puppet: Puppet, grounding: Grounding, motion: Played
+    show: Show, hands: Sequence[HandConfig], puppet: Puppet, grounding: Grounding, motion: Playback
 ) -> list[Puppeteer]:
     """The hands of one puppet in their order; springs know the others, whose joints they leave alone, and
     hands by place where its phrases take their joints.

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any
 
-from appliance.box.show_state import MOTION, ShowStateReader
+from appliance.box.show_state import ShowStateReader
 from appliance.dancer.material.material_file import Material
+from appliance.levers.fade import Fade
+from appliance.levers.lever import AT_ONCE, Lever, at_once
+from appliance.levers.table import PHRASE, RATE, SPRINGS, find_lever
 from appliance.show.sources import LIVE, MAIN
 from appliance.show_control.orders import Order
-from appliance.stage.carry_out import SPRINGS_ORDERS, obey
+from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
 from appliance.stage.made_motions import MELT_S, MadeMotions
 from appliance.stage.stage_parts import StageParts
 
+_OF_SPRINGS = frozenset((SPRINGS.name, *SPRINGS.ends))
 GATE_S = 1.0  # in which strings drive the joints again after panic, blackout and stop
 
 
@@ -51,36 +55,41 @@ class Reconciler:
         """Orders that make the dance follow the show state; none in nearly every tick."""
         orders: list[Order] = []
         show_state = self._reader.read()
-        is_news = self._is_first or show_state.generation != self.generation
-        if is_news and show_state.show == self._show:
+        has_news = self._is_first or show_state.generation != self.generation
+        if has_news and show_state.show == self._show:
             before, self.generation = self.generation, show_state.generation
             self.cue = show_state.cue or self.cue
-            for name, (number, text, values) in show_state.dance.items():
-                if number > before and name == "rate":
-                    self.rate = values[0] if values else self._usual_rate or 1.0
-                elif name.startswith(MOTION):
-                    self.motion = tuple({**dict(self.motion), name: values}.items())
-                elif name == "phrase" and self._is_made(text):
-                    continue  # the generator makes it
-                elif number > before:
-                    orders.append(Order(name.partition(" ")[0], values, text))
-                elif self._is_first and name in SPRINGS_ORDERS:  # it was in force
-                    orders.append(without_fade(Order(name, values, text)))
+            for name, fade in show_state.settings.items():
+                if (one := find_lever(name)) is None:
+                    continue
+                is_news = fade.generation > before
+                if one is RATE and is_news:
+                    self.rate = self._usual_rate or 1.0 if fade.value is None else fade.value
+                elif one.follower == "generator":
+                    self.motion = tuple({**dict(self.motion), name: one.told(fade)[1]}.items())
+                elif one.follower != "stage" or (one is PHRASE and self._is_made(fade.value)):
+                    continue  # others follow it
+                elif is_news:
+                    orders.append(order_of(one, fade))
+                elif self._is_first and name in _OF_SPRINGS:  # it was in force
+                    orders.append(order_of(one, at_once(fade)))
             self._is_first = False
         if (gate := show_state.going and not (show_state.panic or show_state.blackout)) != self._gate:
             self._gate = gate
             if self.parts.springs:
                 orders.append(Order("gate", (float(gate), GATE_S if gate else 0.0)))
         live, is_ours = self.parts.live, show_state.show == self._show
-        declared = show_state.dance.get("phrase") if is_ours else None
-        wanted, fade = (declared[1], declared[2]) if declared else (self.source, ())
+        declared = show_state.settings.get(PHRASE.name) if is_ours else None
+        wanted = declared.value if declared else self.source
+        melt_s = declared.seconds if declared else MELT_S
         self.wanted = "" if wanted in self.parts.motion.phrases else wanted
         if wanted == LIVE and live is not None and not (orders or live.is_chosen):
-            orders.append(Order("phrase", fade, LIVE))  # after a restart: checkpoints know phrases only
+            # After a restart: checkpoints know phrases only.
+            orders.append(order_of(PHRASE, declared) if declared else Order(PHRASE.name, (), LIVE))
         for puppet, made in enumerate(self._made):
             source, fade_s = made.source, MELT_S
             if puppet == 0:
-                source, fade_s = wanted if self._is_made(wanted) else "", fade[0] if fade else MELT_S
+                source, fade_s = wanted if self._is_made(wanted) else "", melt_s
             if (order := made.order(source, fade_s, now)) is not None:
                 orders.append(order)
         rate = 0.0 if show_state.stands(now) else self.rate
@@ -117,12 +126,15 @@ class Reconciler:
         return " ".join(filter(None, (cue, *words)))
 
 
+def order_of(lever: Lever[Any], fade: Fade[Any]) -> Order:
+    """The order to go to a value, as the journal notes it."""
+    text, numbers = lever.told(fade)
+    return Order(lever.family, numbers, text)
+
+
 def without_fade(order: Order) -> Order:
     """The same, at once."""
-    if order.name == "iterations":
-        return replace(order, values=order.values[:2])
-    if order.name == "springs":
-        return replace(order, values=())
-    if order.name in ("feedback", "stiffness", "storm"):
-        return replace(order, values=(order.values[0], 0.0))
-    return order
+    one = find_lever(order.name)
+    if one is None or one.fade_s is AT_ONCE:
+        return order
+    return order_of(one, at_once(Fade(one.given(order.text, order.values)[0], one.default)))

@@ -15,7 +15,7 @@ from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.show_control.command import Command
 from appliance.show_control.orders import Order
-from appliance.show_control.show_state_commands import DECLARATIONS
+from appliance.show_control.show_state_commands import declare
 from appliance.stage.carry_out import carry_out
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
@@ -71,7 +71,7 @@ class Night:
         """What show control declares at a command; the dance follows after the last tick."""
         now, facts = self.slot.started, facts_of(self.show, None, self.tick.iterations, 0.0)
         command = Command(address, values, text)
-        self._declared.now, _ = DECLARATIONS[address](self._declared.now, command, facts, now)
+        self._declared.now, _ = declare(self._declared.now, command, facts, now)
         for order in self.reconciler.pending(now):
             self._carry_out(order, now)
 

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from appliance.show_control.command import FORMS
+from appliance.levers.addresses import FORMS
 from appliance.show_control.packet import MOST_MESSAGES, messages_in
 
 _NUMBERS = [0, 1, -1, 2, 65, 2**31 - 1, -(2**31)]

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from appliance.box.show_state import ShowState, ShowStateReader
+from appliance.levers.lever import Lever
 
 
 def show_state(folder: Path) -> ShowState:
     return ShowStateReader(folder).read()
 
 
-def declared(folder: Path, part: str) -> tuple[object, ...]:
-    """What is declared for a part of the dance: a text, and numbers; nothing before it is."""
-    _, text, numbers = show_state(folder).dance.get(part, (0, "", ()))
-    return (text, *numbers) if part in show_state(folder).dance else ()
+def declared(folder: Path, lever: Lever[Any]) -> tuple[Any, float] | None:
+    """Value and seconds of a lever; None: it was not set."""
+    state = show_state(folder)
+    return (state[lever].value, state[lever].seconds) if lever in state else None

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from appliance.show_control.command import FORMS, Command, command
+from appliance.levers.addresses import FORMS
+from appliance.show_control.command import Command, command
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "osc.md"
 

@@ -3,17 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from appliance.box.show_state import ShowState
-from appliance.show_control.command import FORMS
-from appliance.show_control.command_handler import ORDERS
+from appliance.levers.addresses import ADDRESSES
+from appliance.levers.lever import Lever
+from appliance.levers.table import (
+    CAMERA,
+    CARD,
+    ITERATIONS,
+    LIGHTS,
+    LIVELINESS,
+    LOOK,
+    MASTER,
+    PHRASE,
+    RATE,
+    SEED,
+    hand,
+)
 from appliance.show_control.orders import Order
-from appliance.show_control.show_state_commands import DECLARATIONS
-from appliance.show_control.status_messages import QUESTIONS
+from appliance.show_control.show_state_commands import OWN
 from tests.show_control.doubles import Asker, ControlInThread, InboxDouble, StageDouble, until
 from tests.show_control.in_force import declared, show_state
+
+
+def faded(folder: Path, lever: Lever[Any]) -> tuple[Any, Any, float]:
+    """From where to where, in how long."""
+    fade = show_state(folder)[lever]
+    return fade.value, fade.before, fade.seconds
 
 
 def test_ping(asker: Asker) -> None:
@@ -24,29 +42,26 @@ def test_master_look_and_lights_fade(folder: Path, stage: StageDouble, asker: As
     asker.ask("/master", 0.25, 5)
     asker.ask("/look", "ink", 4)
     asker.ask("/lights", "cold")
-    now = show_state(folder)
-    assert (now.master, now.master_before, now.master_fade_s) == (0.25, 1.0, 5.0)
-    assert (now.look, now.look_before, now.look_fade_s) == ("ink", "", 4.0)
-    assert (now.lights, now.lights_before, now.lights_fade_s) == ("cold", "", 2.0)
+    assert faded(folder, MASTER) == (0.25, 1.0, 5.0)
+    assert faded(folder, LOOK) == ("ink", "", 4.0)
+    assert faded(folder, LIGHTS) == ("cold", "", 2.0)
 
 
 def test_cards_and_the_camera_come_and_go_with_fades(folder: Path, stage: StageDouble, asker: Asker) -> None:
     assert asker.ask("/card", "blank", 3)[2] == 1
-    now = show_state(folder)
-    assert (now.card, now.card_before, now.card_fade_s) == ("blank", "", 3.0)
+    assert faded(folder, CARD) == ("blank", "", 3.0)
     off, on, end = asker.ask_all("/cards")
     assert (off, on, end) == (["/cards/card", "none", 0], ["/cards/card", "blank", 1], ["/end", "/cards", 2])
     asker.ask("/card", "none")
-    assert (show_state(folder).card, show_state(folder).card_fade_s) == ("", 2.0)
+    assert declared(folder, CARD) == ("", 2.0)
     assert asker.ask("/camera", 90, 20, 0.4, 5)[2] == 1
-    now = show_state(folder)
-    assert (now.camera, now.camera_fade_s) == (
+    assert declared(folder, CAMERA) == (
         {"angle_deg": 90.0, "elevation_deg": 20.0, "figure": pytest.approx(0.4)},
         5.0,
     )
     assert "figure (0.1 to 0.9)" in asker.ask("/camera", 90, 20, 3)[3]
     asker.ask("/camera/look", 1)
-    assert (show_state(folder).camera, show_state(folder).camera_fade_s) == ({}, 1.0)
+    assert declared(folder, CAMERA) == ({}, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +83,7 @@ def test_what_is_misspelt_changes_nothing_and_the_nearest_is_named(
     assert (address, about, done) == ("/reply", message[0], 0)
     assert cure in words
     now = show_state(folder)
-    assert now in (ShowState(), ShowState(show="A test")) and now.generation == 0
+    assert not now.settings and now.generation == 0 and not now.panic
     assert stage.orders == []
 
 
@@ -79,42 +94,47 @@ def test_names_without_a_stage_are_refused_in_words(asker: Asker) -> None:
 
 
 @pytest.mark.parametrize(
-    ("message", "part", "wanted"),
+    ("message", "lever", "wanted"),
     [
-        (("/phrase", "quiet"), "phrase", ("quiet", 2.0)),
-        (("/phrase", "quiet", 0), "phrase", ("quiet", 0.0)),
-        (("/iterations", 12, 11), "iterations", ("", 12.0, 11.0)),
+        (("/phrase", "quiet"), PHRASE, ("quiet", 2.0)),
+        (("/phrase", "quiet", 0), PHRASE, ("quiet", 0.0)),
+        (("/iterations", 12, 11), ITERATIONS, ((12, 11), 0.0)),
     ],
 )
 def test_what_persists_of_the_dance_is_declared_and_answered_when_the_stage_follows(
-    folder: Path, stage: StageDouble, asker: Asker, message: tuple[str], part: str, wanted: tuple[object, ...]
+    folder: Path,
+    stage: StageDouble,
+    asker: Asker,
+    message: tuple[str],
+    lever: Lever[Any],
+    wanted: tuple[object, ...],
 ) -> None:
     stage.remark = "So it is."
     assert asker.ask(*message) == ["/reply", message[0], 1, "So it is."]
-    assert declared(folder, part) == wanted
+    assert declared(folder, lever) == wanted
     assert stage.orders == []
 
 
 def test_how_alive_and_which_dance_is_declared(folder: Path, stage: StageDouble, asker: Asker) -> None:
     words = "The liveliness goes to 50 %."
     assert asker.ask("/liveliness", 0.5, 3) == ["/reply", "/liveliness", 1, words]
-    assert declared(folder, "liveliness") == ("", 0.5, 3.0)
+    assert declared(folder, LIVELINESS) == (0.5, 3.0)
     words = "The answer goes over to the seed 2147483647."
     assert asker.ask("/seed", 2**31 - 1) == ["/reply", "/seed", 1, words]
-    assert declared(folder, "seed") == ("", 2.0**31 - 1)
+    assert declared(folder, SEED) == (2**31 - 1, 0.0)
     stage.tell(liveliness=0.75, seed=5)
     assert asker.ask("/status")[-3:] == [0.75, 5, ""]
 
 
 def test_hands_are_declared_by_name_or_number(folder: Path, stage: StageDouble, asker: Asker) -> None:
     assert asker.ask("/hold", "lShldr", 0) == ["/reply", "/hold", 1, "The hand of lShldr lets go."]
-    assert declared(folder, "hand lShldr") == ("lShldr", 0.0)
+    assert declared(folder, hand("lShldr")) == (False, 0.0)
     assert asker.ask("/hold", 2, 1) == ["/reply", "/hold", 1, "The hand of lShldr holds."]
-    assert declared(folder, "hand lShldr") == ("lShldr", 1.0)
+    assert declared(folder, hand("lShldr")) == (True, 0.0)
     assert "Did you mean 'lShldr'?" in asker.ask("/hold", "lSholder", 1)[3]
     assert "No hand of this show holds 'Chest'" in asker.ask("/hold", "Chest", 1)[3]
     assert "There is no joint 99" in asker.ask("/hold", 99, 1)[3]
-    assert list(show_state(folder).dance) == ["hand lShldr"]
+    assert list(show_state(folder).settings) == ["hand lShldr"]
 
 
 @pytest.mark.parametrize(
@@ -144,9 +164,9 @@ def test_streams_are_answered_when_refused_alone(folder: Path, stage: StageDoubl
     until(lambda: len(stage.orders) == 4)
     assert [order.name for order in stage.orders] == ["excerpt", "hold", "jump", "release"]
     assert stage.orders[-1].text == "lShldr"
-    assert declared(folder, "rate") == ("", -1.0)
+    assert declared(folder, RATE) == (-1.0, 0.0)
     asker.tell("/player/stop")
-    until(lambda: declared(folder, "rate") == ("", 0.0))
+    until(lambda: declared(folder, RATE) == (0.0, 0.0))
     stage.obeys = False
     assert asker.ask("/ping") == ["/pong"]
 
@@ -211,5 +231,7 @@ def test_two_show_controls_do_not_share_a_folder(folder: Path, control: ControlI
 
 
 def test_each_command_is_carried_out_somewhere() -> None:
-    tables = (ORDERS, DECLARATIONS, QUESTIONS)
-    assert set(FORMS) == {"/ping", "/sensors/list"}.union(*tables)
+    declared = {address for address, one in ADDRESSES.items() if one.lever} | set(OWN)
+    orders = {address for address, one in ADDRESSES.items() if one.order}
+    assert set(ADDRESSES) == {"/ping", "/sensors/list"} | declared | orders
+    assert not declared & orders

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import CUE, GOING, LOOK, MASTER
 from appliance.show_control.console_messages import ConsoleMessages, held_back
 
 
 def test_nothing_is_said_where_nothing_changes() -> None:
-    news = ConsoleMessages(ShowState(panic=True, cue="storm"))
-    assert news.look(ShowState(panic=True, cue="storm"), 0.0) == ""
-    assert news.look(replace(ShowState(panic=True, cue="storm"), look="wires"), 1.0) == ""
+    news = ConsoleMessages(ShowState(panic=True).to(CUE, "storm"))
+    assert news.look(ShowState(panic=True).to(CUE, "storm"), 0.0) == ""
+    assert news.look(ShowState(panic=True).to(CUE, "storm").to(LOOK, "wires"), 1.0) == ""
 
 
 @pytest.mark.parametrize(
     ("show_state", "words"),
     [
         (ShowState(panic=True), "Panic is in force: black"),
-        (ShowState(going=False), "The show is stopped: dark. /go"),
+        (ShowState().to(GOING, 0.0), "The show is stopped: dark. /go"),
         (ShowState(blackout=True), "Blackout is in force. /blackout 0"),
-        (ShowState(master=0.0), "Master is at 0 %: dark. /master 1"),
-        (ShowState(panic=True, blackout=True, going=False), "Panic"),
+        (ShowState().to(MASTER, 0.0), "Master is at 0 %: dark. /master 1"),
+        (ShowState(panic=True, blackout=True).to(GOING, 0.0), "Panic"),
     ],
 )
 def test_why_it_is_dark_is_said_once_and_that_it_is_back(show_state: ShowState, words: str) -> None:
@@ -36,8 +35,8 @@ def test_why_it_is_dark_is_said_once_and_that_it_is_back(show_state: ShowState, 
 
 def test_a_cue_is_said_with_what_it_changes() -> None:
     news = ConsoleMessages(ShowState())
-    assert news.look(ShowState(cue="storm"), 0.0) == "Cue storm."
-    assert news.look(ShowState(cue="end", master=0.0), 1.0).startswith("Cue end. Master is at 0 %")
+    assert news.look(ShowState().to(CUE, "storm"), 0.0) == "Cue storm."
+    assert news.look(ShowState().to(CUE, "end").to(MASTER, 0.0), 1.0).startswith("Cue end. Master is at 0 %")
 
 
 def test_a_button_that_somebody_plays_with_is_no_flood() -> None:

@@ -4,8 +4,26 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import (
+    CAMERA,
+    CARD,
+    CUE,
+    ITERATIONS,
+    LIGHTS,
+    LIVELINESS,
+    LOOK,
+    MASTER,
+    PHRASE,
+    SEED,
+    hand,
+)
 from tests.show_control.doubles import Asker, StageDouble
 from tests.show_control.in_force import declared, show_state
+
+
+def shown(now: ShowState) -> tuple[str, str, str, float]:
+    return now.cue, now[LOOK].value, now[LIGHTS].value, now[MASTER].value
 
 
 def test_a_cue_declares_picture_lights_and_dance_and_is_answered_when_the_dance_follows(
@@ -14,20 +32,20 @@ def test_a_cue_declares_picture_lights_and_dance_and_is_answered_when_the_dance_
     stage.remark = "At most 8 iterations fit."
     assert asker.ask("/cue", "storm") == ["/reply", "/cue", 1, "Cue storm. At most 8 iterations fit."]
     now = show_state(folder)
-    assert (now.cue, now.look, now.lights, now.master) == ("storm", "ink", "cold", 0.5)
-    assert (now.card, now.camera) == ("blank", {"angle_deg": 30.0})
-    assert (now.look_fade_s, now.lights_fade_s, now.master_fade_s) == (4.0, 4.0, 4.0)
-    assert declared(folder, "phrase") == ("quiet", 4.0)
-    assert declared(folder, "hand lShldr") == ("lShldr", 0.0)
-    assert declared(folder, "iterations") == ("", 12.0, 11.0, 4.0)
-    assert declared(folder, "liveliness") == ("", 0.25, 4.0)
-    assert declared(folder, "seed") == ("", 7.0)
-    dance = {**now.dance}
+    assert shown(now) == ("storm", "ink", "cold", 0.5)
+    assert (now[CARD].value, now[CAMERA].value) == ("blank", {"angle_deg": 30.0})
+    assert [now[lever].seconds for lever in (LOOK, LIGHTS, MASTER)] == [4.0, 4.0, 4.0]
+    assert declared(folder, PHRASE) == ("quiet", 4.0)
+    assert declared(folder, hand("lShldr")) == (False, 0.0)
+    assert declared(folder, ITERATIONS) == ((12, 11), 4.0)
+    assert declared(folder, LIVELINESS) == (0.25, 4.0)
+    assert declared(folder, SEED) == (7, 0.0)
+    before = now.settings
     assert asker.ask("/cue", 1)[2] == 1
     now = show_state(folder)
-    assert (now.cue, now.look, now.lights, now.master) == ("1", "lines", "cold", 0.5)
-    assert declared(folder, "cue") == ("1",)
-    assert {**now.dance, "cue": dance["cue"]} == dance  # what it leaves out stays
+    assert shown(now) == ("1", "lines", "cold", 0.5)
+    assert declared(folder, CUE) == ("1", 0.0)
+    assert {name for name in before if now.settings[name] != before[name]} == {"cue", "look"}
 
 
 def test_a_command_again_is_declared_again(folder: Path, stage: StageDouble, asker: Asker) -> None:
@@ -35,7 +53,7 @@ def test_a_command_again_is_declared_again(folder: Path, stage: StageDouble, ask
     generations = []
     for message in (("/phrase", "quiet"), ("/phrase", "quiet"), ("/cue", "storm"), ("/cue", "storm")):
         assert asker.ask(*message)[2] == 1
-        generations.append(show_state(folder).dance["phrase"][0])
+        generations.append(show_state(folder)[PHRASE].generation)
     assert generations == sorted(set(generations))
 
 
@@ -46,7 +64,7 @@ def test_what_is_said_after_a_cue_wins_over_it(folder: Path, stage: StageDouble,
     asker.tell("/cue", "1")
     assert {asker.hear()[1] for _ in range(4)} == {"/look", "/cue", "/master"}  # type: ignore[index]
     now = show_state(folder)
-    assert (now.cue, now.look, now.lights, now.master) == ("1", "lines", "cold", 0.25)
+    assert shown(now) == ("1", "lines", "cold", 0.25)
 
 
 def test_cues_follow_each_other(folder: Path, stage: StageDouble, asker: Asker) -> None:

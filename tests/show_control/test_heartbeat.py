@@ -12,7 +12,8 @@ from typing import get_type_hints
 import pytest
 from pythonosc.osc_message import OscMessage
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import GOING
 from appliance.show_control.heartbeat import Heartbeat
 from appliance.show_control.packet import datagram
 from appliance.show_control.stage_observer import StageObserver
@@ -73,9 +74,9 @@ def test_every_state_of_the_stage_and_the_house(folder: Path) -> None:
     assert state(ShowState()) == state(ShowState(panic=True)) == "absent"
     with StageDouble(folder) as stage:
         until(lambda: state(ShowState()) == "dancing")
-        until(lambda: state(ShowState(panic=True, blackout=True, going=False)) == "panic")
-        until(lambda: state(ShowState(blackout=True, going=False)) == "blackout")
-        until(lambda: state(ShowState(going=False)) == "stopped")
+        until(lambda: state(ShowState(panic=True, blackout=True).to(GOING, 0.0)) == "panic")
+        until(lambda: state(ShowState(blackout=True).to(GOING, 0.0)) == "blackout")
+        until(lambda: state(ShowState().to(GOING, 0.0)) == "stopped")
         stage.tell(state="stopped")
         until(lambda: state(ShowState()) == "stopped")
         stage.dances = False

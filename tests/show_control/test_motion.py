@@ -11,10 +11,11 @@ from typing import Any, cast
 import pytest
 
 from appliance.box.made_motion import KeptNamesWriter
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import AGAIN, MADE_NUMBERS, PATH_POINTS, PHRASE
 from appliance.show.sources import MOST_POINTS, PARAMETERS
 from appliance.show_control.command import command
-from appliance.show_control.show_state_commands import DECLARATIONS
+from appliance.show_control.show_state_commands import declare
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status, told
 from tests.show_control.doubles import facts
@@ -27,7 +28,7 @@ def declared(address: str, *arguments: Any, **more: Any) -> tuple[ShowState, str
     """What a command declares in a show with all sources."""
     before = more.pop("before", ShowState(show="A test"))
     asked = command(address, arguments)
-    return DECLARATIONS[address](before, asked, facts(**{"phrases": SOURCES} | more), NOW)
+    return declare(before, asked, facts(**{"phrases": SOURCES} | more), NOW)
 
 
 @pytest.mark.parametrize("source", PARAMETERS)
@@ -35,7 +36,7 @@ def test_each_parameter_is_declared_within_its_bounds(source: str) -> None:
     for name, about in PARAMETERS[source].items():
         address = f"/motion/{source}/{name}"
         state, words = declared(address, about.most, 3.0)
-        assert state.dance[f"motion {source} {name}"][2] == (about.most, 3.0) and name in words
+        assert state[MADE_NUMBERS[source][name]].value == about.most and name in words
         for wrong in ((about.most + 1,), (about.least - 1,), (), (about.least, 100.0), ("far",)):
             with pytest.raises(ValueError, match=address):
                 declared(address, *wrong)
@@ -44,7 +45,7 @@ def test_each_parameter_is_declared_within_its_bounds(source: str) -> None:
 def test_points_of_the_map_come_in_pairs_between_0_and_1() -> None:
     for count in (0, 1, MOST_POINTS):
         state, words = declared("/motion/path", *[0.25, 0.75] * count)
-        assert state.dance["motion path points"][2] == (0.25, 0.75) * count and words
+        assert state[PATH_POINTS].value == (0.25, 0.75) * count and words
     with pytest.raises(ValueError, match="has no y"):
         declared("/motion/path", 0.5, 0.5, 0.5)
     for wrong in ((0.5, 1.5), [0.5] * (2 * MOST_POINTS + 1)):
@@ -55,7 +56,7 @@ def test_points_of_the_map_come_in_pairs_between_0_and_1() -> None:
 def test_again_counts_on() -> None:
     once, _ = declared("/motion/again")
     twice, _ = declared("/motion/again", before=once)
-    assert [state.dance["motion again"][2] for state in (once, twice)] == [(1.0,), (2.0,)]
+    assert [state[AGAIN].value for state in (once, twice)] == [1, 2]
 
 
 def test_a_show_without_the_source_is_told_so() -> None:
@@ -72,10 +73,11 @@ def test_a_cue_declares_the_parameters_that_it_names_with_its_fade() -> None:
     changes = {"vary": {"sigma": 2.0}, "path": {"points": [0.25, 0.75]}}
     cue = {"name": "wild", "phrase": "vary", "motion": changes, "fade_s": 8.0}
     state, _ = declared("/cue", "wild", cues=(cue,))
-    assert state.dance["motion vary sigma"][2] == (2.0, 8.0)
-    assert state.dance["phrase"][1:] == ("vary", (8.0,))
-    assert state.dance["motion path points"][2] == (0.25, 0.75)
-    assert len([name for name in state.dance if name.startswith("motion")]) == 2
+    sigma, phrase = state[MADE_NUMBERS["vary"]["sigma"]], state[PHRASE]
+    assert (sigma.value, sigma.seconds) == (2.0, 8.0)
+    assert (phrase.value, phrase.seconds) == ("vary", 8.0)
+    assert state[PATH_POINTS].value == (0.25, 0.75)
+    assert len([name for name in state.settings if name.startswith("motion")]) == 2
 
 
 def test_kept_motions_are_known_by_name(tmp_path: Path) -> None:

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from appliance.levers.lever import Lever
+from appliance.levers.table import GOING, ITERATIONS, LIGHTS, LOOK, MASTER, PHRASE
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.show_control.order_dispatch import ANSWER_S, PATIENCE_S
 from appliance.show_control.orders import Order, OrderInbox
@@ -72,13 +74,13 @@ def test_a_command_is_carried_out_however_long_it_was_held_up_before(
 
 
 @pytest.mark.parametrize(
-    ("command", "since"),
+    ("command", "lever"),
     [
-        (("/stop", 2.0), "going_since"),
-        (("/master", 0.5, 3.0), "master_since"),
-        (("/look", "ink", 4.0), "look_since"),
-        (("/lights", "cold", 4.0), "lights_since"),
-        (("/cue", "storm"), "look_since"),
+        (("/stop", 2.0), GOING),
+        (("/master", 0.5, 3.0), MASTER),
+        (("/look", "ink", 4.0), LOOK),
+        (("/lights", "cold", 4.0), LIGHTS),
+        (("/cue", "storm"), LOOK),
     ],
 )
 def test_a_fade_begins_when_its_command_has_come(
@@ -86,14 +88,14 @@ def test_a_fade_begins_when_its_command_has_come(
     clock: Clock,
     asker: Asker,
     command: tuple[Any, ...],
-    since: str,
+    lever: Lever[Any],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     hold_up(process, clock, 5.0, monkeypatch)
     asker.tell(*command)
     began = clock.now
     process.turn()
-    assert getattr(process.handler.show_state, since) == began + 5.0
+    assert process.handler.show_state[lever].since == began + 5.0
 
 
 def test_a_command_is_answered_when_the_stage_follows_the_newest_or_what_came_before_it(
@@ -126,7 +128,7 @@ def test_a_stage_that_does_not_follow_is_told_once_and_the_cue_stays_in_force(
     process.turn()
     assert asker.hear()[:3] == ["/reply", "/cue", 0]  # type: ignore[index]
     declared = process.handler.show_state
-    assert (declared.cue, declared.look, declared.dance["phrase"][1]) == ("storm", "ink", "quiet")
+    assert (declared.cue, declared[LOOK].value, declared[PHRASE].value) == ("storm", "ink", "quiet")
     report(stage, declared.generation)
     process.turn()
     assert process.handler.show_state == declared
@@ -160,8 +162,11 @@ def test_another_show_does_not_get_what_was_declared_for_the_one_before(
         clock.now += 0.3
         process.turn()
         now = process.handler.show_state
-        assert (now.show, now.cue, now.dance, now.look) == ("Another", "", {}, "ink")
+        assert (now.show, [*now.settings], now[LOOK].value) == (
+            *("Another", ["master", "look", "card", "lights"], "ink"),
+        )
         asker.tell("/iterations", 4, 3)
         process.turn()
         now = process.handler.show_state
-        assert (now.show, now.dance) == ("Another", {"iterations": (now.generation, "", (4.0, 3.0))})
+        assert (now.show, now[ITERATIONS].value) == ("Another", (4, 3))
+        assert now[ITERATIONS].generation == now.generation

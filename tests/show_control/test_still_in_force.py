@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.show_state import ShowState, ShowStateWriter
+from appliance.box.show_state import ShowStateWriter
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import CUE, LIGHTS, LOOK, MASTER, PHRASE, SPRINGS
 from appliance.show_control import order_dispatch
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts, until
 from tests.show_control.in_force import declared, show_state
@@ -21,8 +23,8 @@ def test_after_a_power_cut_picture_and_lights_are_those_of_the_stages_cue(folder
         control = ControlInThread(folder)
         until(lambda: show_state(folder).cue == "storm")
         now = show_state(folder)
-        assert (now.look, now.lights, now.master) == ("ink", "cold", 1.0)
-        assert now.look_mix(time.monotonic()) == 1.0
+        assert (now[LOOK].value, now[LIGHTS].value, now[MASTER].value) == ("ink", "cold", 1.0)
+        assert now[LOOK].share(time.monotonic()) == 1.0
         control.close()
 
 
@@ -32,13 +34,16 @@ def test_after_a_power_cut_the_springs_are_those_of_the_stages_cue(folder: Path)
         stage.tell(cue="gale")
         control = ControlInThread(folder)
         until(lambda: show_state(folder).cue == "gale")
-        assert show_state(folder).dance["springs"][1] == "storm"
+        assert show_state(folder)[SPRINGS].value == "storm"
         control.close()
 
 
 @pytest.mark.parametrize(
     ("left", "cue"),
-    [(ShowState(cue="1", look="lines", show="A test"), "storm"), (ShowState(), "of another")],
+    [
+        (ShowState(show="A test").to(CUE, "1").to(LOOK, "lines"), "storm"),
+        (ShowState(), "of another"),
+    ],
 )
 def test_what_is_in_force_stays_whatever_the_stages_cue(folder: Path, left: ShowState, cue: str) -> None:
     with closing(ShowStateWriter(folder)) as writer:
@@ -49,7 +54,7 @@ def test_what_is_in_force_stays_whatever_the_stages_cue(folder: Path, left: Show
         asker = Asker(control.port)
         until(lambda: control.process.handler.status(0, time.monotonic()).state == "dancing")
         asker.ask("/ping")
-        assert (show_state(folder).cue, show_state(folder).look) == (left.cue, left.look)
+        assert (show_state(folder).cue, show_state(folder)[LOOK].value) == (left.cue, left[LOOK].value)
         asker.close()
         control.close()
 
@@ -67,7 +72,7 @@ def test_what_is_declared_while_the_stage_is_away_is_in_force_and_the_reply_says
     words = "does not answer. The dance follows" if lives else "The dance begins with this"
     reply = asker.ask("/cue", "storm")
     assert reply[:3] == ["/reply", "/cue", 0] and words in reply[3]
-    assert show_state(folder).cue == "storm" and declared(folder, "phrase") == ("quiet", 4.0)
+    assert show_state(folder).cue == "storm" and declared(folder, PHRASE) == ("quiet", 4.0)
 
 
 def test_what_was_in_force_stays_in_force_over_a_restart_and_is_said(folder: Path) -> None:
@@ -80,18 +85,19 @@ def test_what_was_in_force_stays_in_force_over_a_restart_and_is_said(folder: Pat
     second = ControlInThread(folder)
     assert second.said == ["Still from before: Panic is in force: black, lights safe. /go lifts it."]
     assert show_state(folder).panic
-    assert show_state(folder).master == 0.5
+    assert show_state(folder)[MASTER].value == 0.5
     second.close()
 
 
 def test_names_that_another_show_has_left_are_forgotten(folder: Path) -> None:
     writer = ShowStateWriter(folder)
-    left = ShowState(panic=True, cue="storm", look="ink", lights="cold", look_before="lines")
-    writer.write(left.with_dance(1.0, {"phrase": ("quiet", (0.0,))}))
+    left = ShowState(panic=True).to(CUE, "storm").to(LOOK, "lines").to(LOOK, "ink").to(LIGHTS, "cold")
+    writer.write(left.to(PHRASE, "quiet", 1.0))
     writer.close()
     control = ControlInThread(folder)
     with StageDouble(folder, facts(looks=("ink", "glass"), cues=(), lights=())):
-        generation = show_state(folder).generation
-        now = ShowState(panic=True, look="ink", show="A test", generation=generation)
-        until(lambda: show_state(folder) == now)
+        until(lambda: show_state(folder).show == "A test")
+        now = show_state(folder)
+        assert now.panic and now.cue == "" and PHRASE not in now
+        assert (now[LOOK].value, now[LOOK].before, now[LIGHTS].value) == ("ink", "", "")
     control.close()

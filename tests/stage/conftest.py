@@ -11,7 +11,7 @@ from appliance.box.show_state import ShowStateReader
 from appliance.show.box import BoxConfig, RealtimeConfig
 from appliance.show.show import Show, load_show
 from appliance.show_control.command import Command
-from appliance.show_control.show_state_commands import DECLARATIONS
+from appliance.show_control.show_state_commands import declare
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.sensor_memory import SensorMemory
@@ -65,7 +65,7 @@ def command(show: Show, iterations: Iterations, declared: Declared, reconciler: 
     facts = facts_of(show, None, iterations, NOW)
 
     def command(address: str, *values: float, text: str = "") -> str:
-        declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values, text), facts, NOW)
+        declared.now, _ = declare(declared.now, Command(address, values, text), facts, NOW)
         words = follow(reconciler)
         assert not reconciler.pending(NOW)
         return words

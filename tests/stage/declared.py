@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
 from appliance.stage.carry_out import obey
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.stage_parts import StageParts

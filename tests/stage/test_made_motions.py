@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionWriter
-from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
+from appliance.box.show_state import ShowStateReader, ShowStateWriter
 from appliance.dancer.loop import Loop
 from appliance.dancer.material.maker import Maker
 from appliance.dancer.material.material_file import Material, recipe_text, write_material
 from appliance.dancer.material.prompt import end_of, prompt_of
 from appliance.dancer.phrase import NUMBER
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import PHRASE
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show, load_show
 from appliance.stage import fallback as rows
@@ -115,7 +117,7 @@ def dance_of(tmp_path: Path) -> Iterator[Callable[..., Dance]]:
 def declare(folder: Path, *names: str) -> None:
     state = ShowState(show="A test")
     for name in names:
-        state = state.with_dance(5.0, {"phrase": (name, (0.2,))})
+        state = state.to(PHRASE, name, 5.0, 0.2)
     with closing(ShowStateWriter(folder)) as writer:
         writer.write(state)
 

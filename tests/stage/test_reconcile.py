@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from appliance.box.show_state import ShowState
 from appliance.dancer.puppeteers import Remote
+from appliance.levers.show_state import Change, ShowState
+from appliance.levers.table import CUE, GOING, ITERATIONS, PHRASE, RATE, hand
 from appliance.pose import quaternion
 from appliance.show_control.orders import Order
 from appliance.stage.iterations import Iterations
@@ -22,7 +24,7 @@ def test_nothing_is_pending_before_anything_is_declared_and_of_another_show(
     reconciler: Reconciler, declared: Declared
 ) -> None:
     assert not reconciler.pending(NOW)
-    declared.now = replace(declared.now.with_dance(NOW, {"phrase": ("slow", (0.0,))}), show="Another")
+    declared.now = replace(declared.now.to(PHRASE, "slow", NOW), show="Another")
     assert not reconciler.pending(NOW) and reconciler.generation == 0
 
 
@@ -30,13 +32,14 @@ def test_of_what_several_commands_declared_meanwhile_the_newest_counts(
     reconciler: Reconciler, declared: Declared
 ) -> None:
     """After a stall, in the order in which they came."""
-    for parts in (
-        {"iterations": ("", (5.0, 4.0)), "rate": ("", (3.0,))},
-        {"phrase": ("slow", (1.0,)), "hand Chest": ("Chest", (0.0,))},
-        {"rate": ("", (2.0,))},
-        {"iterations": ("", (6.0, 5.0, 0.5))},
-    ):
-        declared.now = declared.now.with_dance(NOW, parts)
+    changes: tuple[list[Change[Any]], ...] = (
+        [Change(ITERATIONS, (5, 4)), Change(RATE, 3.0)],
+        [Change(PHRASE, "slow", 1.0), Change(hand("Chest"), False)],
+        [Change(RATE, 2.0)],
+        [Change(ITERATIONS, (6, 5), 0.5)],
+    )
+    for one in changes:
+        declared.now = declared.now.changed(NOW, one)
     assert list(reconciler.pending(NOW)) == [
         Order("phrase", (1.0,), "slow"),
         Order("hand", (0.0,), "Chest"),
@@ -60,8 +63,7 @@ def test_a_part_is_applied_once_so_that_what_came_after_it_stays(
 def test_a_phrase_that_the_show_lost_changes_nothing_and_is_told(
     parts: StageParts, reconciler: Reconciler, declared: Declared
 ) -> None:
-    parts_declared = {"phrase": ("slwo", (0.0,)), "rate": ("", (0.5,))}
-    declared.now = declared.now.with_dance(NOW, parts_declared)
+    declared.now = declared.now.to(PHRASE, "slwo", NOW).to(RATE, 0.5, NOW)
     assert "Did you mean 'slow'?" in follow(reconciler)
     parts.motion.advance()
     assert (parts.motion.rate, parts.motion.jumped) == (0.5, False)
@@ -76,15 +78,13 @@ def test_a_stopped_show_stands_once_it_is_dark_and_goes_on_at_its_rate(
         return parts.motion.rate
 
     command("/player/rate", 0.5)
-    declared.now = declared.now.with_going(False, NOW, 2.0)
+    declared.now = declared.now.to(GOING, 0.0, NOW, 2.0)
     assert [rate_at(NOW + t) for t in (0.0, 1.9, 2.0, 3.0)] == [0.5, 0.5, 0.0, 0.0]
-    declared.now = declared.now.with_dance(
-        NOW, {"rate": ("", (-1.0,))}
-    )  # in the dark it stands, and goes on so
+    declared.now = declared.now.to(RATE, -1.0, NOW)  # in the dark it stands, and goes on so
     assert rate_at(NOW + 4.0) == 0.0
-    declared.now = declared.now.with_going(True, NOW + 5.0, 1.0)
+    declared.now = declared.now.to(GOING, 1.0, NOW + 5.0, 1.0)
     assert rate_at(NOW + 5.0) == -1.0
-    declared.now = declared.now.with_dance(NOW, {"rate": ("", ())})
+    declared.now = declared.now.to(RATE, None, NOW)
     assert rate_at(NOW + 6.0) == 1.0
 
 
@@ -93,16 +93,16 @@ def test_a_show_that_stands_by_itself_can_be_started(parts: StageParts, iteratio
     declared = Declared()
     reconciler = Reconciler("A test", parts, iterations, declared)  # type: ignore[arg-type]
     assert not reconciler.pending(NOW)
-    declared.now = declared.now.with_dance(NOW, {"rate": ("", ())})
+    declared.now = declared.now.to(RATE, None, NOW)
     assert reconciler.pending(NOW) == [Order("rate", (1.0,))]
 
 
 def test_a_stage_without_a_checkpoint_begins_with_what_is_declared(
     parts: StageParts, iterations: Iterations, reconciler: Reconciler, declared: Declared
 ) -> None:
-    called = {"phrase": ("slow", (2.0,)), "iterations": ("", (12.0, 11.0, 2.0))}
-    hands = {"hand lShldr": ("lShldr", (0.0,)), "hand Chest": ("Chest", (1.0,))}
-    declared.now = replace(declared.now.with_dance(NOW, called | hands), cue="storm")
+    called = [Change(CUE, "storm"), Change(PHRASE, "slow", 2.0), Change(ITERATIONS, (12, 11), 2.0)]
+    hands = [Change(hand("lShldr"), False), Change(hand("Chest"), True)]
+    declared.now = declared.now.changed(NOW, [*called, *hands])
     sentence = reconciler.begin(NOW)
     assert "goes on in the cue 'storm'" in sentence and "at most 8 fit" in sentence
     assert (reconciler.cue, parts.motion.phrase, parts.motion.position_s) == ("storm", "slow", 0.0)
@@ -117,7 +117,7 @@ def test_a_stage_without_a_checkpoint_begins_with_what_is_declared(
 
 @pytest.mark.parametrize(
     "show_state",
-    [ShowState(), ShowState(show="Another", cue="storm").with_dance(NOW, {"rate": ("", (0.5,))})],
+    [ShowState(), ShowState(show="Another").to(CUE, "storm", NOW).to(RATE, 0.5, NOW)],
 )
 def test_with_nothing_declared_for_this_show_it_begins_as_it_does(
     parts: StageParts,

@@ -10,7 +10,7 @@ import pytest
 from appliance.show.show import load_show
 from appliance.show_control.command import Command
 from appliance.show_control.orders import Order
-from appliance.show_control.show_state_commands import DECLARATIONS
+from appliance.show_control.show_state_commands import declare
 from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
@@ -30,7 +30,7 @@ def test_springs_follow_what_is_declared_also_after_a_restart(tmp_path: Path, de
     assert parts.first.springs is not None and again.first.springs is not None
 
     def say(address: str, *values: float, text: str = "") -> None:
-        declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values, text), facts, NOW)
+        declared.now, _ = declare(declared.now, Command(address, values, text), facts, NOW)
         follow(reconciler)
 
     say("/springs/wind", 1.0, 2.0, 3.0)
@@ -68,7 +68,7 @@ def test_strings_drive_no_joint_in_panic_blackout_and_after_a_stop(
     assert springs.feedback == 1.0
     for away, back in (("/panic", "/go"), ("/stop", "/go"), ("/blackout", "/blackout")):
         for address, values in ((away, (1.0,)), (back, () if back == "/go" else (0.0,))):
-            declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values), None, NOW)
+            declared.now, _ = declare(declared.now, Command(address, values), None, NOW)
             follow(reconciler)
             assert springs.feedback == 0.0
         gains = []

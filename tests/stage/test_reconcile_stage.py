@@ -7,7 +7,9 @@ import time
 from contextlib import closing
 
 from appliance.box.checkpoint import CheckpointReader
-from appliance.box.show_state import ShowState, ShowStateWriter
+from appliance.box.show_state import ShowStateWriter
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import CUE, PHRASE, RATE
 from appliance.outputs.frame_reader import FrameReader
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
@@ -18,8 +20,8 @@ from tests.stage.shows import NOW
 def test_the_stage_begins_with_the_show_state_of_its_folder(show: Show, box: BoxConfig) -> None:
     for cue, phrase in (("storm", "slow"), ("", "main")):
         with closing(ShowStateWriter(box.runtime)) as writer:
-            declared = ShowState(show="A test", cue=cue)
-            writer.write(declared.with_dance(NOW, {"phrase": (phrase, (0.0,))}) if cue else declared)
+            declared = ShowState(show="A test")
+            writer.write(declared.to(CUE, cue, NOW).to(PHRASE, phrase, NOW) if cue else declared)
         said: list[str] = []
         stage = Stage(show, box, said.append)
         with closing(stage):
@@ -35,7 +37,7 @@ def test_the_dance_follows_within_a_tick_reports_it_and_notes_it_before(show: Sh
         closing(CheckpointReader(box.runtime)) as checkpoint,
         closing(FrameReader(box.runtime)) as frames,
     ):
-        declared = ShowState(show="A test", cue="storm").with_dance(NOW, {"phrase": ("slow", (1.0,))})
+        declared = ShowState(show="A test").to(CUE, "storm", NOW).to(PHRASE, "slow", NOW, 1.0)
         ticks: list[int] = []
 
         def follows() -> bool:
@@ -58,7 +60,7 @@ def test_the_dance_follows_within_a_tick_reports_it_and_notes_it_before(show: Sh
 
 def test_an_unchanged_show_state_leaves_nothing_to_the_collector(show: Show, box: BoxConfig) -> None:
     with closing(ShowStateWriter(box.runtime)) as writer, closing(Stage(show, box, print)) as stage:
-        writer.write(ShowState(show="A test").with_dance(NOW, {"rate": ("", (1.0,))}))
+        writer.write(ShowState(show="A test").to(RATE, 1.0, NOW))
         stage.reconciler.pending(NOW)
         gc.collect()
         gc.disable()

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from appliance.box.clock import TICK_S
-from appliance.box.show_state import ShowState
 from appliance.dancer.motion_source import Playback
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import GOING, ITERATIONS, PHRASE, RATE
 from appliance.pose import quaternion
 from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey
@@ -102,21 +103,16 @@ def test_what_was_declared_while_the_stage_was_away_follows_and_what_it_followed
     dance_of: Callable[[], Reconciler], runtime: Path, generation: int, is_applied: bool
 ) -> None:
     before, after = dance_of(), dance_of()
-    declared = ShowState(show="A test").with_dance(NOW, {"phrase": ("walk", (0.5,))})
+    declared = ShowState(show="A test").to(PHRASE, "walk", NOW, 0.5)
     declare(runtime, declared)
     for _ in range(10):
         do(before, *before.pending(NOW))
         before.parts.motion.advance()
     before.parts.motion.excerpt(1.0, 3.0)
     if is_applied:
-        declare(
-            runtime,
-            declared.with_dance(NOW, {"phrase": ("walk", (0.5,))}).with_dance(
-                NOW, {"iterations": ("", (6.0, 5.0))}
-            ),
-        )
+        declare(runtime, declared.to(PHRASE, "walk", NOW, 0.5).to(ITERATIONS, (6, 5), NOW))
     goes_on(before, runtime, after)
-    orders = [Order("phrase", (0.5,), "walk"), Order("iterations", (6.0, 5.0))]
+    orders = [Order("phrase", (0.5,), "walk"), Order("iterations", (6.0, 5.0, 0.0))]
     assert after.pending(NOW) == (orders if is_applied else [])
 
 
@@ -127,8 +123,8 @@ def test_a_show_that_stands_comes_back_standing(
     before, after = dance_of(), dance_of()
     for tick in range(100):
         if tick == 50:
-            stopped = ShowState(show="A test", going=by != "stop")
-            declare(runtime, stopped if by == "stop" else stopped.with_dance(NOW, {"rate": ("", (0.0,))}))
+            goes = ShowState(show="A test")
+            declare(runtime, goes.to(GOING, 0.0, NOW) if by == "stop" else goes.to(RATE, 0.0, NOW))
         do(before, *before.pending(NOW))
         before.parts.motion.advance()
     goes_on(before, runtime, after)

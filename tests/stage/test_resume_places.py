@@ -13,7 +13,8 @@ import pytest
 from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, boot_id, packed
 from appliance.box.clock import TICK_S
 from appliance.box.record import SlotFile
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import ITERATIONS
 from appliance.show_control.orders import Order
 from appliance.stage.fallback import PLACE_DROPPED
 from appliance.stage.reconcile import Reconciler
@@ -29,11 +30,11 @@ def test_after_a_power_cut_all_that_is_declared_is_new(
 ) -> None:
     """Its generations count from the machine's start."""
     put(runtime, replace(PLACE, boot="another", applied=10**15, cue="storm"))
-    declare(runtime, ShowState(show="A test").with_dance(NOW, {"iterations": ("", (6.0, 5.0))}))
+    declare(runtime, ShowState(show="A test").to(ITERATIONS, (6, 5), NOW))
     dance = dance_of()
     with closing(Resumption("A test", runtime, None, "always")) as resuming:
         assert "After a power cut" in resuming.go_on(dance, NOW)
-    assert dance.pending(NOW) == [Order("iterations", (6.0, 5.0))]
+    assert dance.pending(NOW) == [Order("iterations", (6.0, 5.0, 0.0))]
     assert dance.cue == "storm"
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from appliance.box.checkpoint import CheckpointReader, boot_id
 from appliance.box.clock import TICK_S, Slot
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import CUE, PHRASE
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.run import Stage
@@ -45,7 +46,7 @@ def test_the_whole_stage_goes_on_where_it_was(show: Show, box: BoxConfig) -> Non
 
 def test_a_place_goes_before_what_was_declared_before_it(show: Show, box: BoxConfig, runtime: Path) -> None:
     """The cue was called, and another part of the phrase after it."""
-    declared = ShowState(show="A test", cue="storm").with_dance(NOW, {"phrase": ("walk", (0.0,))})
+    declared = ShowState(show="A test").to(CUE, "storm", NOW).to(PHRASE, "walk", NOW)
     declare(runtime, declared)
     place = replace(PLACE, excerpt=(1.0, 3.0), cue="storm", applied=declared.generation, boot=boot_id())
     put(runtime, place)

@@ -11,7 +11,9 @@ import pytest
 import yaml
 
 from appliance.box.clock import TICK_S, TickClock
-from appliance.box.show_state import ShowState, ShowStateWriter
+from appliance.box.show_state import ShowStateWriter
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import ITERATIONS, PHRASE
 from appliance.pose.bvh import write_bvh
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
@@ -173,7 +175,7 @@ def test_a_box_whose_every_tick_takes_too_long_can_be_told_to_do_less(evening: E
     evening.dance(2.0)
     evening.inbox.waiting = [Order("jump", (1.0,)), Order("heading")]
     with closing(ShowStateWriter(evening.runtime)) as writer:
-        writer.write(ShowState(show="A test").with_dance(evening.time.now, {"iterations": ("", (1.0, 1.0))}))
+        writer.write(ShowState(show="A test").to(ITERATIONS, (1, 1), evening.time.now))
     run_tick = evening.stage.tick.run
     evening.stage.tick.run = lambda slot: (run_tick(slot), evening.time.work(0.11))[0]  # type: ignore[method-assign]
     evening.dance(2.0)
@@ -185,7 +187,7 @@ def test_what_was_declared_before_an_order_comes_before_it(evening: Evening) -> 
     """Also where it was declared after the tick had read the show state."""
     evening.dance(1.0)
     with closing(ShowStateWriter(evening.runtime)) as writer:
-        writer.write(ShowState(show="A test").with_dance(evening.time.now, {"phrase": ("other", (0.5,))}))
+        writer.write(ShowState(show="A test").to(PHRASE, "other", evening.time.now, 0.5))
     evening.inbox.waiting = [Order("jump", (0.5,))]
     evening.stage._take_orders(evening.time.now, evening.time.monotonic)
     assert evening.stage.parts.motion.going_on == ("other", pytest.approx(0.5), 0)

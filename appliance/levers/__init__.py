@@ -1,0 +1,1 @@
+"""Levers: what a desk, a cue or the page may set, described once."""
