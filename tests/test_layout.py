@@ -18,8 +18,11 @@ BIN = Path(sys.executable).parent
 PACKAGES = ("appliance", "hw_sim", "tools")
 LOCKS = ("requirements.txt", "requirements-test.txt")
 TOP_LEVEL = {
-    *("appliance", "firmware", "hw_sim", "tools", "deploy", "tests", "docs", ".ci"),
+    *("appliance", "firmware", "hw_sim", "tools", "deploy", "tests", "docs", ".ci", ".github"),
     *("pyproject.toml", "README.md", "Makefile", "LICENSE", "CHANGELOG.md", ".gitignore", *LOCKS),
+    *("CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", ".pre-commit-config.yaml"),
+    *(".clang-format", ".clang-format-ignore"),
+    *("package.json", "package-lock.json", ".npmrc", "tsconfig.json", "eslint.config.js"),  # of the page
 }
 
 
@@ -137,7 +140,7 @@ def test_both_locks_agree_and_only_one_has_torch() -> None:
 
 def test_make_help_lists_the_targets() -> None:
     shown = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    for target in ("run", "test", "bench", "lock", "clean", "help"):
+    for target in ("run", "test", "test-quick", "lint-js", "bench", "dist", "lock", "clean", "help"):
         assert re.search(rf"^  make {target} +\S", shown, re.MULTILINE), shown
 
 

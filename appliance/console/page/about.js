@@ -1,8 +1,7 @@
 // Box: which show dances and which would instead, release, addresses, clock.
+import { byId } from "./elements.js";
 import { danceAgain, twice } from "./venue.js";
 import { locale, words } from "./words.js";
-
-const byId = (id) => document.getElementById(id);
 
 export async function readAbout() {
   byId("box-said").textContent = words("box_reading");

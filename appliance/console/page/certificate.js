@@ -1,6 +1,6 @@
 // A proof as a document: one sheet of paper, to be printed or sent as a picture.
 import { drawPlots, PAPER } from "./plots.js";
-import { language, locale, number, words } from "./words.js";
+import { locale, number, words } from "./words.js";
 
 const WIDTH = 1240, HEIGHT = 1754, MARGIN = 90; // A4 at 150 dots an inch
 

@@ -62,7 +62,7 @@ export class Dance {
     });
     this.frame = { tick: head.getFloat64(0, true), figures, source, ...figures[0] }; // fingers and words are the first one's
     this.takenAt = performance.now();
-    document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
+    document.body.dataset.frames = String(Number(document.body.dataset.frames ?? 0) + 1);
     this.redraw();
   }
 
@@ -149,9 +149,9 @@ export class Dance {
       for (const joint of this.heldJoints(figure)) this.drawRing(ink, eye(pointOf(figure, joint)), ratio, figure.holds[joint]);
     }
     document.body.dataset.ghost = ghost ? Array.from(ghost.positions, (value) => value.toFixed(3)).join(" ") : "";
-    document.body.dataset.puppets = frame.figures.length;
+    document.body.dataset.puppets = String(frame.figures.length);
     document.body.dataset.held = this.heldJoints().map((joint) => `${show.joints[joint]} ${frame.holds[joint].toFixed(2)}`).join(", ");
-    document.body.dataset.tick = frame.tick;
+    document.body.dataset.tick = String(frame.tick);
     document.body.dataset.root = Array.from(root, (value) => value.toFixed(3)).join(" ");
     const isOld = performance.now() - this.takenAt > 1500;
     const names = this.heldJoints().map((joint) => show.joints[joint]);
@@ -175,6 +175,7 @@ export class Dance {
     };
   }
 
+  /** @param {{ holds: Float32Array }} figure */
   heldJoints(figure = this.frame) {
     return this.show.joints.map((_, joint) => joint).filter((joint) => figure.holds[joint] > HELD);
   }

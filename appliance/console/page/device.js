@@ -1,8 +1,8 @@
 // This device: the PIN, what is asked of the box with it, and the devices that it knows.
 import { request } from "./box.js";
+import { byId } from "./elements.js";
 import { language, locale } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 let known = false, waiting = null, words = (key) => key, silence = 0;
 
 export function initDevice(me, table) {
@@ -19,7 +19,7 @@ export function initDevice(me, table) {
     button.type = "button";
     button.textContent = new Intl.DisplayNames([one], { type: "language" }).of(one);
     button.lang = one;
-    button.setAttribute("aria-pressed", one === language);
+    button.setAttribute("aria-pressed", String(one === language));
     button.addEventListener("click", () => {
       localStorage.setItem("language", one);
       location.reload();

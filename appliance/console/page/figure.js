@@ -169,6 +169,7 @@ export class Figure extends Dance {
     return [at.x / ratio, at.y / ratio];
   }
 
+  /** @param {Iterable<number>} at */
   ringAt([x, y]) {
     if (!this.frame || !this.show) return null;
     const near = this.joints.map((joint) => [joint, Math.hypot(this.ring(joint)[0] - x, this.ring(joint)[1] - y)]);

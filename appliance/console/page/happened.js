@@ -1,9 +1,9 @@
 // What happened: the journal as a timeline, and any stretch of it danced again.
 import { Dance } from "./dance.js";
 import { withPin } from "./device.js";
+import { byId } from "./elements.js";
 import { clock, locale, number, words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const HEAD_BYTES = 16, JOINT_BYTES = 32; // of a frame: dance.js
 const SLOWEST_MS = 20, MANY = 5; // what fills the timeline's height
 const INK = { late: "#ff7a66", skipped: "#f0b840", failed: "#d36bff", slowest: "#59636f", mark: "#f3ece0", order: "#58c27d" };
@@ -37,7 +37,7 @@ export async function readHappened() {
   if (answer === null) return;
   byId("happened-run").replaceChildren(...runs.map((one, place) => {
     const option = document.createElement("option"), date = new Date(1000 * one.begun).toLocaleDateString(locale);
-    option.value = place;
+    option.value = String(place);
     option.textContent = `${date} ${clock(one.begun)} · ${one.show} · ${number(one.seconds / 60, 1)} min`;
     return option;
   }));
@@ -79,7 +79,7 @@ function point(at) {
   draw();
 }
 
-const part = () => new URLSearchParams({ run: run.number, from: second.toFixed(2), seconds: stretch() });
+const part = () => new URLSearchParams({ run: run.number, from: second.toFixed(2), seconds: String(stretch()) });
 const stretch = () => Number(byId("happened-seconds").value);
 
 function draw() {

@@ -1,8 +1,7 @@
 // The last lines of the box's units, for a device that gave the PIN.
 import { ask } from "./device.js";
+import { byId } from "./elements.js";
 import { clock, words } from "./words.js";
-
-const byId = (id) => document.getElementById(id);
 
 export function initLogs() {
   byId("logs-read").addEventListener("click", readLogs);

@@ -1,9 +1,9 @@
 // The map of the dancer's poses: a tap is a place, a line is danced there and back.
 import { request } from "./box.js";
 import { command } from "./device.js";
+import { byId } from "./elements.js";
 import { words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const PATIENCE_MS = 60_000;
 const MOST_POINTS = 16, STEP = 0.02, TAP = 0.03; // of the map's width
 const INK = { path: "#6b7480", figure: "#b3b7bd", line: "#ff8a5c" };
@@ -103,7 +103,7 @@ function draw() {
     ink.arc(...line.at(-1), 9 * ratio, 0, 7);
     ink.fill();
   }
-  canvas.dataset.points = points.length;
+  canvas.dataset.points = String(points.length);
   canvas.dataset.figures = ground?.figures.length ?? 0;
 }
 

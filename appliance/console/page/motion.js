@@ -1,10 +1,10 @@
 // Motion that is made ahead: how far from the phrase, which walk, which path over the map; again, and keep.
 import { command, say } from "./device.js";
+import { byId } from "./elements.js";
 import { initMap, showMap } from "./map.js";
 import { slider } from "./slider.js";
 import { number, words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const FADE_S = 1;
 const USUAL_SIGMA = 2, MOST_SIGMA = 4; // beyond two a body may come apart: behind a lock
 // By source: its dials as name, least, most, step, digits. docs/osc.md has the bounds.

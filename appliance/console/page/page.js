@@ -4,6 +4,7 @@ import { Box } from "./box.js";
 import { showChoices } from "./choices.js";
 import { Dance } from "./dance.js";
 import { command, initDevice } from "./device.js";
+import { byId, every } from "./elements.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
 import { initLogs } from "./logs.js";
 import { initPicture, showPicture } from "./picture.js";
@@ -15,13 +16,12 @@ import { showSensors } from "./sensors.js";
 import { initVenue } from "./venue.js";
 import { clock, hasWords, language, loadWords, number, words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const STILL_PX = 14; // a thumb that scrolls moves farther between touch and release
 
 function show(page) {
   const known = byId(page) && document.querySelector(`[data-page="${page}"]`) ? page : "tonight";
-  for (const section of document.querySelectorAll("main > section")) section.hidden = section.id !== known;
-  for (const button of document.querySelectorAll("nav button")) {
+  for (const section of every("main > section")) section.hidden = section.id !== known;
+  for (const button of every("nav button")) {
     if (button.dataset.page === known) button.setAttribute("aria-current", "page");
     else button.removeAttribute("aria-current");
   }
@@ -98,8 +98,8 @@ function tonight(value) {
   showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
   showChoices(byId("overlays"), byId("overlays-part"), value.cards, (name) => command("/card", name));
   if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
-  byId("panic").setAttribute("aria-pressed", Boolean(status?.panic));
-  byId("blackout").setAttribute("aria-pressed", Boolean(status?.blackout));
+  byId("panic").setAttribute("aria-pressed", String(Boolean(status?.panic)));
+  byId("blackout").setAttribute("aria-pressed", String(Boolean(status?.blackout)));
   const over = value.fallbacks.filter((one) => !one.active);
   byId("fallbacks-part").hidden = over.length === 0;
   byId("fallbacks").replaceChildren(...over.map(told));
@@ -145,7 +145,7 @@ initSensorChanges();
 initLogs();
 initVenue();
 initRehearsal(me, box);
-for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => show(button.dataset.page));
+for (const button of every("nav button")) button.addEventListener("click", () => show(button.dataset.page));
 for (const id of ["show-dance", "show-ghost"]) byId(id).addEventListener("change", () => show("dance"));
 addEventListener("hashchange", () => show(location.hash.slice(1)));
 byId("go").addEventListener("click", () => command("/go"));

@@ -1,15 +1,15 @@
 // Picture: brightness, grid, test card, and corners that move on the wall as far as a finger moves here.
 import { command } from "./device.js";
+import { byId, every, first } from "./elements.js";
 
-const byId = (id) => document.getElementById(id);
 const CORNERS = [[0, 0], [1, 0], [1, 1], [0, 1]]; // in the projector's order
 const STEP_S = 0.12;
 
 export function initPicture() {
-  for (const [id, address, on] of [
+  for (const [id, address, on] of /** @type {[string, string, number][]} */ ([
     ["grid-on", "/projector/grid", 1], ["grid-off", "/projector/grid", 0],
     ["info-on", "/projector/info", 1], ["info-off", "/projector/info", 0],
-  ]) byId(id).addEventListener("click", () => command(address, on));
+  ])) byId(id).addEventListener("click", () => command(address, on));
   byId("corners-reset").addEventListener("click", () => command("/projector/corners/reset"));
   const brightness = byId("brightness");
   const tell = () => { byId("brightness-said").textContent = `${brightness.value} %`; };
@@ -22,10 +22,10 @@ export function initPicture() {
 export function showPicture(value) {
   const runs = (name) => value.processes.some((one) => one.process === name && !one.late);
   const projects = runs("projector");
-  document.querySelector('[data-page="picture"]').hidden = !projects && !runs("lights") && value.looks.length === 0;
+  first('[data-page="picture"]').hidden = !projects && !runs("lights") && value.looks.length === 0;
   for (const id of ["brightness", "grid-on", "info-on", "corners-reset"]) byId(id).parentElement.hidden = !projects;
   byId("corners").hidden = !projects;
-  for (const element of document.querySelectorAll('#picture > h2, #picture > .quiet')) element.hidden = !projects;
+  for (const element of every('#picture > h2, #picture > .quiet')) element.hidden = !projects;
 }
 
 function handle(x, y, number) {

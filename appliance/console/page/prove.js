@@ -2,10 +2,10 @@
 import { request } from "./box.js";
 import { drawCertificate, limitWords, madeAt, mostOf, valueOf, verdictOf } from "./certificate.js";
 import { ask, say } from "./device.js";
+import { byId } from "./elements.js";
 import { DARK, drawPlots } from "./plots.js";
 import { words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const LOOK_MS = 500;
 let isShown = false, timer = 0, next = 0, measured = null, proof = null;
 
@@ -62,7 +62,7 @@ async function look() {
     const answer = await fetch(`/api/prove/progress?from=${next}`, { signal: AbortSignal.timeout(6000) });
     const lines = (await answer.text()).split("\n").filter(Boolean);
     next = Number(answer.headers.get("X-Next"));
-    for (const line of lines) take(JSON.parse(line));
+    for (const written of lines) take(JSON.parse(written));
     isOver = answer.headers.get("X-Runs") === "0" && lines.length === 0;
   } catch { /* the page says by itself that the box is silent; it is asked again */ }
   if (measured.at.length) drawLive();

@@ -2,19 +2,19 @@
 import { showChoices } from "./choices.js";
 import { request } from "./box.js";
 import { ask, command, withPin } from "./device.js";
+import { byId, first } from "./elements.js";
 import { Figure } from "./figure.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
 import { twice } from "./venue.js";
 import { hasWords, number, words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const PHRASE_FADE_S = 1, LIVELINESS_FADE_S = 1, KEEPING_MS = 120_000;
 const SEEDS = 1_000_000; // six digits are easily noted down
 let figure = null;
 
 export function initRehearsal(me, box) {
-  document.querySelector('[data-page="rehearsal"]').hidden = !me.rehearsal;
+  first('[data-page="rehearsal"]').hidden = !me.rehearsal;
   for (const id of ["coding", "interaction"]) {
     byId(id).addEventListener("input", () => tell());
     byId(id).addEventListener("change", () => {

@@ -1,9 +1,9 @@
 // The rig as it shines now, from the audience and from above; and a walk through it while the show stands.
 import { request } from "./box.js";
 import { command } from "./device.js";
+import { byId } from "./elements.js";
 import { words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const LOOK_MS = 200, WIDE_PX = 640;
 const LONGEST_M = 12, MARGIN_M = 1.2, STAGE_M = 2;
 const VIEWS = [["rig_front", 1, 1], ["rig_above", 2, -1]]; // words; the axis upwards, and its sense

@@ -1,8 +1,10 @@
 // Unit quaternions w, x, y, z, as small functions.
-export function multiplied([a, b, c, d], [w, x, y, z]) {
-  return [a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w];
-}
 
+/** @type {(one: Iterable<number>, other: Iterable<number>) => number[]} */
+export const multiplied = ([a, b, c, d], [w, x, y, z]) =>
+  [a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w];
+
+/** @type {(one: Iterable<number>) => number[]} */
 export const inverse = ([w, x, y, z]) => [w, -x, -y, -z];
 
 // The shortest turn from one way to another, of any lengths but zero.

@@ -1,8 +1,8 @@
 // Sensors renamed, replaced, revoked, and a new one paired by cable: what the box says, as it says it.
 import { say, withPin } from "./device.js";
+import { byId } from "./elements.js";
 import { words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 let sensors = [], act = null, name = "";
 
 // For a card: buttons that open the dialog.
@@ -33,7 +33,7 @@ export function showSensorChanges(value, show) {
   sensors = value.sensors;
   const isEmulated = Boolean(show?.rehearsal) || !value.control;
   byId("pair").hidden = isEmulated;
-  byId("sensors").dataset.emulated = isEmulated;
+  byId("sensors").dataset.emulated = String(isEmulated);
 }
 
 function open(what, sensor) {
@@ -83,13 +83,13 @@ async function send() {
   if (act === "pair") {
     for (const part of ["name", "port", "network", "password"]) said[part] = byId(`change-${part}`).value.trim();
   }
-  const send = byId("change-send"), steps = byId("change-steps");
-  send.disabled = true;
+  const button = byId("change-send"), steps = byId("change-steps");
+  button.disabled = true;
   steps.replaceChildren(step(words("change_runs"), ""));
   const isDone = await run(said, (sentence) => steps.insertBefore(step(sentence, ""), steps.lastChild));
   steps.lastChild.remove();
   steps.append(step(words(isDone ? "change_done" : "change_failed"), isDone ? "done" : "failed"));
-  send.disabled = isDone;
+  button.disabled = isDone;
 }
 
 async function run(said, tell) {

@@ -1,10 +1,10 @@
 // Springs and strings: the setting, how loose, how stormy, how loud, how strongly the strings pull back; a kick.
 import { showChoices } from "./choices.js";
 import { command } from "./device.js";
+import { byId } from "./elements.js";
 import { slider } from "./slider.js";
 import { number, words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const FADE_S = 1;
 const KICK_M_S = [1.5, 0.5, 1.5];
 // Stiffness is a factor from 0.1 to 10: its slider has powers of ten, so that the setting's own stands in the middle.

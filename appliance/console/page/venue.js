@@ -1,8 +1,8 @@
 // What a venue changes of its box: keys of the box file, the file as a whole, and which show dances.
 import { ask } from "./device.js";
+import { byId } from "./elements.js";
 import { words } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
 const SURE_MS = 6000, CHECKED_WITHIN_MS = 100_000;
 let file = null, asked = "";
 

@@ -1,4 +1,5 @@
 // The table of words: /words/LANGUAGE.json; a word that a language lacks is English.
+import { every } from "./elements.js";
 let english = {}, own = {};
 export let language = "en", locale = "en"; // dates and numbers are written as this device does
 
@@ -9,8 +10,8 @@ export async function loadWords(languages) {
   english = await table("en");
   own = language === "en" ? english : await table(language);
   document.documentElement.lang = language;
-  for (const element of document.querySelectorAll("[data-words]")) element.textContent = words(element.dataset.words);
-  for (const element of document.querySelectorAll("[data-label]")) element.setAttribute("aria-label", words(element.dataset.label));
+  for (const element of every("[data-words]")) element.textContent = words(element.dataset.words);
+  for (const element of every("[data-label]")) element.setAttribute("aria-label", words(element.dataset.label));
 }
 
 export function words(key, values = {}) {
