@@ -21,7 +21,8 @@ Settings provisioned() {
   Settings settings;
   settings.device_id = 0x1A2B3C4D;
   settings.has_key = true;
-  const uint8_t key[wire::kKeyBytes] = {0xC0, 0xFF, 0xEE, 0, 0xC0, 0xFF, 0xEE, 1, 0xC0, 0xFF, 0xEE, 2, 0xC0, 0xFF, 0xEE, 3};
+  const uint8_t key[wire::kKeyBytes] = {0xC0, 0xFF, 0xEE, 0, 0xC0, 0xFF, 0xEE, 1,
+                                        0xC0, 0xFF, 0xEE, 2, 0xC0, 0xFF, 0xEE, 3};
   memcpy(settings.key, key, sizeof key);
   strcpy(settings.name, "left-wrist");
   strcpy(settings.network, "stage");

@@ -58,11 +58,10 @@ struct Remap {
                                m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
     const double squares[4] = {1 + trace, 1 + 2 * m[0][0] - trace, 1 + 2 * m[1][1] - trace,
                                1 + 2 * m[2][2] - trace};
-    const double parts[4][4] = {
-        {squares[0], m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]},
-        {m[2][1] - m[1][2], squares[1], m[0][1] + m[1][0], m[0][2] + m[2][0]},
-        {m[0][2] - m[2][0], m[0][1] + m[1][0], squares[2], m[1][2] + m[2][1]},
-        {m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], squares[3]}};
+    const double parts[4][4] = {{squares[0], m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]},
+                                {m[2][1] - m[1][2], squares[1], m[0][1] + m[1][0], m[0][2] + m[2][0]},
+                                {m[0][2] - m[2][0], m[0][1] + m[1][0], squares[2], m[1][2] + m[2][1]},
+                                {m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], squares[3]}};
     const size_t best = static_cast<size_t>(std::max_element(squares, squares + 4) - squares);
     for (size_t i = 0; i < 4; ++i) chip_from_new[i] = parts[best][i] / (2 * std::sqrt(squares[best]));
     return determinant > 0;

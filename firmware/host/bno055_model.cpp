@@ -139,10 +139,18 @@ void Bno055Model::corrupt(uint8_t reg, uint8_t* data, uint8_t count) {
 // Register map, page 0, table 4-2: what is there after power-on or reset.
 void Bno055Model::reset_registers() {
   registers_.fill(0);
-  const std::pair<uint8_t, uint8_t> values[] = {{kChipId, kChipIdValue}, {0x01, 0xFB}, {0x02, 0x32},
-                                                {0x03, 0x0F}, {0x04, 0x11}, {0x05, 0x03}, {0x06, 0x15},
-                                                {0x36, 0x0F}, {kUnits, kUnitsAtPowerOn},
-                                                {kAxisMap, kAxisMapPlain}, {0x69, 0xE0}, {0x6A, 0x01}};
+  const std::pair<uint8_t, uint8_t> values[] = {{kChipId, kChipIdValue},
+                                                {0x01, 0xFB},
+                                                {0x02, 0x32},
+                                                {0x03, 0x0F},
+                                                {0x04, 0x11},
+                                                {0x05, 0x03},
+                                                {0x06, 0x15},
+                                                {0x36, 0x0F},
+                                                {kUnits, kUnitsAtPowerOn},
+                                                {kAxisMap, kAxisMapPlain},
+                                                {0x69, 0xE0},
+                                                {0x6A, 0x01}};
   for (const auto& [reg, value] : values) registers_[reg] = value;
   page_ = 0;
   mode_ = next_mode_ = kConfigMode;

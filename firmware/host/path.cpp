@@ -41,14 +41,12 @@ void Path::go_to(const Quaternion& orientation, uint64_t at_us) {
 }
 
 Quaternion Path::at(uint64_t at_us) const {
-  const auto right =
-      std::upper_bound(waypoints_.begin(), waypoints_.end(), at_us,
-                       [](uint64_t time, const Waypoint& point) { return time < point.at_us; });
+  const auto right = std::upper_bound(waypoints_.begin(), waypoints_.end(), at_us,
+                                      [](uint64_t time, const Waypoint& point) { return time < point.at_us; });
   if (right == waypoints_.begin()) return waypoints_.front().orientation;
   if (right == waypoints_.end()) return waypoints_.back().orientation;
   const auto left = right - 1;
-  const double share =
-      static_cast<double>(at_us - left->at_us) / static_cast<double>(right->at_us - left->at_us);
+  const double share = static_cast<double>(at_us - left->at_us) / static_cast<double>(right->at_us - left->at_us);
   return between(left->orientation, right->orientation, share);
 }
 

@@ -6,9 +6,8 @@
 namespace bunraku {
 namespace {
 
-constexpr const char* kFaultNames[] = {"nack",        "stuck bus", "zero read",
-                                       "torn read",   "flipped bit", "brown-out",
-                                       "silent config", "frozen",    "fusion error"};
+constexpr const char* kFaultNames[] = {"nack",      "stuck bus",     "zero read", "torn read",   "flipped bit",
+                                       "brown-out", "silent config", "frozen",    "fusion error"};
 static_assert(std::size(kFaultNames) == kImuFaults, "a name for each fault, in the order of ImuFault");
 
 struct Trouble {

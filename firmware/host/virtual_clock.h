@@ -12,7 +12,7 @@ class VirtualClock final : public Clock {
   explicit VirtualClock(uint64_t start_us = 0) : now_us_(start_us) {}
 
   uint32_t micros() override { return static_cast<uint32_t>(now_us_); }  // what the board sees: it wraps
-  uint64_t now_us() const { return now_us_; }                            // what the simulation sees: it does not
+  uint64_t now_us() const { return now_us_; }  // what the simulation sees: it does not
   void advance(uint64_t us) { now_us_ += us; }
   void advance_to(uint64_t us) {  // never backwards
     if (us > now_us_) now_us_ = us;

@@ -41,8 +41,7 @@ void tell_firmware(const bunraku::Status& from, wearable_status& to) {
 
 }  // namespace
 
-wearable_world* wearable_create(const uint8_t* flash, uint32_t flash_bytes, uint64_t seed,
-                                uint64_t start_us) {
+wearable_world* wearable_create(const uint8_t* flash, uint32_t flash_bytes, uint64_t seed, uint64_t start_us) {
   auto world = std::make_unique<wearable_world>(seed, start_us);
   if (flash != nullptr && !world->flash.use_image(flash, flash_bytes)) return nullptr;
   return world.release();
@@ -97,8 +96,7 @@ void wearable_set_stale(wearable_world* world, uint32_t least_us, uint32_t most_
   world->wifi.conditions.stale_us[1] = most_us;
 }
 
-int wearable_put_datagram(wearable_world* world, uint32_t ip, uint16_t port, const uint8_t* data,
-                          uint16_t count) {
+int wearable_put_datagram(wearable_world* world, uint32_t ip, uint16_t port, const uint8_t* data, uint16_t count) {
   return world->wifi.deliver({world->clock.now_us(), {ip, port}, std::vector<uint8_t>(data, data + count)});
 }
 
@@ -114,9 +112,7 @@ uint16_t wearable_take_datagram(wearable_world* world, uint64_t* at_us, uint32_t
   return static_cast<uint16_t>(count);
 }
 
-void wearable_connect_cable(wearable_world* world, int is_connected) {
-  world->serial.connect(is_connected != 0);
-}
+void wearable_connect_cable(wearable_world* world, int is_connected) { world->serial.connect(is_connected != 0); }
 
 uint16_t wearable_put_serial(wearable_world* world, const uint8_t* data, uint16_t count) {
   return world->serial.put(data, count);
@@ -148,9 +144,7 @@ int wearable_set_trouble(wearable_world* world, const char* trouble, double amou
   return bunraku::set_trouble(*world, trouble, amount);
 }
 
-void wearable_set_battery(wearable_world* world, uint16_t millivolts) {
-  world->board.millivolts = millivolts;
-}
+void wearable_set_battery(wearable_world* world, uint16_t millivolts) { world->board.millivolts = millivolts; }
 
 int wearable_take_light(wearable_world* world, uint64_t* at_us) {
   bunraku::LedTrace::Change change;

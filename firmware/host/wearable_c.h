@@ -46,8 +46,7 @@ void wearable_set_network(wearable_world* world, const char* name, const char* p
 void wearable_set_access_point(wearable_world* world, int is_on, uint64_t at_us);
 /* How long the driver calls itself joined after the access point went. */
 void wearable_set_stale(wearable_world* world, uint32_t least_us, uint32_t most_us);
-int wearable_put_datagram(wearable_world* world, uint32_t ip, uint16_t port, const uint8_t* data,
-                          uint16_t count);
+int wearable_put_datagram(wearable_world* world, uint32_t ip, uint16_t port, const uint8_t* data, uint16_t count);
 /* Bytes of the oldest datagram sent, 0 when there is none; ip 0xFFFFFFFF: to all. */
 uint16_t wearable_take_datagram(wearable_world* world, uint64_t* at_us, uint32_t* ip, uint16_t* port,
                                 uint8_t* data, uint16_t room);

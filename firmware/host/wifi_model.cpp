@@ -116,9 +116,7 @@ void WifiModel::forget_after(uint64_t at_us) {
   join_us_[1] = std::min(join_us_[1], at_us);
 }
 
-bool WifiModel::is_carrying() const {
-  return is_joined_ && next_change(false, joined_at_us_) > clock_.now_us();
-}
+bool WifiModel::is_carrying() const { return is_joined_ && next_change(false, joined_at_us_) > clock_.now_us(); }
 
 bool WifiModel::is_on_air(uint64_t at_us) const {
   bool is_on = false;

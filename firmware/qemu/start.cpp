@@ -36,6 +36,6 @@ void fault() {
 extern "C" void reset() { start(); }
 
 // Initial stack pointer, reset, NMI, hard fault; no interrupt is ever enabled.
-__attribute__((section(".vectors"), used)) const void* const vectors[4] = {
-    top_of_stack, reinterpret_cast<const void*>(reset), reinterpret_cast<const void*>(fault),
-    reinterpret_cast<const void*>(fault)};
+__attribute__((section(".vectors"), used))
+const void* const vectors[4] = {top_of_stack, reinterpret_cast<const void*>(reset),
+                                reinterpret_cast<const void*>(fault), reinterpret_cast<const void*>(fault)};

@@ -52,8 +52,7 @@ struct BoxSide {
     packet.led = wire::kLedOn;
     return packet;
   }
-  wire::Heartbeat heartbeat(uint32_t echo_sequence = 0, uint32_t echo_held_us = 0,
-                            uint8_t led = wire::kLedOn) {
+  wire::Heartbeat heartbeat(uint32_t echo_sequence = 0, uint32_t echo_held_us = 0, uint8_t led = wire::kLedOn) {
     auto packet = head<wire::Heartbeat>();
     packet.echo_sequence = echo_sequence;
     packet.echo_held_us = echo_held_us;

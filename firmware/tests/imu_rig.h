@@ -16,8 +16,7 @@ constexpr double kDegree = 3.14159265358979323846 / 180;
 
 inline Quaternion turned(double degrees, double x, double y, double z) {
   const double length = std::sqrt(x * x + y * y + z * z), half = degrees * kDegree / 2;
-  return {std::cos(half), std::sin(half) * x / length, std::sin(half) * y / length,
-          std::sin(half) * z / length};
+  return {std::cos(half), std::sin(half) * x / length, std::sin(half) * y / length, std::sin(half) * z / length};
 }
 
 inline double degrees_between(const Quaternion& a, const Quaternion& b) {

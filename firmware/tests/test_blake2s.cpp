@@ -48,8 +48,7 @@ std::vector<uint8_t> recurrence(size_t count, uint32_t seed) {
 }  // namespace
 
 TEST_CASE("RFC 7693, appendix B: abc") {
-  CHECK(digest({}, {'a', 'b', 'c'}, 32) ==
-        "508c5e8c327c14e2e1a72ba34eeb452f37458b209ed63a294d999b4c86675982");
+  CHECK(digest({}, {'a', 'b', 'c'}, 32) == "508c5e8c327c14e2e1a72ba34eeb452f37458b209ed63a294d999b4c86675982");
 }
 
 TEST_CASE("RFC 7693, appendix E: all lengths of digest and message, with and without key") {
@@ -70,8 +69,7 @@ TEST_CASE("RFC 7693, appendix E: all lengths of digest and message, with and wit
 }
 
 TEST_CASE("keyed vectors of the reference implementation") {
-  CHECK(digest(counting(32), {}, 32) ==
-        "48a8997da407876b3d79c0d92325ad3b89cbb754d86ab71aee047ad345fd2c49");
+  CHECK(digest(counting(32), {}, 32) == "48a8997da407876b3d79c0d92325ad3b89cbb754d86ab71aee047ad345fd2c49");
   CHECK(digest(counting(32), counting(64), 32) ==
         "8975b0577fd35566d750b362b0897a26c399136df07bababbde6203ff2954ed4");
 }

@@ -25,8 +25,8 @@ TEST_CASE("no chip: it says so, and takes one that comes later") {
 }
 
 TEST_CASE("short trouble on the bus costs readings, not the heading") {
-  for (const ImuFault fault : {ImuFault::kNack, ImuFault::kStuckBus, ImuFault::kZeroRead, ImuFault::kTornRead,
-                               ImuFault::kFlippedBit}) {
+  for (const ImuFault fault :
+       {ImuFault::kNack, ImuFault::kStuckBus, ImuFault::kZeroRead, ImuFault::kTornRead, ImuFault::kFlippedBit}) {
     for (const uint32_t times : {1u, 2u, 5u}) {
       CAPTURE(static_cast<int>(fault));
       CAPTURE(times);
@@ -69,7 +69,7 @@ TEST_CASE("a chip that lost fusion is brought back, and the lost heading is said
   struct Trouble {
     ImuFault fault;
     double back_s;
-    uint16_t ImuCounts::*reason;
+    uint16_t ImuCounts::* reason;
   };
   for (const Trouble& trouble : {Trouble{ImuFault::kBrownOut, 0.7, &ImuCounts::brown_outs},
                                  Trouble{ImuFault::kSilentConfig, 0.2, &ImuCounts::silent_configs},
@@ -210,8 +210,8 @@ TEST_CASE("whatever mix of faults: nothing wrong is believed, no wait is broken,
     rig.model.set_motion(dance);
     rig.model.drift_degrees_minute = 5;
     const double often = random.happens(0.5) ? 0.02 : 0.15;
-    for (const ImuFault fault : {ImuFault::kNack, ImuFault::kStuckBus, ImuFault::kZeroRead,
-                                 ImuFault::kTornRead, ImuFault::kFlippedBit}) {
+    for (const ImuFault fault :
+         {ImuFault::kNack, ImuFault::kStuckBus, ImuFault::kZeroRead, ImuFault::kTornRead, ImuFault::kFlippedBit}) {
       if (random.happens(0.6)) rig.model.set_probability(fault, random.share() * often);
     }
     for (const ImuFault fault : {ImuFault::kBrownOut, ImuFault::kSilentConfig, ImuFault::kFusionError}) {

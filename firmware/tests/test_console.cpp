@@ -90,19 +90,43 @@ TEST_CASE("names of networks may have letters beyond ASCII and spaces at their e
 }
 
 TEST_CASE("what breaks a rule changes nothing") {
-  for (const char* line :
-       {"set device 1a2b3c4", "set device 1a2b3c4dd", "set device 1a2b3c4g", "set device 00000000",
-        "set device", "set device -1a2b3c4", "set key 00", "set key 000102030405060708090a0b0c0d0e0",
-        "set key",
-        "set key 000102030405060708090a0b0c0d0e0f00", "set key 0001020304050607 8090a0b0c0d0e0f", "set name",
-        "set name two words", "set name a-name-of-25-characters!!", "set name B\xC3\xBChne", "set port 0",
-        "set port 65536", "set port 4294977046", "set port 9750x", "set port -1", "set port",
-        "set password short",
-        "set password 1234567890123456789012345678901234567890123456789012345678901234",
-        "set network 123456789012345678901234567890123", "set fusion amg", "set fusion",
-        "set crystal", "set crystal 1", "set crystal maybe", "set crystal yes ", "set axes 24",
-        "set axes 24 08", "set axes 64 00", "set axes 25 00", "set axes 24 01", "set axes 2400",
-        "set axes 24 00 "}) {
+  for (const char* line : {"set device 1a2b3c4",
+                           "set device 1a2b3c4dd",
+                           "set device 1a2b3c4g",
+                           "set device 00000000",
+                           "set device",
+                           "set device -1a2b3c4",
+                           "set key 00",
+                           "set key 000102030405060708090a0b0c0d0e0",
+                           "set key",
+                           "set key 000102030405060708090a0b0c0d0e0f00",
+                           "set key 0001020304050607 8090a0b0c0d0e0f",
+                           "set name",
+                           "set name two words",
+                           "set name a-name-of-25-characters!!",
+                           "set name B\xC3\xBChne",
+                           "set port 0",
+                           "set port 65536",
+                           "set port 4294977046",
+                           "set port 9750x",
+                           "set port -1",
+                           "set port",
+                           "set password short",
+                           "set password 1234567890123456789012345678901234567890123456789012345678901234",
+                           "set network 123456789012345678901234567890123",
+                           "set fusion amg",
+                           "set fusion",
+                           "set crystal",
+                           "set crystal 1",
+                           "set crystal maybe",
+                           "set crystal yes ",
+                           "set axes 24",
+                           "set axes 24 08",
+                           "set axes 64 00",
+                           "set axes 25 00",
+                           "set axes 24 01",
+                           "set axes 2400",
+                           "set axes 24 00 "}) {
     CAPTURE(line);
     Session session;
     const std::string before = session.ask("show");
@@ -139,12 +163,11 @@ TEST_CASE("prove: keyed BLAKE2s over the word and the nonce") {
 
 TEST_CASE("what the wearable has to do is asked of it") {
   Session session;
-  const std::vector<std::pair<const char*, Request>> requests = {
-      {"save", Request::kSave},
-      {"forget", Request::kForget},
-      {"strobe", Request::kStrobe},
-      {"calibration save", Request::kSaveCalibration},
-      {"restart", Request::kRestart}};
+  const std::vector<std::pair<const char*, Request>> requests = {{"save", Request::kSave},
+                                                                 {"forget", Request::kForget},
+                                                                 {"strobe", Request::kStrobe},
+                                                                 {"calibration save", Request::kSaveCalibration},
+                                                                 {"restart", Request::kRestart}};
   for (const auto& known : requests) {
     CHECK(session.ask(known.first).substr(0, 2) == "ok");
     CHECK(session.request == known.second);
@@ -195,8 +218,9 @@ TEST_CASE("a version is three numbers, whatever follows") {
   const struct {
     const char* text;
     uint8_t version[3];
-  } versions[] = {{"19.6.1", {19, 6, 1}}, {"19.5.4 Ver 2", {19, 5, 4}}, {"0.0.0", {0, 0, 0}},
-                  {"19.6", {0, 0, 0}},    {"", {0, 0, 0}},              {"19.256.1", {0, 0, 0}},
+  } versions[] = {{"19.6.1", {19, 6, 1}}, {"19.5.4 Ver 2", {19, 5, 4}},
+                  {"0.0.0", {0, 0, 0}},   {"19.6", {0, 0, 0}},
+                  {"", {0, 0, 0}},        {"19.256.1", {0, 0, 0}},
                   {"19..1", {0, 0, 0}},   {"v19.6.1", {0, 0, 0}}};
   for (const auto& known : versions) {
     CAPTURE(known.text);
@@ -210,8 +234,8 @@ TEST_CASE("help names every command") {
   Session session;
   const std::string help = session.ask("help");
   for (const char* command :
-       {"id", "show", "status", "device", "key", "name", "network", "password", "port", "fusion",
-        "crystal", "axes", "save", "forget", "prove", "strobe", "calibration save", "restart"})
+       {"id", "show", "status", "device", "key", "name", "network", "password", "port", "fusion", "crystal",
+        "axes", "save", "forget", "prove", "strobe", "calibration save", "restart"})
     CHECK(help.find(command) != std::string::npos);
   CHECK(help.substr(help.size() - 7) == "restart");
 }
@@ -241,9 +265,24 @@ TEST_CASE("control characters are refused whole") {
 TEST_CASE("no answer holds the key or the password, whatever is asked") {
   Session session;
   session.provision();
-  const char* lines[] = {"id", "show", "status", "help", "save", "forget", "strobe", "restart", "set key",
-                         "set password", "set password short", "prove 0000000000000000", "set key zz",
-                         "get key", "show key", "show password", "calibration", "set name break a leg",
+  const char* lines[] = {"id",
+                         "show",
+                         "status",
+                         "help",
+                         "save",
+                         "forget",
+                         "strobe",
+                         "restart",
+                         "set key",
+                         "set password",
+                         "set password short",
+                         "prove 0000000000000000",
+                         "set key zz",
+                         "get key",
+                         "show key",
+                         "show password",
+                         "calibration",
+                         "set name break a leg",
                          "set network break a leg and more than fits into a name",
                          "set device 000102030405060708090a0b0c0d0e0f",
                          "key 000102030405060708090a0b0c0d0e0f"};

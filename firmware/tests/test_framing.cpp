@@ -89,8 +89,8 @@ TEST_CASE("text and packets take turns") {
   line.feed(framed({8}));
   line.feed(framed({9}));
   line.feed(text("show\r"));
-  CHECK(line.found == Findings{"line:id", "packet:\x07", "line:status", "packet:\x08", "packet:\x09",
-                               "line:show"});
+  CHECK(line.found ==
+        Findings{"line:id", "packet:\x07", "line:status", "packet:\x08", "packet:\x09", "line:show"});
   CHECK(line.input.damaged() == 0);
 }
 
@@ -131,7 +131,9 @@ TEST_CASE("a slow typist is no silence") {
 
 TEST_CASE("backspace takes back, and not beyond the beginning") {
   Line line;
-  line.feed(text("\b\bix\x7F" "d\n"));
+  line.feed(
+      text("\b\bix\x7F"
+           "d\n"));
   CHECK(line.found == Findings{"line:id"});
 }
 
@@ -141,8 +143,7 @@ TEST_CASE("empty lines are nothing; overlong ones are refused whole and the next
   line.feed(text(std::string(kLongestLine, 'x') + "\n"));
   line.feed(text(std::string(kLongestLine + 1u, 'y') + "\n"));
   line.feed(text(std::string(1000, 'z') + "\nid\n"));
-  CHECK(line.found ==
-        Findings{"line:" + std::string(kLongestLine, 'x'), "overlong", "overlong", "line:id"});
+  CHECK(line.found == Findings{"line:" + std::string(kLongestLine, 'x'), "overlong", "overlong", "line:id"});
 }
 
 TEST_CASE("an overlong packet is counted, and the next one counts") {

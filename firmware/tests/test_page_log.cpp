@@ -41,7 +41,8 @@ class FlashInMemory : public FlashRows {
     if (steps_until_power_cut == 0) return;
     const bool is_cut = steps_until_power_cut == 1;
     if (steps_until_power_cut > 0) --steps_until_power_cut;
-    std::copy_n(after.begin(), is_cut ? after.size() / 2 : after.size(), bytes_.begin() + static_cast<long>(start));
+    std::copy_n(after.begin(), is_cut ? after.size() / 2 : after.size(),
+                bytes_.begin() + static_cast<long>(start));
   }
 
   std::vector<uint8_t> bytes_;

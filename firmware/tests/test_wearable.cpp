@@ -171,4 +171,3 @@ TEST_CASE("a crystal that is set later is told to a chip that fuses already") {
   stage.run(3 * kSecond);
   CHECK(stage.imu.trigger() == 0);
 }
-

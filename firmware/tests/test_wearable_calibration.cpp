@@ -62,8 +62,8 @@ TEST_CASE("a calibration that the box kept is restored and saved") {
   stage.link();
   REQUIRE_FALSE(stage.wearable->status().has_profile);
   const uint8_t recoveries = stage.wearable->status().recoveries;
-  stage.say(signed_packet(stage.box.restore(stage.hellos.empty() ? stage.wearable->status().imu_id
-                                                                 : stage.hellos[0].imu_id)));
+  stage.say(signed_packet(
+      stage.box.restore(stage.hellos.empty() ? stage.wearable->status().imu_id : stage.hellos[0].imu_id)));
   stage.run(kSecond);
   CHECK(stage.wearable->status().has_profile);
   CHECK(stage.wearable->status().recoveries == static_cast<uint8_t>(recoveries + 1));  // its heading was lost
@@ -84,8 +84,7 @@ TEST_CASE("a calibration that the flash did not take is in use, told to the box,
   CHECK(stage.ask("calibration save").substr(0, 9) == "ok saving");
   stage.run(2 * kSecond);
   REQUIRE(stage.lines.size() == 2);
-  CHECK(stage.lines[1] ==
-        "note: the flash did not take the calibration, it counts until power-off; try again");
+  CHECK(stage.lines[1] == "note: the flash did not take the calibration, it counts until power-off; try again");
   CHECK(stage.wearable->status().has_profile);
   CHECK(stage.wearable->status().is_profile_unsaved);
   stage.flash.is_broken = false;

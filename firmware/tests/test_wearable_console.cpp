@@ -19,8 +19,7 @@ TEST_CASE("a fresh board joins no network, greets no box, and is provisioned by 
   CHECK(stage.wifi.joins == 0);
   CHECK(stage.hellos.empty());
   char beginning[64];
-  snprintf(beginning, sizeof beginning, "ok bunraku-wearable %s wire %08x i", kFirmwareVersion,
-           wire::kWireHash);
+  snprintf(beginning, sizeof beginning, "ok bunraku-wearable %s wire %08x i", kFirmwareVersion, wire::kWireHash);
   CHECK(stage.ask("id").substr(0, strlen(beginning)) == beginning);
   CHECK(stage.ask("id").find("board b0a2d001") != std::string::npos);
   for (const char* line :
@@ -111,8 +110,7 @@ TEST_CASE("an overlong line is refused; garbage harms nothing") {
   Stage stage;
   stage.link();
   stage.serial.is_open = true;
-  CHECK(stage.ask(std::string(200, 'x')) ==
-        "error: a line has 128 bytes at most, nothing was done; type help");
+  CHECK(stage.ask(std::string(200, 'x')) == "error: a line has 128 bytes at most, nothing was done; type help");
   uint32_t noise = 1;
   for (int i = 0; i < 5000; ++i) {
     noise = noise * 1664525 + 1013904223;

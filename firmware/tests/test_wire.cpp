@@ -15,9 +15,11 @@ namespace {
 
 // Every field of every packet by its name; `visit` checks or fills it.
 #define VISIT(field) visit(#field, packet.field);
-#define FIELDS(Packet, LIST) \
-  template <typename Visit>  \
-  void fields(wire::Packet& packet, Visit& visit) { LIST(VISIT) }
+#define FIELDS(Packet, LIST)                        \
+  template <typename Visit>                         \
+  void fields(wire::Packet& packet, Visit& visit) { \
+    LIST(VISIT)                                     \
+  }
 FIELDS(Hello, BUNRAKU_HELLO)
 FIELDS(Assignment, BUNRAKU_ASSIGNMENT)
 FIELDS(Reading, BUNRAKU_READING)

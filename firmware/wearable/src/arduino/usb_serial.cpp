@@ -7,9 +7,9 @@
 namespace bunraku {
 namespace {
 
-constexpr uint8_t kInEndpoint = 3;       // CDC's data endpoint towards the host: the third that the core plugs in
-constexpr uint16_t kLargestPiece = 63;   // one less than the endpoint holds: a full one needs a second packet
-constexpr uint32_t kUnpluggedMs = 50;    // a live host sends a frame each millisecond
+constexpr uint8_t kInEndpoint = 3;  // CDC's data endpoint towards the host: the third that the core plugs in
+constexpr uint16_t kLargestPiece = 63;  // one less than the endpoint holds: a full one needs a second packet
+constexpr uint32_t kUnpluggedMs = 50;  // a live host sends a frame each millisecond
 
 bool endpoint_is_free() {
   const auto& endpoint = USB->DEVICE.DeviceEndpoint[kInEndpoint];

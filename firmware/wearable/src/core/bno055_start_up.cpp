@@ -66,9 +66,7 @@ void Bno055::search(uint32_t now_us) {
 }
 
 // The board may have been restarted while page 1 was selected, or in the middle of a transaction.
-void Bno055::select_page(uint32_t now_us) {
-  write(kPageId, 0) ? go(State::kIdentify) : keep_looking(now_us);
-}
+void Bno055::select_page(uint32_t now_us) { write(kPageId, 0) ? go(State::kIdentify) : keep_looking(now_us); }
 
 void Bno055::identify(uint32_t now_us) {
   uint8_t id = 0;
@@ -93,15 +91,16 @@ void Bno055::inspect() {
   if (!read(kSystemStatus, bytes, sizeof bytes)) return;
   const uint8_t status = bytes[0], error = bytes[kSystemError - kSystemStatus];
   const uint8_t* units = bytes + (kUnits - kSystemStatus);
-  is_fusion_kept_ = status == kStatusFusion && !is_crystal_new_ &&
-                    is_as_told(units, static_cast<uint8_t>(settings_.fusion));
+  is_fusion_kept_ =
+      status == kStatusFusion && !is_crystal_new_ && is_as_told(units, static_cast<uint8_t>(settings_.fusion));
   if (is_fusion_kept_) return go(has_id_ ? State::kAwaitData : State::kSelectIdPage);
   if (++looks_ < kMostDoubts) return;
   if (status == kStatusError) return repair_fusion(error);
   if (is_fusion_expected_) {
     const bool is_in_config = (bytes[kMode - kSystemStatus] & kModeBits) == kConfigMode;
     count(*units == kUnitsAtPowerOn ? counts_.brown_outs
-                                    : is_in_config ? counts_.silent_configs : counts_.mode_refusals);
+          : is_in_config            ? counts_.silent_configs
+                                    : counts_.mode_refusals);
   }
   enter_config_for(Errand::kConfigure);
 }

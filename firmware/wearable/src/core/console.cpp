@@ -18,20 +18,14 @@ const char* set_or_none(bool is_set) { return is_set ? "set" : "none"; }
 
 const char* state_name(State state) {
   switch (state) {
-    case State::kLinked:
-      return "linked";
-    case State::kGreeting:
-      return "greeting";
-    case State::kJoining:
-      return "joining";
-    default:
-      return "unprovisioned";
+    case State::kLinked: return "linked";
+    case State::kGreeting: return "greeting";
+    case State::kJoining: return "joining";
+    default: return "unprovisioned";
   }
 }
 
-const char* lane_name(Lane lane) {
-  return lane == Lane::kWifi ? "wifi" : lane == Lane::kCable ? "cable" : "none";
-}
+const char* lane_name(Lane lane) { return lane == Lane::kWifi ? "wifi" : lane == Lane::kCable ? "cable" : "none"; }
 
 void identify(const Status& status, uint32_t board_number, Answer& answer) {
   answer.add("ok bunraku-wearable ").add(kFirmwareVersion).add(" wire ").add_hex(wire::kWireHash);
@@ -92,7 +86,8 @@ Request Console::execute(const char* line, const Status& status, uint32_t board_
   } else if (strcmp(line, "status") == 0) {
     tell(status, answer);
   } else if (strcmp(line, "help") == 0) {
-    answer.add("ok id, show, status, set device|key|name|network|password|port|fusion|crystal|axes <value>, save, ");
+    answer.add(
+        "ok id, show, status, set device|key|name|network|password|port|fusion|crystal|axes <value>, save, ");
     answer.add("forget, prove <nonce>, strobe, calibration save, restart");
   } else {
     return request(line, answer);

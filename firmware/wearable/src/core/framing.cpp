@@ -15,8 +15,7 @@ uint16_t crc16(const uint8_t* data, uint16_t count) {
   uint16_t crc = 0;
   for (uint16_t i = 0; i < count; ++i) {
     crc = static_cast<uint16_t>(crc ^ data[i] << 8);
-    for (uint8_t bit = 0; bit < 8; ++bit)
-      crc = static_cast<uint16_t>(crc & 0x8000 ? crc << 1 ^ 0x1021 : crc << 1);
+    for (uint8_t bit = 0; bit < 8; ++bit) crc = static_cast<uint16_t>(crc & 0x8000 ? crc << 1 ^ 0x1021 : crc << 1);
   }
   return crc;
 }

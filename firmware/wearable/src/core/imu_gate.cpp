@@ -98,8 +98,7 @@ ImuGate::Verdict ImuGate::refusal(const Reading& reading) const {
 bool ImuGate::has_moved(const Reading& reading, uint8_t needed) {
   uint32_t elapsed_us = reading.at_us - refused_.at_us;
   if (elapsed_us > kLongestStepUs) elapsed_us = kLongestStepUs;
-  const bool agrees = has_refused_ &&
-                      separation(refused_.orientation, reading.orientation) <= reach(elapsed_us) &&
+  const bool agrees = has_refused_ && separation(refused_.orientation, reading.orientation) <= reach(elapsed_us) &&
                       !has_flipped_bit(refused_.orientation, reading.orientation);
   agreeing_ = agrees ? static_cast<uint8_t>(agreeing_ + 1) : 1;
   refused_ = reading;

@@ -18,14 +18,10 @@ bool is_flashing(uint32_t now_ms, uint8_t count, uint32_t period_ms) {
 
 bool is_lit_as_asked(uint8_t box_led, uint32_t now_ms) {
   switch (box_led) {
-    case wire::kLedOn:
-      return now_ms % kOnEveryMs < kOnMs;
-    case wire::kLedSlow:
-      return is_blinking(now_ms, 1000);
-    case wire::kLedFast:
-      return is_blinking(now_ms, 200);
-    default:
-      return false;
+    case wire::kLedOn: return now_ms % kOnEveryMs < kOnMs;
+    case wire::kLedSlow: return is_blinking(now_ms, 1000);
+    case wire::kLedFast: return is_blinking(now_ms, 200);
+    default: return false;
   }
 }
 
@@ -37,8 +33,7 @@ bool is_lit(const LightCues& cues, uint32_t now_ms) {
   if (cues.is_strobing || (is_linked && cues.box_led == wire::kLedStrobe)) return is_blinking(now_ms, 100);
   if (cues.state == State::kNotProvisioned) return is_flashing(now_ms, 2, 2000);
   if (cues.has_imu_failed) return is_flashing(now_ms, 5, 2500);
-  const bool box_wants_attention =
-      is_linked && (cues.box_led == wire::kLedSlow || cues.box_led == wire::kLedFast);
+  const bool box_wants_attention = is_linked && (cues.box_led == wire::kLedSlow || cues.box_led == wire::kLedFast);
   if (cues.is_battery_low && !box_wants_attention && now_ms % kLowEveryMs < kLowLastsMs)
     return is_flashing(now_ms, 3, kLowEveryMs);
   if (is_linked) return is_lit_as_asked(cues.box_led, now_ms);

@@ -22,16 +22,11 @@ bool is_newer(uint32_t sequence, uint32_t than) { return static_cast<int32_t>(se
 
 uint8_t size_from_box(uint8_t kind) {  // 0: not a packet that a box sends
   switch (kind) {
-    case wire::Assignment::kKind:
-      return wire::Assignment::kSize;
-    case wire::Heartbeat::kKind:
-      return wire::Heartbeat::kSize;
-    case wire::Call::kKind:
-      return wire::Call::kSize;
-    case wire::Restore::kKind:
-      return wire::Restore::kSize;
-    default:
-      return 0;
+    case wire::Assignment::kKind: return wire::Assignment::kSize;
+    case wire::Heartbeat::kKind: return wire::Heartbeat::kSize;
+    case wire::Call::kKind: return wire::Call::kSize;
+    case wire::Restore::kKind: return wire::Restore::kSize;
+    default: return 0;
   }
 }
 
@@ -67,8 +62,8 @@ void Pairing::set_lane(Lane lane, bool is_up) {
   for (Timer& pause : hello_pause_) pause.stop();  // greet on the other lane at once
 }
 
-Received Pairing::receive(const uint8_t* data, uint16_t count_bytes, const Way& from,
-                          const Condition& condition, uint32_t now_us) {
+Received Pairing::receive(const uint8_t* data, uint16_t count_bytes, const Way& from, const Condition& condition,
+                          uint32_t now_us) {
   wire::Call head;  // nothing but what every packet carries
   if (count_bytes < wire::kHeadBytes + wire::kTagBytes) return count(counts_.malformed), Received::kNothing;
   const uint8_t kind = data[3];
@@ -155,8 +150,7 @@ bool Pairing::wants_hello(Lane lane) const {
   return !is_linked() || (lane == Lane::kCable && link_.lane == Lane::kWifi);
 }
 
-uint8_t Pairing::next(const Condition& condition, uint32_t now_us, uint8_t (&packet)[wire::kLargest],
-                      Way& to) {
+uint8_t Pairing::next(const Condition& condition, uint32_t now_us, uint8_t (&packet)[wire::kLargest], Way& to) {
   call_pause_.is_running(now_us);
   restore_window_.is_running(now_us);
   if (is_linked() && !heard_.is_running(now_us)) leave();

@@ -154,8 +154,9 @@ void Wearable::light(uint32_t now_us) {
   turn_us_ = now_us;
   uptime_ms_ += uptime_rest_us_ / 1000;
   uptime_rest_us_ %= 1000;
-  const LightCues cues = {state(), pairing_.led(), saving_.is_running(now_us), strobe_.is_running(now_us),
-                          imu_.has_failed(), battery_.is_low()};
+  const LightCues cues = {
+      state(),           pairing_.led(),   saving_.is_running(now_us), strobe_.is_running(now_us),
+      imu_.has_failed(), battery_.is_low()};
   set_lamp(is_lit(cues, uptime_ms_));
 }
 
@@ -180,10 +181,9 @@ State Wearable::state() const {
 Condition Wearable::condition() const {
   Condition now = {};
   now.battery = battery_.percent();
-  now.flags = static_cast<uint8_t>((imu_.has_profile() ? wire::kHasProfile : 0) |
-                                   (settings_.imu.fusion == Fusion::kNdof ? wire::kIsNdof : 0) |
-                                   (settings_.imu.has_crystal ? wire::kHasCrystal : 0) |
-                                   radio_flags(status_.radio));
+  now.flags = static_cast<uint8_t>(
+      (imu_.has_profile() ? wire::kHasProfile : 0) | (settings_.imu.fusion == Fusion::kNdof ? wire::kIsNdof : 0) |
+      (settings_.imu.has_crystal ? wire::kHasCrystal : 0) | radio_flags(status_.radio));
   now.taps = status_.taps;
   now.recoveries = imu_.recoveries();
   if (imu_.has_id()) memcpy(now.imu_id, imu_.unique_id(), sizeof now.imu_id);

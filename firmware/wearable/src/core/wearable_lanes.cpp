@@ -71,25 +71,19 @@ void Wearable::say_line(const char* line) {
 
 const char* Wearable::carry_out(Request request, uint32_t now_us) {
   switch (request) {
-    case Request::kSave:
-      return keep_settings(now_us);
-    case Request::kForget:
-      return forget(now_us);
-    case Request::kStrobe:
-      strobe_.start(now_us, kStrobeUs);
-      return nullptr;
+    case Request::kSave: return keep_settings(now_us);
+    case Request::kForget: return forget(now_us);
+    case Request::kStrobe: strobe_.start(now_us, kStrobeUs); return nullptr;
     case Request::kSaveCalibration:
       if (!imu_.is_running()) return "no running IMU, nothing was saved; check its wiring";
-      if (!imu_.is_calibrated())
-        return "not calibrated yet, nothing was saved; turn it slowly through six poses";
+      if (!imu_.is_calibrated()) return "not calibrated yet, nothing was saved; turn it slowly through six poses";
       save_calibration(now_us);
       return nullptr;
     case Request::kRestart:
       is_restarting_ = true;
       restart_pause_.start(now_us, kRestartPauseUs);
       return nullptr;
-    default:
-      return nullptr;
+    default: return nullptr;
   }
 }
 
@@ -115,8 +109,8 @@ void Wearable::save_calibration(uint32_t now_us) {
 
 // Apply settings: restarts pairing, and Wi-Fi and IMU if their settings changed.
 void Wearable::adopt(const Settings& settings, uint32_t now_us) {
-  const bool is_same_network = strcmp(settings.network, settings_.network) == 0 &&
-                               strcmp(settings.password, settings_.password) == 0;
+  const bool is_same_network =
+      strcmp(settings.network, settings_.network) == 0 && strcmp(settings.password, settings_.password) == 0;
   const ImuSettings& imu = settings.imu;
   const bool is_same_imu = imu.fusion == settings_.imu.fusion && imu.axis_map == settings_.imu.axis_map &&
                            imu.axis_sign == settings_.imu.axis_sign &&
