@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from copy import copy
 from typing import Any
 
@@ -12,20 +13,19 @@ from appliance.dancer.crossfade import Crossfade
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
 from appliance.dancer.phrase import FPS, NUMBER, Phrase, X, Z
-from appliance.dancer.played import Played
 from appliance.dancer.reading_head import Reader, ReadingHead
 from appliance.dancer.repertoire import Made, Repertoire
-from appliance.dancer.slerp import Slerp
+from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.dancer.stream import Stream
 from appliance.pose.recording import Recording
 from appliance.show.sources import MAIN
 
 MAX_RATE = 4.0
 RATE_CHANGE_PER_TICK = 0.08  # from standing to full speed in a quarter of a second
-_FRAME_DIGITS = 2  # of a place to start at: its seconds are exact to some thousandths of a frame
+_FRAME_DIGITS = 2  # rounding of a place to start at: its seconds are exact to some thousandths of a frame
 
 
-class Playback(Played):
+class Playback:
     """Plays one of its phrases endlessly. Each tick: read window() and roots(), then advance().
 
     The motion is one continuous stream; the window is its next 8 poses, the first of them the pose of this
@@ -78,8 +78,59 @@ class Playback(Played):
         self._repertoire.add(name, phrase, floor)
 
     @property
+    def phrases(self) -> tuple[str, ...]:
+        """Names of all phrases, the show's first phrase first."""
+        return self._repertoire.names
+
+    def loop_of(self, name: str) -> Loop:
+        """The whole loop of a phrase. Raises ValueError."""
+        return self._repertoire.find(name)[1]
+
+    def make_by(self, make: Callable[[str], Loop]) -> None:
+        """Set where the loops of recipes come from; it raises ValueError."""
+        self._repertoire.make = make
+
+    def made_by(self, recipe: str) -> Loop:
+        """The loop of a recipe. Raises ValueError."""
+        return self._repertoire.make(recipe)
+
+    def window(self) -> FloatArray:
+        """The next poses (window, J, 4) of the motion, without sign jumps; valid until advance()."""
+        return self._stream.poses()
+
+    def roots(self) -> FloatArray:
+        """The root's position (window, 3) in metres at the poses of the window."""
+        return self._stream.roots()
+
+    @property
+    def lift(self) -> float:
+        """How far the phrase is above the floor (metres) at the window's first pose."""
+        return self._stream.lift
+
+    @property
+    def rest_heights(self) -> FloatArray | None:
+        """Heights (S,) in metres of the soles' points while they stand, at the window's first pose."""
+        heights = self._stream.rest_heights
+        return heights if len(heights) else None
+
+    @property
+    def phrase(self) -> str:
+        """Name of the phrase of the window's first pose; in a crossfade the entering one."""
+        return self._repertoire.name_of(self._stream.number)
+
+    @property
+    def number(self) -> int:
+        """Number of the phrase or of what was made, of the window's first pose."""
+        return self._stream.number
+
+    @property
+    def standing(self) -> tuple[float, float, float]:
+        """The root on the stage at the window's first pose: x, z in metres, heading in radians."""
+        return self._stream.standing
+
+    @property
     def made(self) -> Made | None:
-        """What was made ahead and dances now or is about to; None: a phrase."""
+        """The motion made ahead that dances now or is about to; None: a phrase."""
         return self._repertoire.made(self._excerpt)
 
     @property
@@ -213,7 +264,7 @@ class Playback(Played):
         self._push()
 
     def state(self) -> dict[str, Any]:
-        """What later poses depend on, for `restore`: plain values and copies of arrays."""
+        """The state that later poses depend on, for `restore`: plain values and copies of arrays."""
         repertoire, request, leaving = self._repertoire, self._request, self._crossfade.leaving
         return {
             "rate": self._rate,
