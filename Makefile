@@ -40,12 +40,13 @@ DEBIAN_FOR_SOAK := $(DEBIAN_FOR_GL) stress-ng:stress-ng rt-tests:cyclictest
 FUZZ_SECONDS ?= $(if $(LENGTH),30,5)
 MINUTES ?= 60
 # The key that signs releases, and the one after it: docs/releases.md.
+VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 SIGNING = $(if $(KEY),--key '$(KEY)') $(if $(NEXT_KEY),--next-key '$(NEXT_KEY)')
 
 .DEFAULT_GOAL := help
-.PHONY: help run release studio firmware test test-long pytest beside firmware-test firmware-check fuzz fuzz-corpus lint bench \
-    lock clean soak boot-figures image test-vm debian-for-image debian-for-vm debian-for-firmware \
-    debian-for-tests debian-for-boot debian-for-soak
+.PHONY: help run release studio firmware firmware-bin test test-quick test-long pytest beside firmware-test \
+    firmware-check fuzz fuzz-corpus lint lint-js bench lock clean soak boot-figures image dist sbom downloads test-vm \
+    debian-for-image debian-for-vm debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -62,6 +63,12 @@ firmware: debian-for-firmware ## build the wearable's firmware for this machine:
 	@$(call build,firmware,wearable)
 	@echo "Built build/firmware/libwearable.so"
 
+# tests/quick.txt lists the tests; tests/quick_rules.py fails one that waits or starts other programs.
+test-quick: $(VENV)/.ready-to-test-quickly ## style and unit tests, in two minutes: no root, no Debian package
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/python -m pytest -p tests.quick_rules $(BESIDE) @tests/quick.txt $(TEST_ARGS)
+
 test: $(VENV)/.ready-to-test debian-for-boot firmware fuzz ## style, types, contracts, all tests
 	@$(MAKE) --no-print-directory --jobs=2 pytest beside
 
@@ -73,6 +80,11 @@ beside:  # while tests wait: with what they leave of the processors
 
 test-long: ## the same with every count at its full length: power cuts, fuzzing, random files, property tests
 	@$(MAKE) --no-print-directory test LENGTH=--long
+
+firmware-bin: ## the wearable's image for its board, out/firmware/wearable.ino.bin (needs arduino-cli)
+	@command -v arduino-cli >/dev/null || { echo "arduino-cli 1.0 or newer is missing: docs/firmware.md" >&2; exit 1; }
+	@arduino-cli compile --profile mkr1000 --output-dir out/firmware \
+	    --build-property "compiler.cpp.extra_flags=-std=gnu++17 -fno-sized-deallocation" firmware/wearable
 
 firmware-test: firmware-check fuzz ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
 
@@ -126,13 +138,23 @@ lint: $(VENV)/.ready-to-test ## style, types and import contracts alone
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy --strict -p appliance -p hw_sim -p tools
 	@$(BIN)/lint-imports
+	@find firmware -name '*.cpp' -o -name '*.h' -o -name '*.ino' | xargs $(BIN)/clang-format --dry-run --Werror
+
+lint-js: node_modules/.ready ## the page's scripts: eslint and the TypeScript compiler (needs Node.js 20 and npm)
+	@npm run --silent lint
+	@npm run --silent types
+
+node_modules/.ready: package.json package-lock.json
+	@command -v npm >/dev/null || { echo "npm is missing. On Debian: sudo apt-get install -y npm" >&2; exit 1; }
+	@npm ci --silent
+	@touch $@
 
 bench: $(VENV)/.ready-to-test ## the speed of everything that a tick does, as ratios in one run
 	@$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-only $(TEST_ARGS)
 
 # One environment for both: `make run` installs the box and pictures, `make test` adds torch and the checks.
 $(VENV)/bin/python:
-	@for python in python3.11 python3.12 python3.13 python3; do \
+	@for python in $(or $(PYTHON),python3.11 python3.12 python3.13 python3); do \
 	    if $$python -c 'import sys, ensurepip, venv; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null; \
 	    then echo "Building $(VENV) with $$($$python --version)"; $$python -m venv $(VENV); exit; fi; \
 	done; \
@@ -145,11 +167,17 @@ $(VENV)/.ready-to-run: requirements.txt pyproject.toml | $(VENV)/bin/python
 
 $(VENV)/.ready-to-test: requirements-test.txt $(VENV)/.ready-to-run
 	@$(call install,requirements-test.txt)
+	@touch $(VENV)/.ready-to-test-quickly $@
+
+# Without PyTorch: a tenth of the download.
+$(VENV)/.ready-to-test-quickly: requirements-test.txt $(VENV)/.ready-to-run
+	@$(call install,requirements-test.txt,torch)
 	@touch $@
 
+# $(1) the lock file, $(2) a package that is left out.
 define install
-echo "Installing what $(1) names (the first time takes minutes)" && \
-$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(1) && \
+echo "Installing what $(1) names$(if $(2), without $(2)) (the first time takes minutes)" && \
+$(BIN)/python -m pip install --quiet --disable-pip-version-check -r <(grep -v '^$(or $(2),#)==' $(1)) && \
 $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 endef
 
@@ -185,6 +213,24 @@ endef
 release: ## everything for a box, on a stick: out/bunraku-VERSION-ARCH (ARCH=arm64: Pi; KEY=FILE signs it)
 	@deploy/release/make-release --arch $(or $(ARCH),amd64) $(SIGNING)
 
+dist: $(VENV)/.ready-to-run ## wheel and source distribution of the last commit, out/dist
+	@rm -rf out/dist build/dist && mkdir -p out/dist build/dist
+	@set -o pipefail; git archive HEAD | tar -C build/dist -xf -
+	@cd build/dist && for kind in sdist wheel; do \
+	    ../../$(BIN)/python -c "from setuptools import build_meta as b; b.build_$$kind('../../out/dist')" \
+	        >../dist.log 2>&1 || { cat ../dist.log; exit 1; }; done
+	@ls out/dist/*
+
+sbom: $(VENV)/.ready-to-run ## bills of materials (CycloneDX) of the releases, and of the image that was built: out/*.cdx.json
+	@for arch in amd64 arm64; do $(BILL) --arch $$arch out/bunraku-$(VERSION)-$$arch.cdx.json || exit 1; done
+	@! [ -f $(IMAGE_PACKAGES) ] || $(BILL) --debian $(IMAGE_PACKAGES) out/bunraku-$(VERSION)-image.cdx.json
+
+BILL = $(BIN)/python -m tools.sbom
+IMAGE_PACKAGES := build/image/etc/bunraku-packages
+
+downloads: ## pack what was built into out/downloads, with signed sums (KEY=FILE)
+	@deploy/release/pack-downloads $(SIGNING)
+
 lock: | $(VENV)/bin/python ## choose the newest versions that pyproject.toml allows and pin them
 	@rm -rf build && $(BIN)/python -m venv build/lock
 	@$(call pin,pictures,requirements.txt,make run: the box and pictures)
@@ -199,5 +245,5 @@ build/lock/bin/python -m pip install --quiet --disable-pip-version-check --upgra
 endef
 
 clean: ## remove the environment and everything built, keep what was trained
-	rm -rf $(VENV) build out benchmarks.json *.egg-info .pytest_cache .mypy_cache .ruff_cache \
+	rm -rf $(VENV) node_modules build out benchmarks.json *.egg-info .pytest_cache .mypy_cache .ruff_cache \
 	    .import_linter_cache .hypothesis .benchmarks
