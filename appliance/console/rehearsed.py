@@ -14,7 +14,7 @@ from appliance.console.box_view import BoxView
 from appliance.console.child import answer_of
 from appliance.console.guard import Guard
 from appliance.console.stage_view import StageView
-from appliance.show.sources import MADE
+from appliance.levers.sources import MADE
 
 _PATIENCE_S = 120.0
 _LONGEST_NAME = 64

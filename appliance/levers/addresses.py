@@ -63,7 +63,7 @@ THE_SHOW = (
         "/stop",
         Form(numbers=(FADE,), optional=1),
         "picture and lights fade out, then the phrase stands still until `/go`, whatever `/player` commands "
-        "say; again: another fade from there, but 0 lets the running one be",
+        "say. Sent again, it starts a new fade from the present level; `/stop 0` does not interrupt a fade",
         fade_s=STOP_FADE_S,
     ),
     Address(
@@ -92,8 +92,8 @@ THE_SHOW = (
         "lights",
         "walk",
         "/lights/walk",
-        "while the show is stopped: each attribute of each fixture moves for three seconds, its fixture "
-        "alone is lit. `/go`, `/panic` and `/blackout` end it",
+        "while the show is stopped: each attribute of each fixture moves for three seconds, and "
+        "only that fixture is lit. `/go`, `/panic` and `/blackout` end it",
         form=Form("fixture", may_be_nameless=True),
         arguments="[fixture; left out: the whole rig]",
     ),
@@ -187,7 +187,7 @@ SENSORS = (
         *("stage", "reload", "/sensors/reload"),
         "reread the key file: new sensors may join, removed ones are dropped at once",
     ),
-    Address("/sensors/list", Form(), "tell how all sensors are"),
+    Address("/sensors/list", Form(), "tells the state of all sensors"),
 )
 MADE_AHEAD = (
     *(one for one in _levers_at(*_MOTION)),
@@ -231,8 +231,8 @@ QUESTIONS = (
         (
             (
                 "/motion/is",
-                ",s` and a text or numbers",
-                "parameter of what was made ahead and is danced; its value",
+                ",s…",
+                "a parameter of the motion that is danced, if it was made ahead; its value, text or numbers",
             ),
             (
                 "/motion/parameter",

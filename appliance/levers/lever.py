@@ -36,7 +36,7 @@ class Lever(Generic[T]):
     value of its own (`hand lShldr`). default: before it is set. does: for people.
     address: OSC; empty: no address sets it directly. fade_s: how long a change takes where a command does not
     say; AT_ONCE: it takes no fade. is_faded_by_osc: whether the address takes one, or cues alone do.
-    cue: the key in a cue; empty: none.
+    cue: the key in a cue; empty: none. in_cue: its sentence in docs/configuration.md.
     follower: the process that has to follow before a command is answered; empty: all read it as they draw.
     names: attribute of Facts with the names that the show has, and what one is called. listed: the last word
     of the answer to the question for these names; empty: none asks. none: the word for no name at all.
@@ -53,6 +53,7 @@ class Lever(Generic[T]):
     fade_s: float | None = 0.0
     is_faded_by_osc: bool = True
     cue: str = ""
+    in_cue: str = ""
     follower: Follower = ""
     names: tuple[str, str] = ("", "")
     listed: str = ""

@@ -9,7 +9,7 @@ from typing import Any
 from appliance.levers import kind
 from appliance.levers.form import Number
 from appliance.levers.lever import AT_ONCE, Lever, Need
-from appliance.show.sources import MADE, MOST_POINTS, NO_CARD, PARAMETERS, PATH, POINTS, SEEDS
+from appliance.levers.sources import MADE, MOST_POINTS, NO_CARD, PARAMETERS, PATH, POINTS, SEEDS
 
 STOP_FADE_S = 2.0
 GO_FADE_S = 1.0
@@ -42,6 +42,8 @@ PHRASE = Lever(
     "/phrase",
     PHRASE_FADE_S,
     cue="phrase",
+    in_cue="What the puppet starts from: `main`, a name under motion.phrases, `live`, `vary`, `granular`, "
+    "`path` or `improvise`. A phrase begins at its start; one that plays already goes on.",
     follower="stage",
     names=("phrases", "phrase"),
 )
@@ -53,6 +55,7 @@ LOOK = Lever(
     "/look",
     LOOK_FADE_S,
     cue="look",
+    in_cue="Name of the look.",
     names=("looks", "look"),
     listed="look",
     stays=True,
@@ -66,6 +69,7 @@ CARD = Lever(
     "/card",
     LOOK_FADE_S,
     cue="card",
+    in_cue="Name of the card over the dance; none: no card.",
     names=("cards", "card"),
     listed="card",
     none=NO_CARD,
@@ -80,6 +84,8 @@ CAMERA: Lever[Mapping[str, float | str]] = Lever(
     "/camera",
     LOOK_FADE_S,
     cue="camera",
+    in_cue="Where the camera stands from now on, whatever the look, like {angle_deg: 90, figure: 0.4}; "
+    "{}: as the look says.",
     said=lambda _, s: f"The camera moves over {s:g} s.",
 )
 LIGHTS = Lever(
@@ -90,6 +96,7 @@ LIGHTS = Lever(
     "/lights",
     LOOK_FADE_S,
     cue="lights",
+    in_cue="Name of the set of light mappings.",
     names=("lights", "set of light mappings"),
     stays=True,
     said=lambda name, s: f"The lights {name} come over {s:g} s.",
@@ -101,6 +108,7 @@ MASTER = Lever(
     "of picture and lights",
     "/master",
     cue="master",
+    in_cue="Brightness of lights and picture, 0 to 1.",
     stays=True,
     said=lambda level, _: f"Master goes to {100 * level:.0f} %.",
 )
@@ -111,6 +119,7 @@ STRINGS = Lever(
     "how loud the strings are; master comes on top",
     "/strings",
     cue="strings",
+    in_cue="How loud the strings are, 0 to 1.",
     stays=True,
     said=lambda level, _: f"The strings go to {100 * level:.0f} %.",
 )
@@ -122,6 +131,7 @@ HAND = Lever(
     "/hold",
     AT_ONCE,
     cue="hands",
+    in_cue="Joints whose hands hold in this cue; the other hands let go. []: all let go.",
     follower="stage",
 )  # a family: each joint has its own
 SPRINGS = Lever(
@@ -131,6 +141,7 @@ SPRINGS = Lever(
     "the springs among the hands go over to another setting, with its own wind, gravity, feedback and kick",
     "/springs",
     cue="springs",
+    in_cue="Setting of the springs that are among the hands.",
     follower="stage",
     names=("springs", "setting of springs"),
     ends=("stiffness", "storm", "feedback", "wind", "gravity"),
@@ -197,6 +208,7 @@ ITERATIONS = Lever(
     "/iterations",
     is_faded_by_osc=False,
     cue="iterations",
+    in_cue="Coding and interaction iterations, reached in whole steps; more than fit are lowered.",
     follower="stage",
 )
 LIVELINESS = Lever(
@@ -206,6 +218,7 @@ LIVELINESS = Lever(
     "how alive the answer to a hand is: 1 as the dancer, 0 calm, without noise; a fade takes 0.5 s at least",
     "/liveliness",
     cue="liveliness",
+    in_cue="How alive the answer to a hand is, 0 to 1.",
     follower="stage",
     said=lambda level, _: f"The liveliness goes to {100 * level:.0f} %.",
 )
@@ -217,6 +230,7 @@ SEED = Lever(
     "/seed",
     AT_ONCE,
     cue="seed",
+    in_cue="Seed of the noise in the answer: another number, another dance. The change takes 2 s.",
     follower="stage",
     said=lambda seed, _: f"The answer goes over to the seed {seed}.",
 )
@@ -278,9 +292,9 @@ AGAIN = Lever(
     follower="generator",
 )
 LEVERS: tuple[Lever[Any], ...] = (
-    *(GOING, MASTER, LOOK, CARD, CAMERA, LIGHTS, STRINGS),
-    *(CUE, PHRASE, HAND, SPRINGS, STIFFNESS, STORM, FEEDBACK, WIND, GRAVITY),
+    *(GOING, CUE, PHRASE, HAND, SPRINGS, STIFFNESS, STORM, FEEDBACK, WIND, GRAVITY),
     *(ITERATIONS, LIVELINESS, SEED, RATE),
+    *(LOOK, CAMERA, CARD, LIGHTS, STRINGS, MASTER),
     *(lever for source in MADE for lever in MADE_NUMBERS[source].values()),
     *(PATH_POINTS, AGAIN),
 )

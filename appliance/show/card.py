@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
+from appliance.levers.sources import NO_CARD
 from appliance.show.picture_file import Colour, PictureFile
 from appliance.show.section import BundleFile, Section, key, refusal, refuse_repeats
-from appliance.show.sources import NO_CARD
 
 BLANK = "blank"
 MOST_CARDS = 32

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from appliance.levers.sources import MAIN
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import content, plain_json, require_inside
 from appliance.pose.possible import FARTHEST_M, FASTEST_M_S, impossible_frames
@@ -26,7 +27,6 @@ from appliance.show.bundle import (
 from appliance.show.config_error import ConfigError, Problem, bounded
 from appliance.show.network import WINDOW, inspect_network
 from appliance.show.show import Show, load_show
-from appliance.show.sources import MAIN
 
 LARGEST_BYTES = 25_000_000
 LARGEST_REPORT = 16_000_000

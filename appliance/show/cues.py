@@ -3,60 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, field_validator
 
+from appliance.levers import table as levers
+from appliance.levers.lever import Lever
+from appliance.levers.table import MOST_ITERATIONS
 from appliance.show.config_error import Problem, did_you_mean
 from appliance.show.look import CameraChange
 from appliance.show.motion_sources import MotionChanges
 from appliance.show.section import Section, key, refusal
-from appliance.show.sources import NO_CARD, SEEDS
 from appliance.show.yaml_file import Location, YamlFile
 
 FADE_S = 2.0
-MOST_ITERATIONS = 64  # as often as DancerConfig admits
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 _Times = Annotated[int, Field(ge=0, le=MOST_ITERATIONS)]
+
+
+def _key(lever: Lever[Any], **bounds: Any) -> Any:
+    """A lever's key in a cue: its sentence, and its bounds where it is one number."""
+    if len(lever.kind.numbers) == 1 and not lever.kind.text:
+        bounds = {"within": lever.kind.numbers[0][1:3]}
+    return key(lever.in_cue, None, **bounds)
 
 
 class CueConfig(Section):
     """One cue. What it leaves out stays as it is."""
 
     name: str = key("What `/cue` calls it.", length=(1, 64))
-    phrase: Name | None = key(
-        "What the puppet starts from: `main`, a name under motion.phrases, `live`, `vary`, `granular`, "
-        "`path` or `improvise`. A phrase begins at its start; one that plays already goes on.",
-        None,
-    )
+    phrase: Name | None = _key(levers.PHRASE)
     motion: MotionChanges | None = key(
         "Parameters of the sources that are made ahead, like {vary: {sigma: 1.2}}, reached over the fade.",
         None,
     )
-    iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = key(
-        "Coding and interaction iterations, reached in whole steps; more than fit are lowered.", None
-    )
-    liveliness: float | None = key("How alive the answer to a hand is, 0 to 1.", None, within=(0, 1))
-    seed: int | None = key(
-        "Seed of the noise in the answer: another number, another dance. The change takes 2 s.",
-        None,
-        within=(0, SEEDS - 1),
-    )
-    hands: list[Name] | None = key(
-        "Joints whose hands hold in this cue; the other hands let go. []: all let go.", None, length=(0, 8)
-    )
-    springs: Name | None = key("Setting of the springs that are among the hands.", None)
-    look: Name | None = key("Name of the look.", None)
-    camera: CameraChange | None = key(
-        "Where the camera stands from now on, whatever the look, like {angle_deg: 90, figure: 0.4}; "
-        "{}: as the look says.",
-        None,
-    )
-    card: Name | None = key("Name of the card over the dance; none: no card.", None)
-    lights: Name | None = key("Name of the set of light mappings.", None)
-    strings: float | None = key("How loud the strings are, 0 to 1.", None, within=(0, 1))
-    master: float | None = key("Brightness of lights and picture, 0 to 1.", None, within=(0, 1))
+    iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = _key(levers.ITERATIONS)
+    liveliness: float | None = _key(levers.LIVELINESS)
+    seed: int | None = _key(levers.SEED)
+    hands: list[Name] | None = _key(levers.HAND, length=(0, 8))
+    springs: Name | None = _key(levers.SPRINGS)
+    look: Name | None = _key(levers.LOOK)
+    camera: CameraChange | None = _key(levers.CAMERA)
+    card: Name | None = _key(levers.CARD)
+    lights: Name | None = _key(levers.LIGHTS)
+    strings: float | None = _key(levers.STRINGS)
+    master: float | None = _key(levers.MASTER)
     fade_s: float = key(
         "How long phrase, iterations, liveliness, springs, strings, look, camera, card, lights and master "
         "take to change, in seconds. "
@@ -96,10 +88,13 @@ def cue_problems(
             first = file.line(("cues", names.index(cue.name), "name"))
             message = f"Two cues are called '{cue.name}' (the first on line {first})."
             yield file.problem(("cues", place, "name"), message, "Give one of them another name.")
-        for what, location, word in _named(cue, place):
-            if word not in known[what]:
-                cure = did_you_mean(word, known[what]) if known[what] else f"Remove `{what}` from the cue."
-                yield file.problem(location, _UNKNOWN[what].format(word), cure)
+        for where, what, location, word in _named(cue, place):
+            if word not in known[where]:
+                cure = did_you_mean(word, known[where]) if known[where] else f"Remove `{where}` from the cue."
+                words = f"This show has no {what} '{word}'."
+                if where == levers.HAND.cue:
+                    words = f"No hand of this show holds the joint '{word}'."
+                yield file.problem(location, words, cure)
 
 
 def too_much(cues: Sequence[CueConfig], most: int, file: YamlFile) -> Iterator[Problem]:
@@ -114,21 +109,11 @@ def too_much(cues: Sequence[CueConfig], most: int, file: YamlFile) -> Iterator[P
             yield file.problem(("cues", place, "iterations"), message, cure)
 
 
-_UNKNOWN = {
-    "phrase": "This show has no phrase '{}'.",
-    "hands": "No hand of this show holds the joint '{}'.",
-    "look": "This show has no look '{}'.",
-    "card": "This show has no card '{}'.",
-    "lights": "This show has no set of light mappings '{}'.",
-    "springs": "This show has no setting of springs '{}'.",
-}
-
-
-def _named(cue: CueConfig, place: int) -> Iterator[tuple[str, Location, str]]:
-    """Each name in a cue: its key, where it stands, the name."""
-    for what in ("phrase", "look", "card", "lights", "springs"):
-        word = getattr(cue, what)
-        if word is not None and (what, word) != ("card", NO_CARD):
-            yield what, ("cues", place, what), word
+def _named(cue: CueConfig, place: int) -> Iterator[tuple[str, str, Location, str]]:
+    """Each name in a cue: its key, what it names, where it stands, the name."""
+    for lever in levers.LEVERS:
+        name = getattr(cue, lever.cue) if lever.cue and lever.names != ("", "") else None
+        if name is not None and name != (lever.none or None):
+            yield lever.cue, lever.names[1], ("cues", place, lever.cue), name
     for hand, joint in enumerate(cue.hands or ()):
-        yield "hands", ("cues", place, "hands", hand), joint
+        yield "hands", "", ("cues", place, "hands", hand), joint

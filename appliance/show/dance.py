@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from appliance.levers.sources import GRANULAR, IMPROVISE, LIVE, MADE, MAIN, PATH, SEEDS, VARY
 from appliance.show.config_error import did_you_mean
 from appliance.show.motion_sources import GranularConfig, ImproviseConfig, PathConfig, VaryConfig
 from appliance.show.section import BundleFile, Section, key, refusal
-from appliance.show.sources import GRANULAR, IMPROVISE, LIVE, MADE, MAIN, PATH, SEEDS, VARY
 
 Blending = Literal["prompt", "hann"]
 

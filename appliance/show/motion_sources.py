@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import Field, field_validator, model_serializer
 
+from appliance.levers.sources import GRANULAR, IMPROVISE, MOST_POINTS, PARAMETERS, PATH, VARY
 from appliance.show.section import BundleFile, Section, key, refusal
-from appliance.show.sources import GRANULAR, IMPROVISE, MOST_POINTS, PARAMETERS, PATH, VARY
 
 _Share = Annotated[float, Field(ge=0, le=1)]
 

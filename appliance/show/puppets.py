@@ -7,8 +7,9 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
+from appliance.levers.table import MOST_ITERATIONS
 from appliance.show.config_error import Problem, did_you_mean
-from appliance.show.cues import MOST_ITERATIONS, require_coding_then_interaction
+from appliance.show.cues import require_coding_then_interaction
 from appliance.show.dance import MotionConfig
 from appliance.show.hand import HandConfig
 from appliance.show.light_rules import MappingConfig

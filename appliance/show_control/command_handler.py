@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from appliance.levers.addresses import ADDRESSES, ANSWERS, QUESTIONS, Receiver
 from appliance.levers.lever import Lever
 from appliance.levers.show_state import Change, ShowState
+from appliance.levers.sources import LIVE
 from appliance.levers.table import CAMERA, CARD, CUE, LIGHTS, LOOK, PHRASE, RATE, SPRINGS, find_lever
-from appliance.show.sources import LIVE
 from appliance.show_control.acknowledgements import Acknowledgements
 from appliance.show_control.command import (
     LONGEST_NAME,

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from appliance.box.live_pose import MOST_JOINTS, LivePoseWriter
 from appliance.dancer.live import SILENT_S
+from appliance.levers.sources import LIVE
 from appliance.outputs.shared_frame import Facts
 from appliance.pose.possible import FARTHEST_M
-from appliance.show.sources import LIVE
 from appliance.show_control.command import require_read
 from appliance.show_control.vmc_input import BONE, ROOT, VmcInput
 from appliance.show_control.vmc_input import PREFIX as VMC

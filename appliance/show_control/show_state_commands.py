@@ -10,6 +10,7 @@ from appliance.levers.addresses import ADDRESSES
 from appliance.levers.fade import Fade
 from appliance.levers.lever import AT_ONCE, Lever
 from appliance.levers.show_state import Change, ShowState
+from appliance.levers.sources import MADE, POINTS
 from appliance.levers.table import (
     AGAIN,
     CAMERA,
@@ -28,7 +29,6 @@ from appliance.levers.table import (
 )
 from appliance.outputs.shared_frame import Facts
 from appliance.show.config_error import did_you_mean
-from appliance.show.sources import MADE, POINTS
 from appliance.show_control.command import Command
 from appliance.show_control.names_of_show import danced, held, joint_name, known, next_cue
 

@@ -24,6 +24,7 @@ from appliance.dancer.phrase_cache import PhraseCache
 from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 from appliance.dancer.puppeteers import WornSensor
 from appliance.dancer.springs import Springs
+from appliance.levers.sources import LIVE, MAIN
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.outputs import Outputs
 from appliance.pose.bvh import BvhError
@@ -35,7 +36,6 @@ from appliance.sensor.state import restored_reading
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
 from appliance.show.show import Show
-from appliance.show.sources import LIVE, MAIN
 from appliance.stage.admission import MOST_ITERATIONS, Admission, admit, lowered
 from appliance.stage.iterations import Iterations
 from appliance.stage.liveliness import Liveliness

@@ -22,11 +22,11 @@ from appliance.dancer.motion_source import Playback
 from appliance.dancer.puppet import Puppet, weights_of_one_pass
 from appliance.dancer.slerp import FloatArray
 from appliance.dancer.springs import Springs
+from appliance.levers.sources import LIVE
 from appliance.outputs.joint_frame import JointFrame
 from appliance.pose import quaternion
 from appliance.pose.possible import FARTHEST_ON_STAGE_M
 from appliance.show.puppets import PuppetConfig
-from appliance.show.sources import LIVE
 from appliance.stage.iterations import Iterations
 
 _STANDING = ("pose", "world", "positions", "root")  # arrays of a frame

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from appliance.box.fallback import Fallbacks
 from appliance.dancer.live import SILENT_S as LIVE_SILENT_S
 from appliance.dancer.puppeteers import HOLD_S
+from appliance.levers.sources import LIVE
 from appliance.sensor import wire
 from appliance.sensor.link import FOREIGN
 from appliance.sensor.state import LOW_BATTERY, SensorState
-from appliance.show.sources import LIVE
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
 from appliance.stage.health import Health

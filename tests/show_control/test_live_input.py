@@ -13,7 +13,7 @@ import pytest
 from pythonosc.udp_client import SimpleUDPClient
 
 from appliance.box.live_pose import LivePose, LivePoseReader
-from appliance.show.sources import LIVE
+from appliance.levers.sources import LIVE
 from tests.show_control.doubles import FIGURE, HOST, Asker, ControlInThread, StageDouble, facts
 from tests.system.processes import wait_until
 

@@ -14,9 +14,9 @@ import pytest
 
 from appliance.box.fallback import Fallen
 from appliance.box.live_pose import LivePoseReader
+from appliance.levers.sources import LIVE
 from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.outputs.shared_frame import FrameWriter
-from appliance.show.sources import LIVE
 from appliance.show_control.intake import LIVE_WAITING
 from appliance.show_control.live_input import POSITIONS, ROTATIONS
 from appliance.show_control.port import open_port

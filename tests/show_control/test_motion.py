@@ -12,8 +12,8 @@ import pytest
 
 from appliance.box.made_motion import KeptNamesWriter
 from appliance.levers.show_state import ShowState
+from appliance.levers.sources import MOST_POINTS, PARAMETERS
 from appliance.levers.table import AGAIN, MADE_NUMBERS, PATH_POINTS, PHRASE
-from appliance.show.sources import MOST_POINTS, PARAMETERS
 from appliance.show_control.command import command
 from appliance.show_control.show_state_commands import declare
 from appliance.show_control.stage_observer import StageObserver

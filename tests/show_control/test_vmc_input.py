@@ -13,11 +13,11 @@ import pytest
 from pythonosc.udp_client import SimpleUDPClient
 
 from appliance.box.live_pose import LivePose, LivePoseReader
+from appliance.levers.sources import LIVE
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.receivers import OscOutputs
 from appliance.pose import quaternion
 from appliance.show.osc import OscConfig
-from appliance.show.sources import LIVE
 from appliance.show_control.vmc_input import BONE, ROOT, VmcInput
 from hw_sim.osc_receiver import OscReceiver, Received
 from tests.outputs.conftest import fill

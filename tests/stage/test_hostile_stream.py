@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from appliance.box.live_pose import LivePoseReader
-from appliance.show.sources import LIVE
+from appliance.levers.sources import LIVE
 from appliance.show_control.live_input import POSITIONS, ROTATIONS, LiveInput
 from appliance.show_control.vmc_input import BONE, ROOT
 from appliance.stage.sharing import facts_of

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from appliance.box.live_pose import LivePose, LivePoseReader, LivePoseWriter
+from appliance.levers.sources import LIVE
 from appliance.pose import quaternion
 from appliance.recorder.reading import read_journal
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
-from appliance.show.sources import LIVE
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
 from appliance.stage.health import Health
