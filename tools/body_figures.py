@@ -1,4 +1,5 @@
-"""What an audience sees of a danced body, from a journal: `python -m tools.body_figures JOURNAL [show]`.
+"""Measures a danced body as an audience sees it, from a journal: `python -m tools.body_figures JOURNAL
+[show]`.
 
 How often and how deep upper arms are in the trunk, how fast standing feet slide; beside the show's phrase.
 """

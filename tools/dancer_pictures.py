@@ -23,7 +23,7 @@ CAMERA = CameraConfig(move="still", figure=0.85)
 
 def draw_dancers(folder: Path) -> list[Path]:
     """Draw instants of each phrase, in the show's first look, and return the paths of the pictures."""
-    from PIL import Image as Files  # of the extra `pictures`, which the show itself runs without
+    from PIL import Image as Files  # in the extra `pictures`, which the show itself does not need
 
     size, paths = (SIZE[0] * FINER, SIZE[1] * FINER), []
     for name, directory in bundled_shows().items():

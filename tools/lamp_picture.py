@@ -41,7 +41,7 @@ GROUPS: tuple[tuple[str, tuple[Row, ...]], ...] = (
             Row(
                 "neutral", "blinks slowly", "Stand still.", "Arms hanging, face to the front, until it stops."
             ),
-            Row("linked", "one short flash", "Dance.", "Each 3 seconds: hardly seen from the seats."),
+            Row("linked", "one short flash", "Dance.", "Every 3 seconds: hardly visible from the seats."),
         ),
     ),
     (

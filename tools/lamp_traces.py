@@ -1,4 +1,4 @@
-"""What the lamp of a wearable shows in each state: traces of the compiled firmware in its simulated world."""
+"""The lamp of a wearable in each state: traces of the compiled firmware in its simulated world."""
 
 from __future__ import annotations
 

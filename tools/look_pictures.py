@@ -19,7 +19,7 @@ from appliance.show.look import STYLES, CameraConfig, LookConfig
 
 SIZE = 864, 486
 HELD, COLOURS = "lShldr", 256
-UPRIGHT, TOGETHER_S = (320, 400), 49.6  # of the four looks beside each other
+UPRIGHT, TOGETHER_S = (320, 400), 49.6  # for the four looks side by side
 SHOW = default_show_path()
 CHALK = LookConfig(
     name="chalk", style="ink", figure="#f0e9da", light="#5b5550", accent="#d2452b", background="#000000"
@@ -37,7 +37,7 @@ PICTURES = {  # what each picture is called: the look, and the moment of the phr
 
 def draw_looks(folder: Path) -> list[Path]:
     """Draw all pictures into a folder and return their paths."""
-    from PIL import Image as Files  # of the extra `pictures`, which the show itself runs without
+    from PIL import Image as Files  # in the extra `pictures`, which the show itself does not need
 
     recording = read_bvh(SHOW / "phrase.bvh")
     size = SIZE[0] * FINER, SIZE[1] * FINER

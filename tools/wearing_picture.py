@@ -23,7 +23,7 @@ BACKDROP, INK, FAINT = "#0f1015", "#efe6d8", "#9a948c"
 IVORY, VERMILION = np.array([0.93, 0.87, 0.78]), np.array([0.96, 0.27, 0.13])
 STRAP, LID, SIDES = "#20232c", "#3b4252", ("#2a303d", "#222733", "#181c25")
 AZIMUTH, ELEVATION = np.radians(48), np.radians(16)
-HANG = np.radians(80)  # of the arms, from the T of the rest pose
+HANG = np.radians(80)  # the arms, from the T of the rest pose
 FRONT, LEFT, UP = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 HALF_CASE_M = np.array([0.009, 0.020, 0.027])  # out of the lid, along the arm, along the arrow
 

@@ -18,7 +18,7 @@ PLACE = Record("place", "place", LARGEST)
 FILE = PLACE.name
 
 _NUMBERS = struct.Struct("<q9d4HBB")
-_OTHER = struct.Struct("<9d2H")  # of another puppet: its places as above, its iterations
+_OTHER = struct.Struct("<9d2H")  # another puppet: its places as above, its iterations
 _ENDED = 1
 _MOST = 0xFFFF
 _MOST_NUMBER = 1 << 62  # ticks and seeds may get this large; seconds and parameters stay far below

@@ -141,7 +141,7 @@ class Door:
 
 
 def gives_way(guests: Iterable[tuple[Guest, str, float]]) -> Guest:
-    """Of (guest, address, time), which one leaves: the oldest of the address that has most of them."""
+    """From (guest, address, time) of each: the one to close, the oldest of the address with the most."""
     listed = list(guests)
     crowd = Counter(address for _, address, _ in listed)
     return min(listed, key=lambda one: (-crowd[one[1]], one[2]))[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-_LEAST_FIELDS = 4  # of a process of an earlier release
+_LEAST_FIELDS = 4  # a process of an earlier release
 RECENT_S = 5.0  # what happens at one moment counts as in force for this long
 
 
@@ -78,7 +78,7 @@ class Fallbacks:
             tally.complaint = complaint if isinstance(complaint, str) else ""
 
     def concern(self, name: str, things: Iterable[str]) -> None:
-        """What it is about, by name. Without any, it is about the same as before."""
+        """Its subject, by name. Without any, it is about the same as before."""
         if about := ", ".join(things):
             self._tallies[name].about = about
 

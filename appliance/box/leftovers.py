@@ -1,4 +1,4 @@
-"""What a run leaves in the runtime folder: a show that ended as it should leaves nothing for the next one."""
+"""State that a run leaves in the runtime folder: a show that ended properly leaves none for the next one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from appliance.box.show_state import forget_show_state
 
 
 def forget_run(folder: Path) -> None:
-    """What was declared, the live dancer's pose, and what was made ahead."""
+    """The declared state, the live dancer's pose, and motion made ahead."""
     forget_show_state(folder)
     forget_live_pose(folder)
     forget_made_motion(folder)

@@ -1,4 +1,4 @@
-"""What libraries log goes to standard error, and no faster than anybody reads: strangers may provoke it."""
+"""Library logs go to standard error at a limited rate: strangers may provoke them."""
 
 from __future__ import annotations
 

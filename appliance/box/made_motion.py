@@ -53,7 +53,7 @@ class MadeMotionReader:
         self._made: MadeMotion | None = None
 
     def read(self) -> MadeMotion | None:
-        """What was made last, or None. Never waits, never raises."""
+        """The last motion made, or None. Never waits, never raises."""
         payload = self._block.read()
         if payload is not None and payload != self._payload:
             self._payload, self._made = payload, _parsed(payload)

@@ -1,4 +1,4 @@
-"""What is mounted where, and whether what is written to a folder outlives power-off."""
+"""Mounted file systems, and whether data written to a folder outlives power-off."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _OCTAL = re.compile(r"\\([0-7]{3})")
 
 
 class Mount(NamedTuple):
-    """One file system: where it is seen, its kind (ext4, overlay ...), what it lies on, all its options."""
+    """One file system: its mount point, its kind (ext4, overlay ...), its device, all its options."""
 
     point: PurePosixPath
     kind: str

@@ -96,7 +96,7 @@ class NotifyListener:
         self._socket.bind("")  # a free name in the abstract space, which the kernel chooses
 
     def environ(self, watchdog_s: float) -> dict[str, str]:
-        """What a child finds it by."""
+        """The environment by which a child finds it."""
         name = self._socket.getsockname()[1:]
         return {"NOTIFY_SOCKET": f"@{os.fsdecode(name)}", "WATCHDOG_USEC": str(round(watchdog_s * 1e6))}
 

@@ -135,7 +135,7 @@ class Member(NamedTuple):
 
 
 class ProcessHealth:
-    """What all of them published; never waits, never raises."""
+    """The health that all of them published; never waits, never raises."""
 
     def __init__(self, folder: Path) -> None:
         self._blocks = {process: _record(process).reader(folder) for process in PROCESSES}

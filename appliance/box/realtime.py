@@ -56,8 +56,8 @@ def enter_realtime(priority: int) -> tuple[str, ...]:
 
     Memory is locked as it is touched (ONFAULT): locking whole libraries and thread stacks would cost 100 MB
     and more. Threads started later are ordinary again (RESET_ON_FORK). The collector is frozen and disabled:
-    a collection on a large heap took up to 118 ms. What a start has left (0.7 MB) is frozen too: looking for
-    it would keep the first frame waiting for 25 ms.
+    a collection on a large heap took up to 118 ms. The objects that a start leaves (0.7 MB) are frozen too:
+    scanning them would delay the first frame by 25 ms.
     """
     share_the_interpreter()
     missing = (_take_priority(priority), _lock_memory(), _sharpen_timers())
@@ -77,7 +77,7 @@ def borrowed_priority(priority: int | None) -> Iterator[None]:
 
 
 def thread_priority(priority: int) -> str:
-    """Real-time priority for the calling thread alone; the reason where the system refuses it, else ""."""
+    """Real-time priority for only the calling thread; the reason if the system refuses it, else ""."""
     if _is_realtime():
         return ""
     try:

@@ -70,7 +70,7 @@ class SlotFile:
     """A record that changes all the time: two slots with number and checksum, one of them always whole.
 
     The file is made in full when it is missing, so that a disk that fills up later still takes each write. A
-    write changes the older slot alone; a power cut in the middle of it leaves the newer one.
+    write changes only the older slot; a power cut in the middle of it leaves the newer one.
     """
 
     def __init__(self, path: Path) -> None:
@@ -79,7 +79,7 @@ class SlotFile:
         self._newest = 0
 
     def read(self) -> list[bytes]:
-        """What is whole in it, the newest first. Never raises."""
+        """Its intact contents, the newest first. Never raises."""
         try:
             descriptor = os.open(self._path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
         except OSError:

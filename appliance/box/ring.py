@@ -18,9 +18,9 @@ _WHOLE = slice(None)  # made once: a slice is an object that the collector visit
 
 @dataclass(frozen=True)
 class Ring:
-    """Where a ring lies in its file: `slots` places for payloads of at most `capacity` bytes.
+    """Layout of a ring in its file: `slots` places for payloads of at most `capacity` bytes.
 
-    It begins with the newest sequence (64-bit, little-endian; 0: nothing was written yet). Payload n lies in
+    It begins with the newest sequence (64-bit, little-endian; 0: nothing was written yet). Payload n is in
     slot n modulo `slots`, with n at both of its ends and the CRC-32 of its bytes, which starts from n.
     Readers need all three: neither Python nor the processor (ARM) promises in which order another process
     sees what was written, so a slot is taken for whole only when it proves to be.
@@ -100,7 +100,7 @@ class RingReader:
         return next(self._older(sequence), None)
 
     def newest_sequence(self) -> int:
-        """What was written last; 0: nothing yet."""
+        """The number written last; 0: nothing yet."""
         return int.from_bytes(self._read(8, self._ring.at), "little")
 
     def payload(self, sequence: int) -> bytes | None:
@@ -118,7 +118,7 @@ class RingReader:
         return payload if zlib.crc32(payload, sequence & 0xFFFFFFFF) == check else None
 
     def _older(self, sequence: int) -> Iterator[tuple[int, bytes]]:
-        """What is whole among the payloads before this one, newest first."""
+        """The intact payloads before this one, newest first."""
         for older in range(sequence - 1, max(sequence - self._ring.slots, 0), -1):
             payload = self.payload(older)
             if payload is not None:

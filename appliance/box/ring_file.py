@@ -40,7 +40,7 @@ class RingFileWriter:
     def new(cls, path: Path, kind: str, version: int, shapes: Sequence[Shape]) -> RingFileWriter:
         """A file that readers do not find before `publish`. Raises OSError where there is no room for it.
 
-        What writers left there that were killed before they published goes.
+        Deletes temporary files left by writers that died before publishing.
         """
         _clear_up(path)
         temporary = _temporary(path)

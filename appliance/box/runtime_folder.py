@@ -30,7 +30,7 @@ class AlreadyHereError(RuntimeFolderError):
 def runtime_folder(box: BoxConfig, environment: Mapping[str, str] = os.environ) -> Path:
     """The box file's `runtime`, else systemd's, else the user session's, else one in shared memory.
 
-    Made (mode 0700) when it is missing. Raises RuntimeFolderError where it is not this user's alone.
+    Made (mode 0700) when it is missing. Raises RuntimeFolderError unless it belongs only to this user.
     """
     folder = box.runtime or _usual(environment)
     try:
@@ -58,7 +58,7 @@ def _usual(environment: Mapping[str, str]) -> Path:
 
 
 def _require_own(folder: Path) -> None:
-    """Anybody may make a folder in shared memory first: only one that is this user's alone will do."""
+    """Anybody may make a folder in shared memory first, so only one that belongs to this user is accepted."""
     found = folder.lstat()
     if not stat.S_ISDIR(found.st_mode):
         raise RuntimeFolderError(
@@ -79,7 +79,7 @@ def _require_own(folder: Path) -> None:
 
 
 class Renewable(Protocol):
-    """What a process has in the runtime folder, and can put there again."""
+    """The files of a process in the runtime folder, which it can put there again."""
 
     def renew(self) -> bool:
         """Whether it was lost and is there again. Raises OSError where the folder does not take it."""
@@ -162,7 +162,7 @@ class Claim:
         except BlockingIOError:
             raise AlreadyHereError(
                 f"Another {place} runs in {folder}. It goes on, and this one does not start. Stop it, or "
-                "give each box a folder of its own: `runtime:` in the box file."
+                "give each box another folder: `runtime:` in the box file."
             ) from None
         except OSError as error:
             raise RuntimeFolderError(

@@ -1,4 +1,4 @@
-"""What the box's HTTP servers share: their socket, the names of this machine, a client's address."""
+"""Shared by the box's HTTP servers: their socket, the names of this machine, a client's address."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 
 def listening(host: str, port: int) -> socket.socket:
-    """`::` takes IPv4 too; on a machine without IPv6 it is IPv4 alone. Raises OSError."""
+    """`::` accepts IPv4 too; a machine without IPv6 listens only on IPv4. Raises OSError."""
     if host == "::" and not socket.has_dualstack_ipv6():
         host = "0.0.0.0"
     family = socket.AF_INET6 if ":" in host else socket.AF_INET

@@ -106,7 +106,7 @@ class ShowState(levers.ShowState):
 
     @property
     def dance(self) -> Mapping[str, Part]:
-        """What stage and generator follow: generation, text and numbers by the lever's name."""
+        """The part that stage and generator follow: generation, text and numbers by the lever's name."""
         found = ((table.find_lever(name), fade) for name, fade in self.settings.items())
         return {one.name: (fade.generation, *one.told(fade)) for one, fade in found if one and one.follower}
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def stop_signals() -> Iterator[Callable[[], bool]]:
-    """While inside, gives what tells whether a signal came; none of them ends anything by itself."""
+    """While inside, yields a function that returns whether a signal came; no signal ends the process."""
     caught: list[int] = []
     signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
     before = [signal.signal(number, lambda came, _: caught.append(came)) for number in signals]

@@ -20,10 +20,10 @@ from appliance.pose.skeleton import Skeleton
 # (99th percentile), where they have 10 so, and 8.5 untreated. The head: with a left upper arm that turns
 # about z once in 5 s, pasted on the default phrase, a forearm was within 7 cm of the skull's middle in
 # 13.6 % -> 0.5.
-CLEAR = 0.85  # of the trunk's radius: so far out the arm's axis is kept
+CLEAR = 0.85  # fraction of the trunk's radius: how far out the arm's axis is kept
 UPPER_ARM, FOREARM = (0.5, 0.75, 1.0), (0.5, 1.0)  # points along the bones
-MEMORY = 0.6  # of the radius: how much the side on which the arm is counts against the nearest way out
-FRONT = 0.1  # of the radius: an arm that points at the spine goes in front of the body
+MEMORY = 0.6  # fraction of the radius: how much the arm's own side counts against the nearest way out
+FRONT = 0.1  # fraction of the radius: an arm that points at the spine goes in front of the body
 FOLLOW = 0.4  # share of a correction that is made in a tick
 MOST_RADIANS = math.radians(4)  # by which a correction changes in a tick
 NOTHING_RADIANS = 1e-4
@@ -71,7 +71,7 @@ class ArmClearance:
         self._turns = [_NO_TURN] * len(self._turns)
 
     def state(self) -> dict[str, Any]:
-        """What later poses depend on, for `restore`: plain values."""
+        """The state that later poses depend on, for `restore`: plain values."""
         return {"ways": list(self._ways), "turns": list(self._turns)}
 
     def restore(self, state: dict[str, Any]) -> None:

@@ -107,7 +107,7 @@ class Blending:
         return pose
 
     def state(self) -> dict[str, Any]:
-        """What later poses depend on, for `restore`: plain values and copies of arrays."""
+        """The state that later poses depend on, for `restore`: plain values and copies of arrays."""
         rows = slice(self._first, self._first + self._window)
         return {
             "poses": self._poses[rows].copy(),

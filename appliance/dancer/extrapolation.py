@@ -43,7 +43,7 @@ class Extrapolation:
         self._ways = ways.astype(np.float32)[:, None, None]
         self._most = np.array(math.tan(MOST_RADIANS / 2) / ways[-1], dtype=np.float32)
         self._steps = np.empty((joints, 2, 4), dtype=np.float32)  # the last one and the one before it
-        self._products = np.empty((joints, 2, 2), dtype=np.float32)  # of the steps with each other
+        self._products = np.empty((joints, 2, 2), dtype=np.float32)  # products of the steps
         self._share = np.empty((joints, 1), dtype=np.float32)
         self._squares = np.empty((window, joints, 4), dtype=np.float32)
         self._lengths = np.empty((window, joints, 1), dtype=np.float32)
@@ -83,7 +83,7 @@ class Extrapolation:
         np.divide(out, self._lengths, out=out)
 
     def state(self) -> dict[str, Any]:
-        """What later targets depend on, for `restore`: plain values and copies of arrays."""
+        """The state that later targets depend on, for `restore`: plain values and copies of arrays."""
         return {"past": self._past.copy(), "oldest": self._oldest}
 
     def restore(self, state: dict[str, Any]) -> None:

@@ -23,7 +23,7 @@ FAR_M = 0.2  # this far from its path a planted foot returns with the time const
 FAR_S = 0.6
 JUMP_M = 0.08  # from this height of a jump on nothing is locked
 NOTHING_M = 1e-4
-BONES_ALIKE = 3.0  # of thigh and shin neither is longer than this times the other: else it is no leg
+BONES_ALIKE = 3.0  # if thigh or shin is longer than this times the other, it is not a leg
 
 
 @dataclass
@@ -40,7 +40,7 @@ class _Leg:
     rows: range
     x: float = 0.0  # offset of the foot from its path, metres
     z: float = 0.0
-    step: list[float] = field(default_factory=lambda: [0.0, 0.0])  # of that offset in the last tick
+    step: list[float] = field(default_factory=lambda: [0.0, 0.0])  # that offset in the last tick
 
 
 class FootLock:
@@ -102,7 +102,7 @@ class FootLock:
             leg.x, leg.z, leg.step = 0.0, 0.0, [0.0, 0.0]
 
     def state(self) -> dict[str, Any]:
-        """What later poses depend on, for `restore`: plain values."""
+        """The state that later poses depend on, for `restore`: plain values."""
         return {"before": self._before, "legs": [[leg.x, leg.z, *leg.step] for leg in self._legs]}
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -141,8 +141,8 @@ class FootLock:
             leg.x = leg.z = 0.0
 
     def _reach(self, leg: _Leg, pose: FloatArray, figure: Figure, toe: list[float]) -> None:
-        """Turn thigh and shin so that the foot stands at its offset, and the foot back; shorten the offset
-        to what the leg reaches.
+        """Turn thigh and shin so that the foot comes to its offset, and the foot back; shorten the offset to
+        the leg's reach.
         """
         hip, knee, ankle = (
             two_bones.vector(figure.positions[joint].tolist()) for joint in (leg.thigh, leg.shin, leg.foot)

@@ -117,7 +117,7 @@ def _pointer_jumps(parents: NDArray[np.intp]) -> list[NDArray[np.intp]]:
 
 
 def _chains(parents: NDArray[np.intp]) -> FloatArray:
-    """(rows, rows): 1 where the column's bone lies on the way from the root to the row's point."""
+    """(rows, rows): 1 where the column's bone is on the path from the root to the row's point."""
     chains = np.zeros((len(parents), len(parents)), dtype=np.float32)
     for row in range(len(parents)):
         bone = row

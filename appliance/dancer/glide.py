@@ -1,4 +1,4 @@
-"""Numbers that glide: each goes to its next value over a time of its own."""
+"""Numbers that glide: each approaches its next value over its own time."""
 
 from __future__ import annotations
 

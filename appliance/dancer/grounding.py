@@ -19,8 +19,8 @@ from appliance.pose.skeleton import Skeleton
 # Capture leaves planted feet some centimetres off the floor: up to FLOOR_NOISE_M they are set down on it.
 # From JUMP_M on the phrase really jumps, and keeps its height; in between, one blends into the other.
 FLOOR_NOISE_M = 0.03
-PLANTED_PERCENTILE = 5.0  # of a point's heights over the phrase: its height while planted
-MOST_ABOVE_OTHER_FOOT_M = 0.03  # so that a foot that never stands in a phrase does not count as planted
+PLANTED_PERCENTILE = 5.0  # percentile of a point's heights over the phrase: its height while planted
+MOST_ABOVE_OTHER_FOOT_M = 0.03  # so that a foot that is never planted in a phrase does not count as planted
 SUPPORT_M = 0.02  # points of the feet this close to the lowest one share its support
 SWINGING_M_S = 1.0  # a point at this speed counts half: it lands or lifts and does not carry
 # The share of a correction that is made at once; the rest follows in later ticks. Measured on three takes at
@@ -38,7 +38,7 @@ class GroundingError(ValueError):
 
 @dataclass(frozen=True)
 class Floor:
-    """What grounding knows about a phrase.
+    """Facts about a phrase that grounding uses.
 
     rest_heights (S,): height in metres of each point of the soles above the floor when it is planted;
     lifts (N,): how far the phrase's lowest foot is above the floor in a jump, 0 while it stands.
@@ -87,8 +87,8 @@ class Grounding:
         self._rest = None if floor is None else floor.rest_heights.tolist()
         self._leak = tick_s / LEAK_S
         self._swinging = (SWINGING_M_S * tick_s) ** 2
-        self._offset_x = self._offset_z = 0.0  # of the root from its path
-        self._step_x = self._step_z = 0.0  # of that offset in the last tick
+        self._offset_x = self._offset_z = 0.0  # offset of the root from its path
+        self._step_x = self._step_z = 0.0  # that offset in the last tick
         self._hips = 0.0, 0.0, 0.0  # where a hand draws the root to, x and z in metres, and its weight
         self._height: float | None = None
         self._before: list[list[float]] | None = None
@@ -109,14 +109,14 @@ class Grounding:
         return np.array((self._offset_x, self._height or 0.0, self._offset_z), dtype=np.float32)
 
     def begin_anew(self) -> None:
-        """Forget the ticks before: the next pose stands on its path."""
+        """Forget the ticks before: the next pose starts on its path."""
         self._offset_x = self._offset_z = self._step_x = self._step_z = 0.0
         self._height = self._before = None
         self._foot_lock.begin_anew()
         self._arms.begin_anew()
 
     def draw_hips(self, x: float, z: float, weight: float) -> None:
-        """From the next pose on let the root stand at x, z (metres), as far as the weight (0..1) says.
+        """From the next pose on the root is placed at x, z (metres), weighted by 0..1.
 
         The path and its offset go on below it, so that the root returns there as the weight fades. The feet
         stay where they carry the figure, as far as the legs reach (FootLock), and come along when they lift.
@@ -173,7 +173,7 @@ class Grounding:
         np.add(self.root, self._shift, out=self.root)
 
     def state(self) -> dict[str, Any]:
-        """What later positions depend on, for `restore`: plain values and copies of arrays."""
+        """The state that later positions depend on, for `restore`: plain values and copies of arrays."""
         return {
             "figure": self.figure.state(),
             "root": self.root.copy(),

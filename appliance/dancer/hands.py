@@ -66,7 +66,7 @@ class Hands:
                 self._turned.append((slice(len(places), len(places) + len(held)), puppeteer))
                 places += [place for place, _ in taken[-len(held) :]]
         self._places: NDArray[np.intp] = np.array(places, dtype=np.intp)
-        self._placed.sort(key=lambda one: not one.is_root)  # the others stand on what it does
+        self._placed.sort(key=lambda one: not one.is_root)  # the others depend on its result
         self._hips = next((one for one in self._placed if one.is_root), None)
         self._from_room = (placement or Placement()).inverse
         self._ahead_s = ahead_s
@@ -171,7 +171,7 @@ class Hands:
         np.greater(self.weights, 0.0, out=self.mask)
 
     def state(self) -> dict[str, Any]:
-        """What later targets depend on, for `restore`: plain values and copies of arrays."""
+        """The state that later targets depend on, for `restore`: plain values and copies of arrays."""
         return {
             "puppeteers": [puppeteer.state() for puppeteer in self.puppeteers],
             "mask": self.mask.copy(),

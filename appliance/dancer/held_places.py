@@ -18,7 +18,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.show.hand import FARTHEST_M
 
 REACH = 0.95  # share of the stretched chain of bones: at its very end every way on turns the whole body
-HIPS_REACH_M = 1.0  # of the hips from their own path
+HIPS_REACH_M = 1.0  # offset of the hips from their own path
 
 Point = tuple[float, float, float]
 _ORIGIN: Point = (0.0, 0.0, 0.0)

@@ -12,7 +12,7 @@ from appliance.box.clock import TICK_S
 from appliance.dancer.slerp import FloatArray
 
 SLOWEST_HZ, FASTEST_HZ = 0.03, 0.25  # one move of the body, not a tremor
-SINUSOIDS = 6  # of each latent
+SINUSOIDS = 6  # per latent
 CROSSFADE_TICKS = 100  # from one seed's noise to another's: 2 s
 
 _Phases = NDArray[np.uint32]  # 2**32 is a whole turn: sums wrap around exactly, after months too
@@ -70,7 +70,7 @@ class LatentNoise:
         return noise
 
     def state(self) -> dict[str, Any]:
-        """What the noise to come depends on, for `restore`: plain values."""
+        """The state that future noise depends on, for `restore`: plain values."""
         return {
             "seeds": [self._before.seed, self._waves.seed, self._next.seed],
             "ticks": [self.begins_at, self._newest, self._since],

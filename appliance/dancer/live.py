@@ -16,7 +16,7 @@ from appliance.pose.possible import FARTHEST_M, most_step_m
 SILENT_S = 0.5  # after which the phrase plays on
 SHORTEST_S, LONGEST_S = 0.004, 0.1  # between two poses of a stream: 10 to 250 a second
 _FOLLOW = 0.1  # share of a new interval in the estimate
-_UNIT = 0.1  # a quaternion this far from unit length is none
+_UNIT = 0.1  # a quaternion this far from unit length is invalid
 _JOINT_FADE_S = 0.5  # in which a joint goes over to the stream, or back to the phrase
 
 
@@ -24,9 +24,10 @@ class Live:
     """Lays a stream of poses over the phrase's window, fading in and out; once a tick.
 
     Poses come at any rate, and are interpolated between the last two: that costs one interval. The window's
-    later poses are extrapolated as those of a hand are. Joints that do not come stay with the phrase. Where
-    the stream says where its root is, the figure moves by as much, from where it stood at the takeover; else
-    it stays on the phrase's path. A root that jumps farther than anybody moves takes the figure nowhere: it
+    later poses are extrapolated as those of a hand are. Joints that do not come stay with the phrase. If the
+    stream gives the root's position, the figure moves by the same amount from its place at the takeover;
+    otherwise it stays on the phrase's path. A root that jumps farther than anybody moves takes the figure
+    nowhere: it
     goes on from where it stood.
     A stream that is silent for SILENT_S gives way to the phrase, and comes back with its next pose.
 
@@ -49,7 +50,7 @@ class Live:
         self._is_whole = False  # all joints come, and all are the stream's: nothing is done joint by joint
         self._window = np.tile(quaternion.IDENTITY, (window, joints, 1))
         self._roots = np.zeros((window, 3), dtype=np.float32)
-        self._root = np.zeros((2, 3), dtype=np.float32)  # of the pose before, and of the newest
+        self._root = np.zeros((2, 3), dtype=np.float32)  # root of the previous and of the newest pose
         self._offset = np.zeros(3, dtype=np.float32)
         self._has_root = False
         self._arrival, self._interval_s = -math.inf, 0.02
@@ -171,7 +172,7 @@ class Live:
             self._offset -= jump
 
     def state(self) -> dict[str, Any]:
-        """What later windows depend on, for `restore`: plain values and copies of arrays."""
+        """The state that later windows depend on, for `restore`: plain values and copies of arrays."""
         return {
             "poses": np.stack([self._before, self._newest, self._present]),
             "roots": self._root.copy(),
@@ -189,7 +190,7 @@ class Live:
         self._before[:], self._newest[:], self._present[:] = state["poses"]
         self._root[:], self._offset[:] = state["roots"], state["offset"]
         self._has_root, self._is_new[:] = state["has_root"], state["is_new"]
-        self._comes[:], self._came[:] = state.get("comes", (True, 1.0))  # of another release: all came
+        self._comes[:], self._came[:] = state.get("comes", (True, 1.0))  # an older checkpoint: all came
         self._is_whole = bool(self._comes.all() and self._came.min() == 1.0)
         self._arrival, self._interval_s = state["times"]
         self._chosen, self._share, self._step = state["chosen"]

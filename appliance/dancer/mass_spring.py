@@ -17,8 +17,9 @@ Floats = NDArray[np.float64]  # (N,)
 SUBSTEPS = 10
 SUBSTEP_S = 0.02 / SUBSTEPS
 FASTEST_M_S = 30.0
-# How far a bone may be stretched beyond its rest vector's length when a tick begins. A bound on velocities
-# alone can feed a stretched spring: symplectic Euler keeps an energy with a term of position times velocity.
+# How far a bone may be stretched beyond its rest vector's length when a tick begins. A bound on velocities is
+# not enough and can feed a stretched spring: symplectic Euler keeps an energy with a term of position times
+# velocity.
 STRETCHED_M = 3.0
 SHORTENED_M = 2.0  # how far it then is: at the bound itself, stiff light chains shook for ever
 # A substep is stable while the frequency of the stiffest mode is below 2 / SUBSTEP_S. By Gershgorin's theorem
@@ -52,7 +53,7 @@ class MassSpring:
         for node, parent in enumerate(parents[1:], 1):
             self._bones_of[node, parent] = -1.0
         self._nodes_of = np.linalg.inv(self._bones_of)  # times these: the positions
-        self._to_bones = self._bones_of.copy()  # the bones alone
+        self._to_bones = self._bones_of.copy()  # only the bones
         self._to_bones[0, 0] = 0.0
         # Newtons a metre that each bone's springs may have for each kilogram at its end.
         self._carried_by = _STABLE / np.maximum(np.count_nonzero(self._to_bones, axis=0), 1) / SUBSTEP_S**2

@@ -48,8 +48,8 @@ class PhraseCache:
     def phrase(self, path: Path, skeleton: Skeleton, grounded: bool) -> tuple[Recording, Floor | None] | None:
         """A phrase at the tick's rate and its floor; None where its joints are not the skeleton's.
 
-        What was prepared is the same, to the bit, as what is read from the BVH file, and is there in a
-        hundredth of the time. Raises as read_bvh and survey do.
+        The cached result is bit for bit the one read from the BVH file, and loads in a hundredth of the time.
+        Raises as read_bvh and survey do.
         """
         name = _name(path, grounded)
         self._used.add(name)
@@ -118,7 +118,7 @@ def _keep(path: Path, phrase: Recording, floor: Floor | None) -> None:
 
 
 def _kept(path: Path, skeleton: Skeleton) -> tuple[Recording, Floor | None] | None:
-    """What was kept, without a copy of it; None where there is none, or no sound one of this skeleton."""
+    """The cached phrase, not copied; None if there is none, or none that is valid for this skeleton."""
     try:
         with opened(path) as stream:
             if os.fstat(stream.fileno()).st_size > LARGEST:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 
-HOLD_S = 0.1  # of silence, after which a sensor's joint is released
+HOLD_S = 0.1  # seconds of silence after which a sensor's joint is released
 GIVE_BACK_S = 1.0
 TAKE_S = 0.5
 LONGEST_STEP_S = 0.12  # six ticks; after a longer stall the targets continue from their last state
@@ -76,7 +76,7 @@ class Puppeteer:
         return self._target
 
     def state(self) -> dict[str, Any]:
-        """What later targets depend on, for `restore`: plain values and copies of arrays."""
+        """The state that later targets depend on, for `restore`: plain values and copies of arrays."""
         return {
             "weight": self.weight,
             "enabled": self.enabled,

@@ -18,7 +18,7 @@ from appliance.show.config_error import did_you_mean
 from appliance.show.sources import GRANULAR, IMPROVISE, MAIN, PATH
 
 FIRST_MADE = 1000  # numbers of loops that were made ahead; phrases have lower ones
-_MADE_KEPT = 6  # of the newest: a crossfade and the window know four at most
+_MADE_KEPT = 6  # the newest ones: a crossfade and the window know four at most
 
 
 class Made(NamedTuple):
@@ -99,7 +99,7 @@ class Repertoire:
         return made
 
     def made(self, loop: Loop) -> Made | None:
-        """What is known of a loop that was made ahead; None for one of a phrase."""
+        """The metadata of a loop that was made ahead; None for one of a phrase."""
         return self._made.get(round(float(loop.track[0, NUMBER])))
 
     def name_of(self, number: int) -> str:

@@ -15,7 +15,7 @@ class Slerp:
     """Interpolates count pairs of unit quaternions; 15 numpy calls, nothing allocated.
 
     It goes the short way, or (short False) the way that the signs say: between two motions that drift more
-    than half a turn apart, the short way would jump from one side to the other. The result lies in a's
+    than half a turn apart, the short way would jump from one side to the other. The result is in a's
     hemisphere and has unit length as exactly as its inputs (1e-6): no normalising.
     """
 

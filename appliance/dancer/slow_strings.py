@@ -13,7 +13,7 @@ from appliance.show.sound import StringsConfig
 from appliance.show.string_pitches import decays, string_pitches
 
 HIGHEST_HZ = 10.0
-TIED_HZ = 2.5  # at gain 1 a joint alone on its string swings as often
+TIED_HZ = 2.5  # at gain 1 a single joint on its string oscillates this often
 _LONGEST_M = 1.0  # no string is drawn out further, along each axis
 
 
@@ -21,8 +21,9 @@ class SlowStrings:
     """N strings, one for each bone of a mass-spring system; those of bones without one never move.
 
     A string is a mode, one complex number an axis: its real part is how far the string is drawn out, and the
-    bone's motion draws it; it pulls the bone back by stiffness times that. What the bone loses the string
-    gains, and loses by its decay: so neither can drive the other up, whatever the gain. In a step that is so
+    bone's motion draws it; it pulls the bone back by stiffness times that. The string gains the energy that
+    the bone loses, and loses it by decay: so neither can drive the other up, whatever the gain. In a step
+    that is so
     because the pull is the mean over the turn that the string makes in it: the exact flow of a Hamiltonian,
     as are the masses' drift and the springs' kick. By the string's place before the step, an undamped body
     was driven to ten times its energy.

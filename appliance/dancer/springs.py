@@ -25,7 +25,7 @@ from appliance.show.springs import Region, SpringsConfig
 JUMP_M = 0.25  # an anchor that moves further in a tick has jumped: the masses are carried along
 FARTHEST = 2.0  # times the body's reach that a mass may be from the anchor, along each axis
 _FASTEST_PHRASE_M_S = 10.0
-_BRANCHING = 0.3  # of the longest bone: children whose mean is nearer than that turn nothing
+_BRANCHING = 0.3  # fraction of the longest bone: children whose mean is nearer than that turn nothing
 _SUM = np.ones((3, 1))
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 _SMALLEST = 1e-6
@@ -34,11 +34,11 @@ _SMALLEST = 1e-6
 class Springs(Puppeteer):
     """Holds its joint and those below it that the network moves, as far as no other hand holds them.
 
-    A mass stands at each of these joints, anchored at the first. Springs hold the bones' lengths and draw
+    There is a mass at each of these joints, anchored at the first. Springs hold the bones' lengths and draw
     each bone to a direction between the phrase's and that of the puppet's last pose; targets turn the
     phrase's bones to where the masses are: so the springs follow the dancer, and the dancer the springs.
     Swinging is damped towards the phrase's motion. Damped towards the puppet's, the two drove each other
-    to 5 m/s. What is held are joints with a bone below them; joints at the ends are masses only.
+    to 5 m/s. Held joints are those with a bone below them; joints at the ends are only masses.
 
     regions: of each mass, and of the bone that leads to it. joints: those that are held; orientations
     (len(joints), 4): local, written by each pull. setting: the name in force; what `turn` turns stays until
@@ -57,8 +57,8 @@ class Springs(Puppeteer):
         others: Sequence[Puppeteer] = (),
         strings: StringsConfig | None = None,
     ) -> None:
-        """figure: stands in the puppet's last pose at each pull; moving: joints that the network moves;
-        others: the show's other hands; strings: the show's.
+        """figure: has the puppet's last pose at each pull; moving: joints that the network moves; others: the
+        show's other hands; strings: the show's.
 
         Raises ValueError where nothing hangs below the joint."""
         super().__init__(joint, weight)

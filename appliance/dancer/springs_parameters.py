@@ -1,4 +1,4 @@
-"""What the springs are like now: a setting's numbers and the knobs on top, gliding from one to the next."""
+"""The springs' present parameters: a setting's numbers and the knobs on top, gliding from one to the next."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class Stream:
 
     @property
     def standing(self) -> tuple[float, float, float]:
-        """Where the root stands at the first pose: x, z in metres, heading in radians."""
+        """The root at the first pose: x, z in metres, heading in radians."""
         first = self._end - self._window
         x, z = self._tracks[first, [X, Z]].tolist()
         w, _, y, _ = self._poses[first, 0].tolist()

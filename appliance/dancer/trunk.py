@@ -12,8 +12,8 @@ from appliance.pose import quaternion
 from appliance.pose.roles import UPPER_ARMS
 from appliance.pose.skeleton import Skeleton
 
-TRUNK_RADIUS = 0.5  # of the distance between the shoulders: 11 cm for the CMU dancers
-SKULL = 0.7  # of that radius: from the head's joint upwards, where the tube ends in a ball
+TRUNK_RADIUS = 0.5  # fraction of the distance between the shoulders: 11 cm for the CMU dancers
+SKULL = 0.7  # fraction of that radius: from the head's joint upwards, where the tube ends in a ball
 
 
 class Arm(NamedTuple):

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-_STRETCH = 0.999  # of the chain's length: a straight leg would have no direction to bend in
-_BEND = 0.02  # of the upper bone's length: how much the preferred direction decides for a straight leg
+_STRETCH = 0.999  # fraction of the chain's length: a straight leg would have no direction to bend in
+_BEND = 0.02  # fraction of the upper bone's length: weight of the preferred direction for a straight leg
 
 
 def bend(root: Vector, middle: Vector, end: Vector, target: Vector, towards: Vector) -> tuple[Vector, Vector]:
@@ -91,7 +91,7 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def inverse(q: Quaternion) -> Quaternion:
-    """Of a unit quaternion."""
+    """Rotation angle of a unit quaternion."""
     return q[0], -q[1], -q[2], -q[3]
 
 

@@ -1,4 +1,4 @@
-"""What a channel of the Open Fixture Library means: its attribute's name and what is special about it."""
+"""Meaning of a channel of the Open Fixture Library: its attribute's name and its special properties."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Meaning:
 
 
 def meaning_of(key: str, channel: Json, fixture: Json) -> Meaning:
-    """What the channel of this key mainly does."""
+    """The main function of the channel with this key."""
     largest = _largest(channel)
     capabilities = [_in_bytes(capability, largest) for capability in capabilities_of(channel)]
     kind = _leading_kind(capabilities)
@@ -72,7 +72,7 @@ def meaning_of(key: str, channel: Json, fixture: Json) -> Meaning:
 
 
 def capabilities_of(channel: Json) -> Sequence[Json]:
-    """What a channel does in parts of its range, or all along."""
+    """A channel's function in parts of its range, or in all of it."""
     return channel.get("capabilities") or [channel["capability"]]
 
 
@@ -99,7 +99,7 @@ def _width(capability: Json) -> int:
 
 
 def _leading_kind(capabilities: Sequence[Json]) -> str | None:
-    """What most of the channel does, a dimmer before everything else; None: nothing."""
+    """The function of most of the channel, a dimmer before everything else; None: nothing."""
     widths: Counter[str] = Counter()
     for capability in capabilities:
         if capability["type"] != "NoFunction":

@@ -1,6 +1,7 @@
 """Fixtures of the Open Fixture Library (JSON) as profiles: modes, matrices, fine and switching channels.
 
-The format: docs/fixture-format.md of that library. What a profile cannot express is left out and reported.
+The format: docs/fixture-format.md of that library. Anything that a profile cannot express is left out and
+reported.
 """
 
 from __future__ import annotations
@@ -117,7 +118,7 @@ class _Conversion:
         return own if len(own) == 1 and templates else []
 
     def _channel(self, key: str, keys: Sequence[str], names: Mapping[str, str]) -> str:
-        """What stands in the profile for one channel of a mode."""
+        """The profile's entry for one channel of a mode."""
         if key == UNUSED or (key in self._meanings and self._meanings[key].name == UNUSED):
             return UNUSED
         if key in names:

@@ -1,1 +1,1 @@
-"""The generator: makes motion ahead for the stage, in a process of its own."""
+"""The generator: a separate process that makes motion ahead for the stage."""

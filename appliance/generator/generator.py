@@ -44,16 +44,18 @@ from appliance.show_control.orders import Order
 _TAKEN_S = 5.0  # what is to be danced at once and is not taken over until then is made again
 _REST_S = 0.2  # from one motion to the next, at least
 _AHEAD_S = 1.2  # until an improvisation is made that is wanted at once
-_FILES = 3  # of each puppet the newest, beside what is danced: the stage may still open the one before
+_FILES = 3  # each puppet's newest besides the one that dances: the stage may still open the one before
 _EACH = ("seed", "number", "after", "from_s", "prompt")
-_M_MMAP_THRESHOLD, _ARRAY_BYTES = -3, 1 << 17  # of malloc.h; it grows by itself unless it is set
+_M_MMAP_THRESHOLD, _ARRAY_BYTES = -3, 1 << 17  # from malloc.h; it grows by itself unless it is set
 _MOST_NUMBERS = 10_000_000  # exact in the track's float32
 _WRONG = (MotionNetworkError, GroundingError, PhraseError, BvhError, OSError, LookupError, ValueError)
 
 
 @dataclass
 class _Ahead:
-    """What is made ahead for one puppet. wish: what was made last was made for it; returns: since then."""
+    """Motion made ahead for one puppet. wish: the request that the last motion was made for; returns: since
+    then.
+    """
 
     puppet: int
     writer: MadeMotionWriter
@@ -115,7 +117,7 @@ class Generator:
         danced = self._danced(0)
         try:
             if not danced:
-                raise ValueError("What is danced was not made ahead: there is nothing to keep.")
+                raise ValueError("The motion that dances now was not made ahead: there is nothing to keep.")
             number = parsed_recipe(danced)["number"]
             return True, self.kept.keep(order.text, self._file(number))
         except (ValueError, LookupError) as error:
@@ -153,7 +155,7 @@ class Generator:
         return True
 
     def _told(self, puppet: int) -> Mapping[str, Any]:
-        """What the stage says of a puppet."""
+        """The stage's report on a puppet."""
         health = self._stage.health() or {}
         if puppet == 0:
             return health
@@ -197,7 +199,7 @@ class Generator:
         self._fallbacks.set(NOT_MADE.name, " ".join(complaints))
 
     def _going_on(self, puppet: int, at_once: bool) -> dict[str, Any]:
-        """What an improvisation goes on from: a moment that is soon danced, or the end of another one."""
+        """The pose that an improvisation continues: one that is soon danced, or the end of another one."""
         told, danced = self._told(puppet), self._danced(puppet)
         name = str(told.get("base", MAIN))
         if danced:
@@ -248,7 +250,7 @@ class Generator:
 
 
 def _character(recipe: Mapping[str, Any]) -> dict[str, Any]:
-    """What is alike in the motions that are made for one wish."""
+    """The properties shared by all motions that are made for one request."""
     return {name: value for name, value in recipe.items() if name not in _EACH}
 
 
@@ -259,6 +261,6 @@ def save_memory() -> None:
 
 
 def give_back_memory() -> None:
-    """What numpy and onnxruntime have freed goes back to the system: 20 MB of 130."""
+    """Returns memory freed by numpy and onnxruntime to the system: 20 MB of 130."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)

@@ -24,7 +24,7 @@ _NAME = re.compile(r"[\w][\w .-]{0,63}")
 
 
 class KeptMotions:
-    """Motions in memory by name, and on the disk: a thread of its own writes, for a disk may hang.
+    """Motions in memory by name, and on disk: a separate thread writes, because a disk may hang.
 
     complaint: why the disk does not take one; "".
     """
@@ -58,7 +58,7 @@ class KeptMotions:
             self._memory.mkdir(mode=0o700, exist_ok=True)
             write_whole(self._memory / f"{name}{SUFFIX}", written, private=True)
         except (OSError, ValueError) as error:
-            raise ValueError(f"What is danced cannot be kept ({error}).") from None
+            raise ValueError(f"The motion cannot be kept ({error}).") from None
         self.recipes[name] = recipe.get("of", recipe)
         if self._disk is None:
             return f"Kept as '{name}' until the box is switched off: it has no state folder (`state:`)."

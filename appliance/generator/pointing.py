@@ -10,8 +10,8 @@ from appliance.outputs.frame_reader import SeenFrame
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 
-HELD = 0.5  # less weight of the hand is none
-STEADY = 0.03  # of the map: a limb that trembles by less stays where it pointed
+HELD = 0.5  # a hand with less weight is ignored
+STEADY = 0.03  # fraction of the map: a limb that trembles by less stays where it pointed
 
 
 class Pointing:
@@ -27,8 +27,8 @@ class Pointing:
     def point(self, frame: SeenFrame | None) -> list[float]:
         """x, y, each 0 to 1, as `/motion/path` takes them; [] while the hand does not hold.
 
-        By the joint's rotation alone, as the limb is seen from the front of the parent joint: ahead is the
-        middle; left and right, up and down are the edges. Angles would leap where a limb hangs.
+        Depends only on the joint's rotation, seen from the front of the parent joint: ahead is the middle;
+        left and right, up and down are the edges. Angles would leap where a limb hangs.
         """
         if frame is None or frame.holds[self._joint] < HELD:
             self._point = []

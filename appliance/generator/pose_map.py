@@ -15,8 +15,8 @@ from appliance.show.sources import MAIN, PATH
 
 ACROSS = 5  # figures
 EVERY_S = 0.2  # between two places of the path
-_SHORTEST_M = 0.04  # of a bone that is drawn
-_SIZE = 0.75  # of a figure's cell
+_SHORTEST_M = 0.04  # the shortest bone that is drawn
+_SIZE = 0.75  # fraction of a figure's cell
 
 
 def pose_map(show: Show) -> dict[str, Any]:

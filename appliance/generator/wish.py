@@ -10,7 +10,7 @@ from appliance.box.show_state import MOTION, Part, ShowState
 from appliance.show.show import ShowConfig
 from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, PATH, POINTS
 
-STEP_S = 1.5  # of a fade: each step is a motion of its own, melted into the one before
+STEP_S = 1.5  # seconds of a fade: each step is a separate motion, blended into the one before
 AGAIN = 1000  # how far `again` counts the seed on: each return counts it on by one
 APART = 10_000_000  # seeds of one puppet and the next: no two dance the same variation
 _DIGITS = 4
@@ -47,7 +47,7 @@ class Wishes:
         puppet: int = 0,
         pointed: Sequence[float] = (),
     ) -> Wish | None:
-        """What a puppet waits for; None: phrases or a live dancer. base: the phrase that it danced last.
+        """A puppet's open request; None: phrases or a live dancer. base: the phrase that it danced last.
 
         kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the first puppet waits for
         while nothing is declared, after a power cut. pointed: x, y of the map at which a hand points.

@@ -21,7 +21,7 @@ from appliance.stage.recorder import FILE
 
 
 class MirroredJournal:
-    """What the stage has noted since the last turn.
+    """The entries that the stage has recorded since the last turn.
 
     While the disk takes nothing, the stage's memory holds the last 80 s; they follow when it recovers.
     """

@@ -1,6 +1,7 @@
 """The keeper: carries what must survive a power cut from memory to the disk, each thing in its own process.
 
-The stage touches no disk while it dances: a disk that is full, read-only, gone or hangs stops these alone.
+The stage touches no disk while it dances: a disk that is full, read-only, missing or hanging stops only these
+mirrors.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _REST_S = 3.5  # and LAST_TURN_S: a person waits at a terminal
 
 
 class KeeperHealth:
-    """What the keeper reports to the box's other processes."""
+    """The keeper's report to the box's other processes."""
 
     def __init__(self, runtime: Path, lasting: Path | None = None) -> None:
         """lasting: the folder that must outlive power-off; None: nobody counts on one."""
@@ -56,7 +57,7 @@ class KeeperHealth:
 
 
 def mirrored_by(box: BoxConfig, runtime: Path, journal: Path | None, minutes: float) -> list[Mirrored]:
-    """What this box keeps: its journal, where one is wanted, and its records, where it has a state folder."""
+    """The mirrors of this box: its journal, if one is wanted, and its records, if it has a state folder."""
     mirrored: list[Mirrored] = []
     if (state := box.state_folder) is not None:
         mirrored += [mirrored_checkpoint(runtime, state), mirrored_sensor_memory(runtime, state)]

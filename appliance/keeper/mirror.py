@@ -16,7 +16,7 @@ RETRY_S = 10.0  # after a disk refused
 
 
 class Mirrored(Protocol):
-    """What is carried to the disk: the journal, the checkpoint, the sensors' memory, that a show has danced.
+    """Copied to disk: the journal, the checkpoint, the sensors' memory, that a show has danced.
 
     name: what people call it; fallback: in force while the disk does not take it; recovered: the sentence
     when it does again; folder: on the disk. Nothing may be open before the first `copy`: the process that
@@ -37,7 +37,7 @@ class Mirrored(Protocol):
         """
 
     def explain(self, error: Exception) -> str:
-        """What cannot be kept and why, what that means for the audience, and what to do."""
+        """Data that cannot be saved and why, the effect for the audience, and what to do."""
 
     def close(self) -> None:
         """After the last copy."""

@@ -1,4 +1,4 @@
-"""A mirror in a process of its own: a disk that hangs holds up neither the other mirrors nor a shutdown.
+"""A mirror in a separate process: a disk that hangs holds up neither the other mirrors nor a shutdown.
 
 A thread in a write to a dead disk cannot be ended, and its process keeps its locks until the disk answers. A
 process can be left behind: the kernel ends it as soon as the disk answers.
@@ -183,7 +183,7 @@ class MirrorProcess:
 
 
 def _detach(channel: socket.socket, parent: int) -> None:
-    """End with the parent alone, and hold none of its locks, files and sockets."""
+    """End only with the parent, and hold none of its locks, files and sockets."""
     gc.freeze()  # unused objects of the parent would close descriptors that are others by then
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):  # systemd and a terminal send them to all
         signal.signal(number, signal.SIG_IGN)

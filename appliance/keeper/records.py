@@ -96,4 +96,4 @@ def mirrored_sensor_memory(runtime: Path, state: Path) -> MirroredRecord:
         "as `state:` in the box file."
     )
     block, file = memory_record(state).reader(runtime), memory_file(state)
-    return MirroredRecord("What sensors taught the box", SENSORS_NOT_KEPT, block, state, file, bytes, words)
+    return MirroredRecord("The sensors' memory", SENSORS_NOT_KEPT, block, state, file, bytes, words)

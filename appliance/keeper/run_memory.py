@@ -37,7 +37,7 @@ class Keyframe:
 
 @dataclass(frozen=True)
 class Piece:
-    """What goes on the disk together: a keyframe, if there is one, and the entries behind it."""
+    """Entries written to disk together: a keyframe, if there is one, and the entries after it."""
 
     keyframe: Keyframe | None
     entries: list[Entry]
@@ -98,7 +98,7 @@ class RunMemory:
         return (found.st_dev, found.st_ino) == self._identity
 
     def news(self) -> Iterator[Piece]:
-        """What was noted since the last kept piece; `keep` each before the next is taken."""
+        """Entries recorded since the last kept piece; `keep` each before the next is taken."""
         newest = self._reader.rings[LOG].newest_sequence()
         frames = [frame for frame in self._keyframes() if self.keyframe < frame.position <= newest]
         ends = [*(frame.position for frame in frames), newest]

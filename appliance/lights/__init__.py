@@ -1,1 +1,1 @@
-"""Lights, a process of its own: the shared frame in, fixtures and their universes out."""
+"""The lights process: the shared frame in, fixtures and their universes out."""

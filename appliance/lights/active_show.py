@@ -30,7 +30,7 @@ class ActiveShow:
         return load_show(self._stage.facts.show_directory)
 
     def _written(self) -> tuple[str, bytes] | None:
-        """What identifies a show: its folder and the text of show.yaml."""
+        """The identity of a show: its folder and the text of show.yaml."""
         if self._stage.facts is None:
             return None
         folder = self._stage.facts.show_directory

@@ -1,4 +1,4 @@
-"""What the lights read from the dance: positions, speeds and orientations of joints."""
+"""Values that the lights read from the dance: positions, speeds and orientations of joints."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 from appliance.show.light_rules import FEATURES, RuleConfig
 
-SMOOTHING_S = 0.06  # of speeds: three ticks, so that one late frame is no step
+SMOOTHING_S = 0.06  # window of speeds: three ticks, so that one late frame is no step
 PAUSE_S = 0.2  # without a new frame for this long, nothing moves
 FASTEST_M_S = 15.0  # no joint of a dancer is faster; a phrase that jumps is
 ROOT = 0
@@ -61,7 +61,7 @@ class Dance:
         return self if puppet is None else self._others.get(puppet, self)
 
     def read(self, rule: RuleConfig) -> float:
-        """What a rule reads now: metres, metres a second or degrees."""
+        """A rule's present input: metres, metres a second or degrees."""
         joint = ROOT if rule.joint is None else self.skeleton.index(rule.joint)
         if rule.reads in _COORDINATE:
             return float(self.positions[joint, _COORDINATE[rule.reads]])

@@ -1,4 +1,4 @@
-"""What the lights tell of themselves, and the walk that show control asks for while the show stands dark."""
+"""The lights' report for show control, and the walk through the rig that it asks for in the dark."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class OrderedWalk:
 
     @property
     def words(self) -> str:
-        """What is to be looked at now."""
+        """Tells the technician what to look at now."""
         step = None if self._walking is None else self._walking.step
         return "" if step is None else f"{step.fixture}: {step.attribute}, {step.words}"
 

@@ -19,7 +19,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class MappingOutput:
-    """What a mapping sets: slots (S,) 0..1; points to aim at (H, 3), metres; which heads it moves."""
+    """The output of a mapping: slots (S,) 0..1; points to aim at (H, 3), metres; which heads it moves."""
 
     values: Values
     aims: NDArray[np.float64]

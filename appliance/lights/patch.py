@@ -57,7 +57,9 @@ class Patch:
         return self._own[fixture.name]
 
     def dimmed(self, values: Values, level: Values | float) -> Values:
-        """The values with dimmers scaled by `level` (a number or (S,)); colours stand in where none is."""
+        """The values with dimmers scaled by `level` (a number or (S,)); a fixture without a dimmer scales its
+        colours.
+        """
         shown = np.where(self.dims, values * level, values)
         if len(self.scaled):
             light = shown[self.scaled]
@@ -108,7 +110,7 @@ class Patch:
         return float(slot.base == DIMMER and slot.name != DIMMER and self._has_dimmer(slot.fixture))
 
     def _dims(self, slot: Slot) -> bool:
-        """A fixture's own dimmer dims it; those of its cells only where it has none of its own."""
+        """A fixture's own dimmer dims it; those of its cells only if the fixture has none."""
         is_dimmer = slot.name == DIMMER or (slot.base == DIMMER and not self._has_dimmer(slot.fixture))
         return is_dimmer or slot.config.dims
 

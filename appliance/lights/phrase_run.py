@@ -31,7 +31,8 @@ def passes(
 ) -> Iterator[Pass]:
     """Dance frames start to end (without it) of the phrase under a mapping, "": the first one.
 
-    Every step-th frame is a pass. Heads have reached the first one before it; they stand in the patch.
+    Every step-th frame is a pass. Before the first one the heads have reached it; the patch holds their
+    positions.
     """
     step_s = step / phrase.fps
     rig = Rig(config, patch, phrase.skeleton, 1.0 / step_s)

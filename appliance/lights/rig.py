@@ -42,7 +42,7 @@ class Rig:
     ) -> None:
         self.patch = patch
         self.dance = Dance(skeleton, puppets)
-        self.safety = 1.0  # 0: the dance alone; 1: the safe look alone
+        self.safety = 1.0  # 0: only the dance; 1: only the safe look
         self._safe, self._homes = _safe_look(config.safe, patch), config.safe.heads == "home"
         self.values: Values = patch.dimmed(self._safe, 1.0)  # (S,) what the last pass showed
         self._is_dark = config.safe.dimmer == 0.0

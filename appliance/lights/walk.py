@@ -14,7 +14,7 @@ from appliance.show.fixture_profile import DIMMER, PAN, TILT
 from appliance.show.light_rules import AIM
 from appliance.show.venue_lights import UNIVERSE_CHANNELS
 
-LONGEST_STEP_S = 0.04  # of a pass; a late one continues where it was, so that no peak is skipped
+LONGEST_STEP_S = 0.04  # time step; a late one continues where it was, so that no peak is skipped
 _ROOM = 2.2  # sweeps from end to end that a head gets time for; it makes two
 CHEST_M = 1.2  # heads point here at the end, at chest height above the origin
 
@@ -30,7 +30,7 @@ class Step:
 
 
 def steps(patch: Patch, fixtures: Sequence[str] = (), attribute: str | None = None) -> Iterator[Step]:
-    """What to look at, in patch order; empty `fixtures` or None for `attribute`: all."""
+    """Steps of the walk, in patch order; empty `fixtures` or None for `attribute`: all."""
     for fixture in patch.fixtures:
         if fixtures and fixture.name not in fixtures:
             continue
@@ -116,7 +116,7 @@ def _words(slot: Slot) -> str:
     if slot.base in (PAN, TILT):
         return f"{where}: from the middle to one end, to the other end, and back"
     if slot.is_lamp:
-        return f"{where}: this colour alone, up and down"
+        return f"{where}: only this colour, up and down"
     return f"{where}: dark, full, back" if slot.base == DIMMER else f"{where}: from 0 to full, and back"
 
 

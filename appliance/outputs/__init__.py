@@ -1,1 +1,1 @@
-"""What leaves the box: the joint frame and its receivers."""
+"""Outputs of the box: the joint frame and its receivers."""

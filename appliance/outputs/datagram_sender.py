@@ -42,7 +42,7 @@ class DatagramPath:
     port: int
     interface: str | None = None
     broadcast: bool = False
-    hops: int = 1  # of multicast, IP_MULTICAST_TTL
+    hops: int = 1  # time to live of multicast, IP_MULTICAST_TTL
     source_port: int | None = None
 
     def open(self) -> socket.socket:
@@ -87,7 +87,7 @@ class DatagramPath:
 
 
 class DatagramSender:
-    """One receiver, with a socket of its own that is opened again after a failure.
+    """One receiver, with a socket that is opened again after a failure.
 
     Datagrams for a machine that is switched off wait 3 s for its address and fill a socket's buffer: with one
     socket for all, two such machines cost the others 85 % of their frames.

@@ -1,4 +1,4 @@
-"""How the shared frame lies in its file; without numpy, for processes that do not load it."""
+"""Layout of the shared frame in its file; without numpy, for processes that do not load it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ FACTS, HEALTH, FRAMES = range(3)  # the file's rings
 FRAME_SLOTS = 64  # a reader has 1.28 s to copy the newest frame
 HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
 LATE = 1  # flag
-GHOST = 2  # flag, for browsers alone
+GHOST = 2  # flag, only for browsers
 # Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
 FRAME_HEAD = struct.Struct("<qddqdII")
 # For browsers: tick, flags, joints; then each puppet's world rotations (w, x, y, z), positions and holds,
@@ -18,8 +18,8 @@ BROWSER_HEAD = struct.Struct("<dII")
 
 
 class FrameLayout:
-    """Where the arrays of J joints lie in a frame's payload: all float32, little-endian, in this order. Those
-    of further puppets lie behind those of the first, `stride` bytes from one to the next.
+    """Offsets of the arrays of J joints in a frame's payload: all float32, little-endian, in this order.
+    Arrays of further puppets follow those of the first, `stride` bytes from one to the next.
     """
 
     def __init__(self, joints: int, puppets: int = 1) -> None:

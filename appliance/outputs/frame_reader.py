@@ -49,7 +49,7 @@ class SeenFrame:
     positions: NDArray[np.float32]  # (J, 3) world, metres
     root: NDArray[np.float32]  # (3,) world, metres
     holds: NDArray[np.float32]  # (J,) 0..1: how firmly a hand holds each joint
-    # Of the puppets beside the first, in their order.
+    # The puppets after the first, in their order.
     others: tuple[SeenFrame, ...] = field(default=(), kw_only=True)
 
 

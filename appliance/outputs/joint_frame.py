@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(slots=True)
 class JointFrame:
-    """Where the dancer stands at one tick, J joints in the skeleton's order.
+    """The dancer's pose at one tick, J joints in the skeleton's order.
 
     Write into the arrays (`frame.pose[:] = ...`); outputs read them while they publish and keep nothing.
     """
@@ -19,7 +19,7 @@ class JointFrame:
     tick: int = 0
     frame_time: float = 0.0  # seconds on the monotonic clock
     late: bool = False  # the last pose again, because the tick was not done in time
-    sensor_sequence: int = -1  # of the primary sensor's newest reading in this frame; -1 without one
+    sensor_sequence: int = -1  # the primary sensor's newest reading in this frame; -1 without one
     sensor_arrival: float = 0.0  # when that reading came in, seconds on the monotonic clock
     pose: NDArray[np.float32] = field(init=False)  # (J, 4) w, x, y, z local to the parent joint
     source: NDArray[np.float32] = field(init=False)  # (J, 4) local: what the puppet starts from, the phrase

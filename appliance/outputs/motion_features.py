@@ -1,4 +1,4 @@
-"""What moves, as numbers: speeds of each joint, quantity of motion, bounds, efforts after Laban.
+"""Movement in numbers: speeds of each joint, quantity of motion, bounds, efforts after Laban.
 
 Definitions: C. Larboulette and S. Gibet, 'A review of computable expressive descriptors of human motion'
 (MOCO 2015); every joint weighs the same.
@@ -18,7 +18,7 @@ Floats = NDArray[np.float32]
 
 
 class Derivatives:
-    """Of vectors, by differences between one frame and the next, not smoothed.
+    """Derivative of vectors, by differences between one frame and the next, not smoothed.
 
     found (orders, J, 3): the first derivative, the second and so on, by seconds; each begins, after zeros,
     with the frame that has all that it needs.
@@ -52,7 +52,7 @@ class MotionFeatures:
     def __init__(self, joints: int) -> None:
         self._derivatives = Derivatives(joints, 3)
         self.derived = self._derivatives.found
-        self._sizes = np.zeros((WINDOW, 3, joints), np.float32)  # of these, the newest frames
+        self._sizes = np.zeros((WINDOW, 3, joints), np.float32)  # the newest frames among these
         self._steps = np.zeros((WINDOW, joints), np.float32)  # metres from the frame before
         self._ways = np.zeros((WINDOW, joints, 3), np.float32)  # positions
         self.numbers: dict[str, Floats] = {

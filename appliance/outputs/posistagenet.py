@@ -77,7 +77,7 @@ class PosiStageNet(DatagramSender):
         np.add(out, self._offset, out=out)
 
     def _note_speeds(self, frame: JointFrame) -> None:
-        """What the trackers moved since the last frame that was not late, a second."""
+        """The trackers' movement since the last frame that was not late, a second."""
         passed_s = frame.frame_time - self._time_before
         if frame.late or passed_s <= 0.0:
             return

@@ -28,7 +28,7 @@ class OscOutputs:
         )
         self._frame_message = FrameMessage()
         forms = [config.model_dump_json(exclude={"host", "port", "frame_message"}) for config in configs]
-        self._encoders = [  # of each puppet
+        self._encoders = [  # for each puppet
             {
                 form: DIALECTS[config.dialect](skeleton, addressed, config.number_of(puppet))
                 for form, config in dict(zip(forms, configs, strict=True)).items()

@@ -35,7 +35,7 @@ _Arrays = tuple[np.ndarray[Any, np.dtype[np.float32]], ...]
 
 @dataclass(frozen=True)
 class Facts:
-    """What readers need to know about the show and what stays the same while a stage runs."""
+    """Facts about the show that stay the same while a stage runs, for readers."""
 
     show_directory: Path
     box_file: Path | None

@@ -182,7 +182,7 @@ def _shade(normal: Array, paint: Array) -> Array:
 
 
 def _openness(depth: Array, frame: Frame) -> Array:
-    """How much light reaches each subpixel past what stands in front of it, 0..1."""
+    """How much light reaches each subpixel past the parts in front of it, 0..1."""
     near = depth.reshape(frame.height, SUPERSAMPLE, frame.width, SUPERSAMPLE).max(axis=(1, 3))
     hit = np.isfinite(near)
     surface = np.where(hit, near, near[hit].min() - 0.3)

@@ -37,10 +37,10 @@ class MissingPicturesError(RuntimeError):
 
 @dataclass(frozen=True)
 class Strip:
-    """A dance for a row of its own: local unit quaternions (N, J, 4), roots (N, 3) metres, what it is.
+    """A dance for a separate row: local unit quaternions (N, J, 4), roots (N, 3) metres, its title.
 
-    behind: a dance whose figures stand behind these as ghosts, so that one sees what is different;
-    holds: (N, J) how firmly a hand holds each joint, 0..1.
+    behind: a dance drawn as ghosts behind these figures, to show differences; holds: (N, J) how firmly a hand
+    holds each joint, 0..1.
     """
 
     poses: Array
@@ -129,7 +129,7 @@ def draw_rows(
     coloured: str,
     start_s: float = 0.0,
 ) -> Path:
-    """Draw rows under each other, each with instants, coloured joints and words of its own, into a PNG.
+    """Draw rows under each other, each with its instants, coloured joints and text, into a PNG.
 
     fps: poses a second; coloured: what the coloured joints are; start_s: as in draw_strips, which raises the
     same.

@@ -16,22 +16,22 @@ from appliance.pose.skeleton import Skeleton
 
 COLUMN_PX, TILE_PX = 176, 320  # figures stand closer than their arms reach: tiles overlap; at least
 MARGIN_PX, HEADER_PX, FOOTER_PX, LABEL_PX = 56, 104, 44, 22
-HEIGHT_PX = 300  # of the figure in its rest pose
+HEIGHT_PX = 300  # the figure in its rest pose
 AZIMUTH, ELEVATION = np.radians(32), np.radians(11)
 TRAIL_S = 0.6
 SHADOW = 0.85
 IVORY, VERMILION = np.array([0.93, 0.87, 0.78]), np.array([0.96, 0.27, 0.13])
 SLATE = np.array([0.62, 0.70, 0.80])
 BACKDROP, HORIZON, BOARDS = (np.array(c) / 255 for c in ([15, 16, 21], [37, 38, 47], [104, 88, 78]))
-GHOST = 0.55  # how dense the figure is that stands behind another one
+GHOST = 0.55  # opacity of the figure behind another one
 
 
 @dataclass(frozen=True)
 class Row:
     """Poses drawn beside each other: local rotations (N, J, 4), roots (N, 3) metres, a label, a colour.
 
-    chosen: which of the N; behind: a row whose figures stand behind these as ghosts; holds: (N, J) 0..1, how
-    far each joint is in colour; stamps: words below the figures, left out: their seconds.
+    chosen: which of the N; behind: a row drawn as ghosts behind these figures; holds: (N, J) 0..1, how far
+    each joint is in colour; stamps: words below the figures, by default their seconds.
     """
 
     poses: Array

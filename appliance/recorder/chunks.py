@@ -17,7 +17,7 @@ _HEAD = struct.Struct("<4sHHIII")  # magic, kind, ticks in it, bytes stored, byt
 _CHECK_AT = _HEAD.size - 4
 # Bytes unpacked, by kind: 80 s of a figure of a thousand joints; a header becomes some ten times as much.
 _LARGEST = {HEADER: 1 << 20, KEYFRAME: 1 << 22, LOG: 1 << 26}
-_LEVEL = 1  # of zlib: poses are noise to it, what is silent costs nothing
+_LEVEL = 1  # zlib level: poses are noise to it, silent fields cost nothing
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Chunk:
 
 
 def chunk(kind: int, data: bytes, ticks: int = 0) -> bytes:
-    """A chunk as it stands in a file."""
+    """A chunk as stored in a file."""
     stored = zlib.compress(data, _LEVEL)
     head = _HEAD.pack(_MAGIC, kind, ticks, len(stored), len(data), 0)[:_CHECK_AT]
     check = zlib.crc32(stored, zlib.crc32(head))
@@ -51,7 +51,7 @@ def chunks(data: bytes) -> Iterator[Chunk]:
 
 
 def count_ticks(path: Path) -> int:
-    """How many ticks a segment holds, by the heads of its chunks alone. Raises OSError."""
+    """Number of ticks in a segment, from the heads of its chunks only. Raises OSError."""
     count = 0
     with opened(path) as file:
         size = os.fstat(file.fileno()).st_size

@@ -1,4 +1,6 @@
-"""What bits of the dance depend on beside the journal: the processor, the libraries, the show's files."""
+"""Facts that the bits of the dance depend on besides the journal: the processor, the libraries, the show's
+files.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,7 @@ def fingerprints(directory: Path, names: Sequence[str]) -> dict[str, str]:
 
 
 def differing_software(recorded: dict[str, Any], here: dict[str, str]) -> list[str]:
-    """What of machine and software is another one than in the recording, in words."""
+    """Differences of machine and software from those of the recording, in words."""
     return [
         f"{words} ({recorded.get(name, _UNKNOWN)} then, {here[name]} here)"
         for name, words in _WORDS.items()

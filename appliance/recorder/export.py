@@ -20,7 +20,7 @@ from appliance.recorder.record import DAMAGED
 from appliance.recorder.segments import SUFFIX
 
 CHECKSUMS = "SHA256SUMS"
-_LONGEST_NAME = 80  # of a show, before the date
+_LONGEST_NAME = 80  # length of a show's name, before the date
 
 
 def export(

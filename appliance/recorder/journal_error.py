@@ -1,4 +1,4 @@
-"""What may be wrong with a journal, in words for people."""
+"""Faults of a journal, in words for people."""
 
 from __future__ import annotations
 

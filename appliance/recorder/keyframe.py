@@ -28,7 +28,7 @@ def packed(state: dict[str, Any]) -> bytes:
 
 
 def unpacked(data: bytes) -> dict[str, Any]:
-    """The state in these bytes; tuples come back as lists. Raises ValueError where they are none."""
+    """The state in these bytes; tuples come back as lists. Raises ValueError for invalid ones."""
     (length,) = _HEAD.unpack_from(data)
     at = _HEAD.size + length
 

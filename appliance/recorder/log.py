@@ -20,7 +20,7 @@ class Entry:
 
 
 def packed(entries: Sequence[Entry]) -> bytes:
-    """Entries as they lie in a chunk."""
+    """Entries as stored in a chunk."""
     return b"".join(
         part for one in entries for part in (_HEAD.pack(one.number, one.kind, len(one.data)), one.data)
     )
@@ -47,7 +47,7 @@ def pieces_of(event: bytes, most_bytes: int) -> Iterator[bytes]:
 
 
 class Pieces:
-    """Puts long events together, whatever segments their pieces lie in."""
+    """Puts long events together, whichever segments hold their pieces."""
 
     def __init__(self) -> None:
         self._kept: dict[int, bytes] = {}

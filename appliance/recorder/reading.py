@@ -28,7 +28,7 @@ _NAME_ONE = "Name the folder of `bunraku play --journal`, a segment in it, or an
 _LARGEST = 1 << 26  # bytes of a segment: a minute of the show that comes with the box has a fiftieth of it
 _MOST_SEGMENTS = 20_000  # in an exported file; a day has 1440 where the disk has room
 _USTAR = slice(257, 262), b"ustar"  # where an archive says that it is one
-# What may be held: so much, and four times what is stored (a show's ticks unpack to less than three times).
+# Memory bound: so much, and four times the stored size (a show's ticks unpack to less than three times).
 # An entry costs more than its bytes, and values read from JSON much more.
 _LEAST_ROOM, _OF_STORED = 512 << 20, 4
 _OF_AN_ENTRY, _OF_JSON = 200, 16
@@ -38,7 +38,7 @@ Ticks = np.ndarray[Any, np.dtype[np.void]]
 
 @dataclass(frozen=True)
 class Run:
-    """What a stage noted from its start to its end, as far as it was kept.
+    """The record of a stage from its start to its end, as far as it was kept.
 
     ticks: a structured array in order of time; `tick_numbers` (N,) their numbers in the log, in which events
     have numbers too: between two that follow on each other nothing is missing. keyframes: (entries of the log
@@ -287,7 +287,7 @@ def _add(parts: dict[str, _Part], data: bytes, room: _Room) -> None:
 
 
 def _event(data: bytes) -> dict[str, Any]:
-    """Raises one of DAMAGED for what is none."""
+    """Raises one of DAMAGED for an invalid one."""
     event: dict[str, Any] = json.loads(data)
     if not isinstance(event["kind"], str) or not isinstance(event.get("order", {}), dict):
         raise TypeError("an event of an unknown kind")

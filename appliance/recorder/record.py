@@ -21,7 +21,7 @@ LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sen
 SECTIONS = ("drain", "motion", "puppeteers", "puppet", "blend", "figure", "send")
 TICK, EVENT, PIECE = 1, 2, 3  # kinds of entries; PIECE: of an event that is too long for one entry
 ORDER = "order"  # kind of the event that show control asked for something, and what came of it
-# What facts, events and ticks raise that no box wrote.
+# Exceptions that parsing a corrupt journal may raise.
 DAMAGED = (ValueError, LookupError, ArithmeticError, TypeError, AttributeError, RecursionError, struct.error)
 _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970: the year 5138
 SAID = "said"  # kind of the event that people were told something
@@ -77,7 +77,7 @@ def _of_others(joints: int, others: int) -> list[tuple[str, str, tuple[int, ...]
 
 
 def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
-    """What explains the ticks of a run, as JSON: the figure, its hands, the show's files, the software.
+    """The metadata for the ticks of a run, as JSON: the figure, its hands, the show's files, the software.
 
     `sensors`: whose readings are noted, in this order. A show that comes with the box has no directory: it
     lies somewhere else on each of them.

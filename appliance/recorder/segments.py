@@ -13,11 +13,11 @@ from appliance.recorder.chunks import count_ticks
 
 SUFFIX = ".segment"
 SEGMENT_TICKS = 3000  # a minute
-LEAST_FREE_BYTES, LEAST_FREE_SHARE = 32 << 20, 0.05  # of the disk, whichever is less: others write there too
+LEAST_FREE_BYTES, LEAST_FREE_SHARE = 32 << 20, 0.05  # bytes or share, whichever is less
 
 
 def segment_paths(folder: Path) -> list[Path]:
-    """All segments of a folder, oldest first; what is no file is none. Raises OSError."""
+    """All segments of a folder, oldest first; other entries are skipped. Raises OSError."""
     found = (path for path in folder.iterdir() if path.name.endswith(SUFFIX) and path.is_file())
     numbered = [(_number(path.name), path) for path in found]
     return [path for _, path in sorted((number, path) for number, path in numbered if number is not None)]

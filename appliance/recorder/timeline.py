@@ -56,7 +56,7 @@ def timeline(number: int, run: Run) -> dict[str, Any]:
 
 
 def words_of(event: dict[str, Any]) -> str:
-    """What was ordered, and what was said about it."""
+    """An order, and the reply to it."""
     asked = event.get("order", {})
     parts = [asked.get("name", ""), asked.get("text", ""), *asked.get("values", ()), event.get("words", "")]
     refused = ["(refused)"] * (event.get("done") is False)

@@ -1,4 +1,4 @@
-"""What this box is, for people: which show dances and which would instead, its release, its addresses."""
+"""This box, described for people: which show dances and which would instead, its release, its addresses."""
 
 from __future__ import annotations
 

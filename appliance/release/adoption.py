@@ -30,7 +30,7 @@ class Places(NamedTuple):
 
     @property
     def moved(self) -> dict[str, str]:
-        """What stands in the built-in box file, and what is to stand there."""
+        """The built-in box file's value, and its replacement."""
         usual = {str(DATA): str(self.data), str(RUN): str(self.run)}
         return {name: place for name, place in usual.items() if name != place}
 
@@ -54,7 +54,7 @@ class Outcome(NamedTuple):
 
 
 def read_choice(data: Path) -> Choice:
-    """What was chosen last, as far as it is still there; nothing (what comes with the box) without it."""
+    """The last choice, as far as it still exists; without one nothing (the built-in show and box file)."""
     choice = Choice.read(data / CHOSEN) or Choice(pairs=())
     pairs = (one.here() for one in choice.pairs if one.id)
     return choice._replace(pairs=tuple(one for one in pairs if one.is_there))
@@ -68,7 +68,7 @@ def chosen_before(places: Places) -> Choice:
 def adopt(places: Places, arrivals: list[Arrival], check: Check, late: bool = False) -> Outcome:
     """Take what is new and sound. The newest arrival counts; the stick goes before the boot partition.
 
-    late: beside a running show, where a check may fail for want of time or memory: what is refused then is
+    late: while a show runs, when a check may fail because time or memory is short: anything refused then is
     checked once more at the next power-on.
     """
     before, seen = chosen_before(places), _read_seen(places.data)
@@ -146,7 +146,7 @@ def _on_shelf(
 
 
 def _combinations(arrival: Arrival) -> Iterator[tuple[bool, bool]]:
-    """Both together; else the show alone, else the box file alone: a broken one does not hold up both."""
+    """Both together; else only the show, else only the box file: a broken one does not hold up both."""
     if arrival.show and arrival.box:
         yield True, True
     if arrival.show:
@@ -161,7 +161,7 @@ def _named(arrival: Arrival, with_show: bool, with_box: bool) -> str:
 
 
 def _as_on_the_stick(words: str, copies: dict[str, str]) -> str:
-    """What people find on their stick, not the copy that was checked."""
+    """The path that people find on their stick, not the copy that was checked."""
     for copy, source in copies.items():
         words = words.replace(copy, source)
     return _printable(words)
@@ -203,7 +203,7 @@ def _is_new(arrival: Arrival, seen: dict[str, Any], lost: set[str]) -> bool:
 
 
 def _lost(data: Path, seen: dict[str, Any]) -> set[str]:
-    """What should still be there and is not. What gave way to something newer is not lost: it stays away."""
+    """Ids of installed bundles that are missing on disk. Bundles pruned for newer ones do not count."""
     kept = Choice.read(data / CHOSEN)
     if kept is None:
         return {one["taken"] for one in seen.values() if one["taken"]}

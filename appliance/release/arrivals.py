@@ -1,4 +1,6 @@
-"""What lies on the stick and on the boot partition: listed in a moment, so that nothing new costs nothing."""
+"""The contents of the stick and the boot partition: listed in a moment, so checking costs nothing when
+nothing is new.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from typing import Any, NamedTuple
 
 SHOW, BOX = "show", "box.yaml"
 _WORDS = {"stick": "the stick", "page": "the page", "rehearsal": "the rehearsal"}
-_MOST_ENTRIES = 4000  # files, folders and all else: a folder may lie in itself on a damaged stick
+_MOST_ENTRIES = 4000  # files, folders and everything else: on a damaged stick a folder may contain itself
 _UNREADABLE = [f"{SHOW}/?", 0, 0]  # it is there, and what reads it says that it cannot be read
 
 
@@ -33,22 +35,22 @@ class Arrival(NamedTuple):
 
     @property
     def parts(self) -> frozenset[str]:
-        """What it brings of a show and a box file."""
+        """The shows and box files that it brings."""
         return frozenset(name.partition("/")[0] for name, *_ in self.listing)
 
     def without(self, parts: frozenset[str]) -> Arrival:
-        """What it brings besides these."""
+        """Its other contents."""
         listing = [one for one in self.listing if one[0].partition("/")[0] not in parts]
         return self._replace(listing=listing)
 
     @property
     def words(self) -> str:
-        """What people call it."""
+        """Its name for people."""
         return _WORDS.get(self.source, "the boot partition")
 
 
 def look(source: str, folder: Path) -> Arrival:
-    """What lies in the folder `bunraku` of a stick or the boot partition; nothing where it cannot be read."""
+    """The contents of the folder `bunraku` of a stick or the boot partition; nothing if it cannot be read."""
     listing: list[list[Any]] = []
     try:
         box = (folder / BOX).lstat()
@@ -66,7 +68,7 @@ def look(source: str, folder: Path) -> Arrival:
 
 
 def _files(show: Path) -> Iterator[list[Any]]:
-    """Regular files alone: a link could lead anywhere, and hidden files are the file manager's."""
+    """Only regular files: a link could lead anywhere, and hidden files are the file manager's."""
     folders = [(show, f"{SHOW}/")] if stat.S_ISDIR(show.lstat().st_mode) else []
     left = _MOST_ENTRIES
     while folders:

@@ -34,12 +34,12 @@ class Pair(NamedTuple):
 
     @property
     def show_id(self) -> str:
-        """Of the show alone."""
+        """Only about the show."""
         return self.id.partition("+")[0]
 
     @property
     def box_id(self) -> str:
-        """Of the box file alone."""
+        """Only about the box file."""
         return self.id.partition("+")[2]
 
     def here(self, box: Path = APPLIANCE_BOX) -> Pair:
@@ -78,7 +78,7 @@ class Choice(NamedTuple):
 
     @property
     def first(self) -> Pair:
-        """What dances."""
+        """The current choice."""
         return self.pairs[0]
 
     @staticmethod
@@ -108,7 +108,7 @@ class Choice(NamedTuple):
         return lists | {"data": str(self.data)}
 
     def write(self, path: Path) -> None:
-        """As a whole or not at all, also when the power is cut; what dances stands at the top as well.
+        """Atomic, even during a power cut; the current choice is also the first entry.
 
         Raises OSError.
         """

@@ -38,7 +38,7 @@ def _is_installed() -> bool:
     except PermissionError:
         from appliance.show.config_error import ConfigError, Problem
 
-        message = "What this box has chosen is closed to this user."
+        message = "The choice of this box is closed to this user."
         cure = "Put sudo before the command, or name another box file: --box."
         raise ConfigError([Problem(choice.RUN, 0, message, cure)]) from None
     except OSError:

@@ -1,4 +1,4 @@
-"""What a rehearsal keeps: a copy of the show with more cues, as a folder for the box's stick."""
+"""Saves a rehearsal: a copy of the show with more cues, as a folder for the box's stick."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def keep_cue(show: Path, folder: Path, cue: Mapping[str, Any]) -> str:
 
 
 def _pack(copy: Path, path: Path) -> None:
-    """As it lies on a stick; the file is there whole or not at all."""
+    """In the layout of a stick; the file is complete or not there at all."""
     part = path.with_suffix(".part")
     with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed:
         for one in sorted(copy.rglob("*")):

@@ -1,4 +1,6 @@
-"""The shelf: shows and box files that were taken over, whole or not at all, in a folder of their own each."""
+"""The shelf: shows and box files that were copied from sticks, complete or not at all, each in a separate
+folder.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +20,12 @@ from appliance.show.bundle import WORKSHOP
 _CHUNK = 1 << 18
 _LARGEST_BYTES = 400_000_000
 _LARGEST_BOX_BYTES = 1_000_000
-_LEFT_FREE_BYTES = 32_000_000  # of the partition, or of memory: the journal and the place need some
+_LEFT_FREE_BYTES = 32_000_000  # on the partition, or in memory: the journal and the place need some
 _PART = ".part"
 
 
 class UnreadableError(Exception):
-    """What lies on the stick cannot be read, or not to its end; the message says which file."""
+    """The stick's contents cannot be read to the end; the message names the file."""
 
 
 class NoRoomError(Exception):
@@ -155,7 +157,7 @@ def _copy(reading: BinaryIO, writing: BinaryIO, digest: Any, source: Path, size:
 
 
 def _remove(found: Path) -> None:
-    """Whatever it is; what cannot be removed stays, and holds up nothing else."""
+    """Removes anything; an entry that cannot be removed stays, and holds up nothing else."""
     with contextlib.suppress(OSError):
         if found.is_dir() and not found.is_symlink():
             shutil.rmtree(found, ignore_errors=True)
@@ -164,7 +166,7 @@ def _remove(found: Path) -> None:
 
 
 def _put(part: Path, place: Path) -> Path:
-    """The copy in its place; one that lies there already gives way, for its disk may have damaged it."""
+    """Moves the copy into place; it replaces an existing one, whose disk may have damaged it."""
     if place.exists():
         before = place.with_name(f"{_PART}-before-{os.getpid()}")
         place.rename(before)
@@ -177,7 +179,7 @@ def _put(part: Path, place: Path) -> Path:
 
 
 def _over(said: Any, built_in: Any) -> Any:
-    """What a venue says, and for keys that it leaves out what is built in."""
+    """The venue's value, or the built-in one for keys that it leaves out."""
     if not (isinstance(said, dict) and isinstance(built_in, dict)):
         return said
     return {**built_in, **{key: _over(value, built_in.get(key)) for key, value in said.items()}}

@@ -30,7 +30,7 @@ class Tries(NamedTuple):
 
 
 def pair_to_dance(chosen: Path, now: float, say: Callable[[str], None]) -> Pair:
-    """What to dance in this start, which is counted; never raises, for something always dances.
+    """The choice to dance in this start, which is counted; never raises, because something always dances.
 
     A new pair has to dance for PROVEN_S within three starts. A proven one may be killed any number of times,
     if a frame came each time.
@@ -124,7 +124,7 @@ class MirroredProof:
 
 
 def _read_tries(folder: Path, pair: Pair, now: float) -> Tries | None:
-    """What became of the starts before this one; None while another process still dances."""
+    """The result of the starts before this one; None while another process still dances."""
     try:
         tries = Tries(*kept_json(folder / TRIES))
     except (OSError, ValueError, TypeError):
@@ -139,7 +139,7 @@ def _read_tries(folder: Path, pair: Pair, now: float) -> Tries | None:
 
 
 def _danced_s(folder: Path, pid: int, now: float) -> float | None:
-    """How long this process danced; None when no frame of its own left it."""
+    """How long this process danced; None if it sent no frame."""
     with contextlib.closing(FrameReader(folder)) as frames:
         newest = frames.newest(now)
         if newest is None or frames.facts is None or frames.facts.pid != pid:
@@ -171,7 +171,7 @@ def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Ch
 
 
 def _publish(chosen: Path, before: Choice, after: Choice, words: str, say: Callable[[str], None]) -> Choice:
-    """What dances from now on, to all processes of the box."""
+    """Publishes the choice that dances from now on to all processes of the box."""
     say(words)
     with contextlib.suppress(OSError):
         after.write(chosen)

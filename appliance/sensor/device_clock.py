@@ -28,7 +28,7 @@ class DeviceClock:
         self._unwrapped_us = 0
         self._arrival = 0.0
         self._points: list[tuple[float, float]] = []  # (sensor time, smallest offset) of each second, seconds
-        self._least = (0.0, 0.0)  # of the second that is still filling
+        self._least = (0.0, 0.0)  # in the second that is still filling
         self._bucket_start: float | None = None
         self._anchor_s = 0.0  # the line: offset = height + slope * (sensor time - anchor)
         self._height = 0.0

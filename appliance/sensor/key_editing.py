@@ -158,7 +158,7 @@ def _places(text: str) -> dict[str, _Place]:
 
 
 def _end(node: yaml.Node) -> int:
-    """Where a value ends; the mark of a block lies behind the comments that follow it."""
+    """The end of a value; the mark of a block comes after the comments that follow it."""
     if isinstance(node, yaml.MappingNode) and not node.flow_style and node.value:
         return _end(node.value[-1][1])
     return int(node.end_mark.index)

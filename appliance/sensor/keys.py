@@ -97,7 +97,7 @@ def parse_keys(path: Path, text: str) -> dict[str, SensorKey]:
 
 
 def create_keys(path: Path, names: Iterable[str]) -> dict[str, SensorKey]:
-    """Write a new key file with a random key for each name, readable by its owner alone.
+    """Write a new key file with a random key for each name, readable only by its owner.
 
     Raises FileExistsError rather than replace a file: provisioned sensors hold its keys.
     """
@@ -128,7 +128,7 @@ def entry(sensor: SensorKey) -> str:
 
 
 def name_fault(name: str) -> str | None:
-    """What is wrong with a new sensor's name, as a clause; None when box and sensor accept it."""
+    """The fault in a new sensor's name, as a clause; None when box and sensor accept it."""
     if not 0 < len(name) <= LONGEST_NAME or not all("!" <= letter <= "~" for letter in name):
         return (
             f"a sensor's name has 1 to {LONGEST_NAME} letters, digits or signs, "

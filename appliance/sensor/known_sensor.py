@@ -12,7 +12,7 @@ from appliance.sensor.state import Orientation, Reception, SensorReading, Sensor
 from appliance.sensor.transports.transport import Route
 
 NORM_TOLERANCE = 0.01  # Q14 rounding gives 6e-5
-CONTESTED_S = 30.0  # two wearables with one key change places each 3 s
+CONTESTED_S = 30.0  # two wearables with one key swap places every 3 s
 
 
 class KnownSensor:
@@ -25,7 +25,7 @@ class KnownSensor:
         self.reception = Reception()
         self.accepted_arrival: float | None = None
         self.refused = 0  # readings without an orientation
-        self.arrivals: list[float] = []  # of the accepted readings of one drain
+        self.arrivals: list[float] = []  # the accepted readings of one drain
         self.strobe_until = -inf
         self._clock = DeviceClock()
         self._orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
@@ -43,7 +43,7 @@ class KnownSensor:
         """The reading, if it holds an orientation, and its fate.
 
         The wearable, which knows when its IMU was read, refuses what no hand can do before it signs. The box
-        checks the length alone: poses are made of it, and a wearable of another maker may have no such gate.
+        checks only the length: poses are made of it, and a wearable of another maker may have no such gate.
         """
         sensor_time_us = self._clock.unwrap(packet.sensor_time_us, arrival)
         measured_at = self._clock.observe(sensor_time_us, arrival)
@@ -115,7 +115,7 @@ class KnownSensor:
             name = self.key.name
             return (
                 f"Two wearables are on with the key of {name} and take its place from each other: its joint "
-                "jumps between them. Switch one of them off, and provision it under a name of its own. "
+                "jumps between them. Switch one of them off, and provision it under another name. "
                 f"Is there only one? Its key was copied: bunraku provision --name {name} gives it another."
             )
         if self.pairing.route(now) is not None:

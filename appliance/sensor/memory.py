@@ -1,4 +1,4 @@
-"""What a box remembers of its sensors, as a record: neutral poses by sensor and joint, calibrations by IMU.
+"""The box's memory of its sensors, as a record: neutral poses by sensor and joint, calibrations by IMU.
 
 The record is text in memory and on the disk, so that people can read, edit and remove the file.
 """
@@ -20,7 +20,7 @@ from appliance.pose.foreign_yaml import plain_values
 from appliance.sensor.neutral import NeutralPose
 
 FILE_NAME = "sensors.memory"
-HEADER = "# What this box remembers of its sensors: neutral poses, and calibrations by the IMU's id.\n"
+HEADER = "# The memory of this box of its sensors: neutral poses, and calibrations by the IMU's id.\n"
 IMU_ID_BYTES = 16
 OFFSETS_BYTES = 22
 LARGEST = 256 * 1024  # bytes
@@ -30,11 +30,11 @@ Worn = tuple[str, str]  # sensor, joint
 
 
 class DamagedMemoryError(ValueError):
-    """The text is none that a box wrote."""
+    """Raises ValueError if no box wrote the text."""
 
 
 def memory_record(state: Path) -> Record:
-    """In memory, for this state folder alone."""
+    """In memory, and valid only for this state folder."""
     return Record(FILE_NAME, "sensors", LARGEST, os.fsencode(state.absolute()))
 
 

@@ -22,7 +22,7 @@ Vector = tuple[float, float, float]
 
 NO_BOOT = -1  # boot_nonce of an assumed pose
 STILL_S = 1.5  # how long a dancer stands still after switching on
-_STILL_COSINE = math.cos(math.radians(3.0) / 2)  # of half the angle, as in a product of quaternions
+_STILL_COSINE = math.cos(math.radians(3.0) / 2)  # cosine of half the angle, as in a product of quaternions
 _GAP_S = 0.25  # after a longer silence stillness starts again
 _LEVEL = math.sin(math.radians(15.0))  # an axis nearer to the vertical has no usable heading
 _ARROW, _LID = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)  # axes of the case: along its arrow, out of its lid
@@ -147,8 +147,8 @@ def joint_from_reading(pose: NeutralPose, mounting: Mounting) -> NDArray[np.floa
 def turned(before: Quaternion, after: Quaternion) -> float | None:
     """Difference in heading between two readings in sensor axes, radians in -pi..pi.
 
-    Turning `after` back by it about the vertical brings it as near to `before` as possible; tilt alone counts
-    as none. None when one is upside down against the other: the heading is then undefined.
+    Turning `after` back by it about the vertical brings it as near to `before` as possible; tilt counts as
+    zero. None when one is upside down against the other: the heading is then undefined.
     """
     w, _, _, z = quaternion.multiply(np.array(after), quaternion.inverse(np.array(before)))
     if math.hypot(w, z) < _LEVEL:

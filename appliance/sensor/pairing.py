@@ -53,7 +53,7 @@ class Pairing:
         self.hand = hand
         self.session: Session | None = None
         self.greeted_at = -inf
-        self.contested_at = -inf  # an ended power-on came back: one sensor alone cannot do that
+        self.contested_at = -inf  # an ended power-on came back: a single sensor cannot do that
         self._device_id = key.device_id
         self._secret = secret
         self._phase_s = phase_s
@@ -146,7 +146,7 @@ class Pairing:
     def due_packets(
         self, now: float, led: int, profiles: Mapping[bytes, bytes]
     ) -> Iterator[tuple[Route, wire.Packet]]:
-        """What is to be sent now, and where to: assignments, calls, a heartbeat, a calibration."""
+        """The packets to send now, and where to: assignments, calls, a heartbeat, a calibration."""
         for boot_nonce, (hello, route) in self._unanswered.take_due(now):
             head = self._head(wire.Assignment, boot_nonce, self._number_for(boot_nonce))
             yield route, wire.Assignment(*head, hello.sequence, self.hand, RATE_HZ, led)

@@ -62,7 +62,7 @@ FLAGS = (
 
 @dataclass(slots=True)
 class Packet:
-    """What every packet carries behind magic, version and kind."""
+    """The fields of every packet after magic, version and kind."""
 
     device_id: Annotated[int, U32, "which sensor, as in the key file"]
     boot_nonce: Annotated[int, U32, "random, drawn by the sensor at each power-on"]
@@ -275,7 +275,7 @@ def unpack(data: Buffer, tagger_of: Callable[[int], Tagger | None]) -> Packet:
 
 
 def declaration() -> str:
-    """What both sides must agree on, as text: order, names, types, scales, kinds, tag."""
+    """The wire format on which both sides must agree, as text: order, names, types, scales, kinds, tag."""
     lines = [f"magic={MAGIC:#06x} version={VERSION} tag=blake2s-{TAG_BYTES} key={KEY_BYTES}"]
     for layout in LAYOUTS.values():
         lines.append(f"{layout.kind} {layout.name} {layout.direction} {layout.size}")

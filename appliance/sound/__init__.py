@@ -1,1 +1,1 @@
-"""Sound, a process of its own: the shared frame in, strings that the dance plays out."""
+"""The sound process: the shared frame in, strings that the dance plays out."""

@@ -107,7 +107,8 @@ class Sound:
 
     def render(self, frames: int, show_state: ShowState) -> NDArray[np.float32]:
         """The next samples (frames, channels): for the card's thread, which is late for nothing else. It also
-        sees to panic and blackout, read with a reader of its own: `look` may wait for a processor."""
+        handles panic and blackout, with a separate reader: `look` may wait for a processor.
+        """
         instrument = self.instrument
         if instrument is None:
             return np.zeros((frames, self._config.channels), np.float32)

@@ -14,7 +14,7 @@ from appliance.show.string_pitches import decays, string_pitches
 Samples = NDArray[np.floating[Any]]
 
 STEP = BOWED_SAMPLES
-_HIGHEST = 0.45  # of the sample rate
+_HIGHEST = 0.45  # fraction of the sample rate
 
 
 class Strings:

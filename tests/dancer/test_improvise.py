@@ -120,5 +120,5 @@ def test_a_prompt_of_another_network_is_refused(made: Improvisations) -> None:
             made.maker.make(recipe | {"prompt": wrong})
     nothing = unpacked_steps(recipe["prompt"], made.network.latent + 4).astype("<f2")
     nothing[0, 0] = np.nan
-    with pytest.raises(ValueError, match="numbers that are none"):
+    with pytest.raises(ValueError, match="numbers that are not finite"):
         made.maker.make(recipe | {"prompt": base64.b64encode(nothing.tobytes()).decode()})

@@ -1,6 +1,6 @@
 """Cyclic motion: a loop as windows that go round and round, and windows blended back into one cycle.
 
-What is decoded of such windows joins its own start by itself: nothing has to be bent there.
+Motion decoded from such windows joins its own start: nothing has to be bent there.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ class Cycle:
         return quaternion.continuous(found, axis=1).astype(np.float32, copy=False)
 
     def blended(self, parts: Iterable[tuple[Poses, Starts]], places: list[int]) -> Poses:
-        """Windows (W, T, M, 4) that stand at these starts, part after part, longer quaternions being more
-        certain -> the cycle's poses (P, J, 4); other joints stay.
+        """Windows (W, T, M, 4) at these starts, part after part, longer quaternions being more certain -> the
+        cycle's poses (P, J, 4); other joints stay.
         """
         mean = HannMean(len(self.poses), len(places))
         for windows, starts in parts:

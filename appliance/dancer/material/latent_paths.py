@@ -13,7 +13,7 @@ Latents = NDArray[np.float32]
 
 
 def sampled(windows: int, latent: int, spread: float, seed: int) -> Latents:
-    """The paper's way: every window is a sample of its own; how smooth it gets is left to the blending."""
+    """The paper's way: every window is an independent sample; blending decides how smooth it gets."""
     chance = np.random.default_rng(seed)
     return (spread * chance.standard_normal((windows, latent))).astype(np.float32)
 

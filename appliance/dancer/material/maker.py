@@ -32,7 +32,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MAIN, PATH, VARY
 
-GRANULAR_S, POINT_S = 20.0, 12.0  # of a walk; of a point or a stroke of the map, there and back
+GRANULAR_S, POINT_S = 20.0, 12.0  # seconds of a walk; of a point or a stroke of the map, there and back
 _FEWEST, _FADE = 50, 25  # frames of an excerpt, and of the fade from its end to its start
 Recipe = Mapping[str, Any]
 
@@ -125,7 +125,7 @@ class Maker:
         return cycle, cycle.blended(_decoded(network, moved, starts, facing), network.places)
 
     def _improvised(self, network: ImproviserNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
-        """What the dancer goes on with after the recipe's prompt; its end leads into its start."""
+        """The motion with which the dancer continues the recipe's prompt; its end leads into its start."""
         heard = unpacked_steps(recipe["prompt"], network.features)
         moves = math.ceil(recipe["seconds"] * FPS / HOP / MOVE)
         danced = improvised(network, heard[None], moves, recipe["temperature"], recipe["seed"])[0]

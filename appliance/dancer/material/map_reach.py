@@ -10,7 +10,7 @@ import numpy as np
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 
-DEAD = 0.5  # of what two poses of the dancer usually differ by: less, and nothing happens on the map
+DEAD = 0.5  # fraction of the usual difference between two poses; less counts as no movement
 COMPARED = 500  # poses
 
 
@@ -25,7 +25,9 @@ class MapReach:
 
     @staticmethod
     def of(low: Array, high: Array, poses_at: Callable[[Array], Array], danced: Array) -> MapReach:
-        """Of a map from low to high (2,); poses_at: points (N, 2) -> poses (N, M, 4); danced (T, M, 4)."""
+        """Bounds of a map from low to high (2,); poses_at: points (N, 2) -> poses (N, M, 4); danced (T, M,
+        4).
+        """
         corners = np.array([low, high, (low[0], high[1]), (high[0], low[1])])
         one, other, third, fourth = quaternion.normalize(poses_at(corners).astype(np.float64))
         some = danced[:: max(1, len(danced) // COMPARED)]

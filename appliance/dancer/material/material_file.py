@@ -95,6 +95,6 @@ def _require_possible(poses: FloatArray, track: FloatArray, step: tuple[float, .
     """Raises ValueError for numbers that nobody danced; one pass over each array, because a tick waits."""
     flat = poses.reshape(-1)
     if not abs(4 * float(flat.dot(flat)) / flat.size - 1.0) < _UNIT:
-        raise ValueError("its poses are none")
+        raise ValueError("its poses are invalid")
     if not (np.abs(track[:, :4]).max() <= FARTHEST_ON_STAGE_M and max(map(abs, step)) <= FARTHEST_ON_STAGE_M):
-        raise ValueError("its places are none")
+        raise ValueError("its places are invalid")

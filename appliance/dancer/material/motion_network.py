@@ -29,9 +29,9 @@ class MotionNetworkError(ValueError):
 class MotionNetwork:
     """A network's encoder and decoder, on one thread.
 
-    window: poses of a window, 1 for a network of single poses; joints: those that it moves; places: where
-    these stand in the skeleton; latent: numbers of a latent, standard Gaussian in the prior. ground: of a
-    network of poses, where the map's 0 to 1 lies: its middle (Z,), directions (2, Z), low and high (2,).
+    window: poses of a window, 1 for a network of single poses; joints: those that it moves; places: their
+    indices in the skeleton; latent: numbers of a latent, standard Gaussian in the prior. ground: for a
+    network of poses, the map's 0 to 1: its middle (Z,), directions (2, Z), low and high (2,).
     """
 
     kind = "motion"
@@ -95,7 +95,7 @@ class MotionNetwork:
         return [slice(first, first + most) for first in range(0, windows, most)]
 
     def _take_facts(self, facts: Mapping[str, str]) -> None:
-        """What a file of this kind says besides. Raises ValueError, LookupError."""
+        """Further metadata of a file of this kind. Raises ValueError, LookupError."""
 
     def _run(self, outputs: list[str], **inputs: NDArray[np.float32]) -> list[NDArray[np.float32]]:
         found: list[NDArray[np.float32]] = self._session.run(outputs, {**self._idle, **inputs})

@@ -23,10 +23,10 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
 STEPS = BEFORE + 2 * MOVE
-FRAMES = HOP * STEPS + WINDOW  # of a loop: its first window only says where the first step comes from
+FRAMES = HOP * STEPS + WINDOW  # for a loop, whose first window only shows the direction of the first step
 CLOSING = HOP * (STEPS - 1) - SHARED  # frames in which it comes round, if nothing is there to go on with
 BEGINS = HOP + MIDDLE + CLOSING  # the prompt's frame with which the improvisation begins
-_LAST_PART = 0.8  # the frame with which an improvisation ends lies behind this share of it
+_LAST_PART = 0.8  # fraction of an improvisation after which its closing frame is chosen
 
 
 def prompt_of(loop: Loop, frame: float, skeleton: Skeleton, coder: Coder, places: list[int]) -> str:
@@ -71,7 +71,7 @@ def unpacked_steps(text: str, features: int) -> Numbers:
     except (binascii.Error, ValueError):
         raise ValueError("the prompt is not of this network") from None
     if not np.isfinite(steps).all():
-        raise ValueError("the prompt holds numbers that are none")
+        raise ValueError("the prompt holds numbers that are not finite")
     return steps
 
 

@@ -117,7 +117,7 @@ def motion_of(coder: Coder, steps: Steps, still_pose: Array, moving: Sequence[in
 
 def danced_again(coder: Coder, poses: Array, moving: Sequence[int], cyclic: bool = False) -> Array:
     """Poses (N, J, 4) seen through the autoencoder at every frame: each the Hann-weighted mean of the 8
-    windows that know it. What no dancer does (a tremble where two steps meet) does not come through.
+    windows that know it. It suppresses tremors where two steps meet, which no dancer does.
 
     cyclic: the last frame leads into the first; otherwise the ends are known by fewer windows.
     """

@@ -60,7 +60,7 @@ class AdapterWire:
 
     @property
     def trouble(self) -> str | None:
-        """What happened, what the audience sees, what to do."""
+        """Says what happened, what the audience sees, what to do."""
         if self.is_open or not self.last_error:
             return None
         return (

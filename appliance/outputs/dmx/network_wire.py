@@ -1,4 +1,4 @@
-"""What Art-Net and sACN share: one universe in one datagram."""
+"""Shared by Art-Net and sACN: one universe in one datagram."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class NetworkWire(DatagramSender):
 
     @property
     def trouble(self) -> str | None:
-        """What happened, what the audience sees, what to do."""
+        """Says what happened, what the audience sees, what to do."""
         if self.is_open or not self.last_error:
             return None
         return f"{self.name}: {self.last_error}. Its lights do not follow; the show goes on. {self._cure}"

@@ -6,7 +6,7 @@ from appliance.outputs.dmx.wire import Wire
 from appliance.show.dmx import SLOTS, DmxConfig
 
 KEEP_ALIVE_S = 0.85  # E1.31 section 6.6.2: 0.8 to 1.0 s, as Art-Net 4 by now; before: 4 s at the latest
-EARLY = 0.75  # of a period
+EARLY = 0.75  # fraction of a period
 REPEATS = 3  # E1.31 section 6.6.2: repeats after the last change, before keep-alives
 
 

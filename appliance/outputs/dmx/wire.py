@@ -1,4 +1,4 @@
-"""What carries one universe to the lights: Art-Net, sACN or an adapter on a USB cable."""
+"""A wire carries one universe to the lights: Art-Net, sACN or an adapter on a USB cable."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Protocol
 class Wire(Protocol):
     """Carries one universe. Never waits for a light, never raises.
 
-    What cannot leave at once is dropped and counted: the next universe is 25 ms away. A wire that failed is
+    Data that cannot be sent at once is dropped and counted: the next universe is 25 ms away. A wire that
+    failed is
     opened again, after 0.1 s at first, then up to every 2 s.
     """
 
@@ -20,11 +21,11 @@ class Wire(Protocol):
 
     @property
     def trouble(self) -> str | None:
-        """What happened, what the audience sees, what to do; None while all is well."""
+        """Says what happened, what the audience sees, what to do; None while all is well."""
 
     @property
     def remark(self) -> str:
-        """What else is worth a word while the wire works; "" for nothing."""
+        """A further remark while the wire works; "" for none."""
 
     def send_universe(self, levels: bytes | bytearray, now: float) -> None:
         """Send one universe, 512 levels; `now` in monotonic seconds. The levels are copied."""

@@ -22,7 +22,7 @@ class Encoder(Protocol):
         ...
 
 
-# Of a skeleton and a receiver: what it gets of the puppet with this number in its addresses.
+# From a skeleton and a receiver: the dialect for the puppet with this number in its addresses.
 DIALECTS: dict[str, Callable[[Skeleton, OscConfig, int], Encoder]] = {
     "ai-toolbox": lambda skeleton, config, _: AiToolbox(skeleton, config),
     "features": lambda skeleton, config, _: Features(skeleton, config),

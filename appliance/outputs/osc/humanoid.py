@@ -18,7 +18,7 @@ _PHALANXES = {0: "Proximal", 1: "Proximal", 2: "Intermediate", 3: "Distal"}
 def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
     """Unity bone name -> index of the joint that moves it; the first joint wins, unknown ones are left out.
 
-    Of a trunk of several joints the first is the spine, the second the chest, the last the upper chest. A
+    In a trunk of several joints the first is the spine, the second the chest, the last the upper chest. A
     skeleton without a known hip gives its root to Hips: without Hips nothing moves.
     """
     roles, places = roles_of(joints), places_of(joints)

@@ -83,5 +83,5 @@ def bundles(messages: Sequence[Message]) -> Template:
 
 
 def single(messages: Sequence[Message]) -> Template:
-    """Each message as a datagram of its own."""
+    """Each message as a separate datagram."""
     return Template([[item] for item in messages], bundled=False)

@@ -62,6 +62,6 @@ def ports_sentence(ports: list[FoundPort]) -> str:
     if not ports:
         return (
             "This machine has no serial port at all. Plug the wearable in with a USB cable that carries data "
-            "(many carry power alone) and switch it on."
+            "(many only carry power) and switch it on."
         )
     return f"Serial ports here: {', '.join(map(str, ports))}. Say which one with --port."

@@ -167,8 +167,8 @@ class WearableConsole:
 class TextOnCable:
     """Finds the console's lines among packets, in a stream that begins anywhere.
 
-    A packet stands between zero bytes. What stands there and begins like an answer is text: a packet begins
-    with the distance to its first zero, which is less than any letter's code.
+    A packet is enclosed in zero bytes. If its content begins like an answer it is text: a packet begins with
+    the distance to its first zero, which is less than any letter's code.
     """
 
     def __init__(self) -> None:

@@ -25,7 +25,7 @@ CLOSE_S = 1.0  # a driver may never return from opening, configuring or closing 
 
 
 class SerialIntake:
-    """Reads and writes one serial device in a thread of its own: opening a port can take longer than a tick.
+    """Reads and writes one serial device in a separate thread: opening a port can take longer than a tick.
 
     The thread sleeps in the kernel between packets, and so notes their true arrivals.
     """

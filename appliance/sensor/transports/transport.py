@@ -1,4 +1,4 @@
-"""What network and cables have in common: packets come in, answers go out."""
+"""The common interface of network and cables: packets come in, answers go out."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from appliance.sensor import wire
 
 LONGEST_STOP_S = 5.0  # after a longer standstill the box does not catch up
 
-Origin: TypeAlias = tuple[Any, ...]  # of a packet: (host, port) of a datagram, (device,) of a cable
+Origin: TypeAlias = tuple[Any, ...]  # origin of a packet: (host, port) of a datagram, (device,) of a cable
 
 
 class Intake(Protocol):
@@ -30,7 +30,7 @@ class Intake(Protocol):
     def send_packet(self, packet: bytes, origin: Origin) -> None: ...
 
     def reserve_sockets(self, origins: Collection[Origin]) -> None:
-        """Give these origins sockets of their own, which a flood from others cannot fill."""
+        """Give each of these origins a separate socket, which a flood from others cannot fill."""
         ...
 
     def describe(self, origin: Origin) -> str: ...

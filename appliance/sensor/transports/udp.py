@@ -35,7 +35,7 @@ class PortError(OSError):
 class UdpIntake:
     """Listens on `host`:`port` (0: any free port, see `address`). Raises PortError when it cannot.
 
-    A common socket receives from every address. A linked sensor has a socket of its own, on the same port and
+    A common socket receives from every address. A linked sensor has a separate socket, on the same port and
     connected to its address: the kernel puts its datagrams there, so a flood fills only the common one.
     """
 
@@ -60,7 +60,7 @@ class UdpIntake:
         self.name = f"{self._bound[0]}:{self._bound[1]}"
         self._own: dict[Origin, socket.socket] = {}
         self._left: list[socket.socket] = []  # drained once more, then closed
-        self._astray: set[Origin] = set()  # have a socket of their own, but came in on the common one
+        self._astray: set[Origin] = set()  # have a separate socket, but came in on the common one
         self._buffer = bytearray(2 * wire.LARGEST)  # longer datagrams are cut and have the wrong length
         self._view = memoryview(self._buffer)
         self._buffers = [self._buffer]
@@ -98,14 +98,16 @@ class UdpIntake:
             yield received
 
     def send_packet(self, packet: bytes, origin: Origin) -> None:
-        """Send one datagram from the listening port. What cannot leave at once is dropped and counted."""
+        """Send one datagram from the listening port. Datagrams that cannot be sent at once are dropped and
+        counted.
+        """
         try:
             self._socket.sendto(packet, origin)
         except OSError:
             self.counts["send_error"] += 1
 
     def reserve_sockets(self, origins: Collection[Origin]) -> None:
-        """Give exactly these senders a socket of their own."""
+        """Give each of exactly these senders a separate socket."""
         if sys.platform != "linux":
             return
         for origin in [one for one in self._own if one not in origins or one in self._astray]:
