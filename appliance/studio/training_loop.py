@@ -105,17 +105,17 @@ class TrainingLoop(ABC, Generic[Report]):
         The leading process's clock and stop() count for all; only that process is told to report and save.
         """
         agreed, leads = self.processes.agreed, self.processes.leads
-        sums: dict[str, float] = {}
+        sums: dict[str, Tensor] = {}  # added up where they are computed: no step waits for a GPU
         counted = 0
         began, offset = time.monotonic(), self.seconds
         last_report = last_save = self.seconds
         while self.fraction < 1.0 and not agreed(stop()):
             for name, value in self.train_step().items():
-                sums[name] = sums.get(name, 0.0) + float(value)
+                sums[name] = value.double() + sums.get(name, 0.0)
             counted += 1
             now = self.seconds = agreed(offset + time.monotonic() - began)
             if now - last_report >= report_every_s or self.fraction >= 1.0:
-                means = self.processes.mean(torch.tensor(list(sums.values()), dtype=torch.float64)) / counted
+                means = self.processes.mean(torch.stack(list(sums.values())).cpu()) / counted
                 line = self.report(dict(zip(sums, means.tolist(), strict=True)))
                 self.history.append(line)
                 if leads:

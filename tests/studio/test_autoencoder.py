@@ -10,7 +10,7 @@ from torch import Tensor
 from appliance.studio.autoencoder import losses, rotation
 from appliance.studio.autoencoder.architectures import NETWORKS
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.autoencoder.coupled import CALM, Coupled, matrix_of_products
+from appliance.studio.autoencoder.coupled import BODY, CALM, Coupled, matrix_of_products
 from appliance.studio.autoencoder.held_joints import HeldJoints
 from tests.studio.tiny import moving, swaying, untrained
 
@@ -86,9 +86,10 @@ def test_each_window_of_a_batch_may_have_targets_and_weights_of_its_own() -> Non
 def coupled_pull(autoencoder: Autoencoder, goal: Tensor, held: Tensor, **changed: Tensor) -> Tensor:
     network, windows = autoencoder.network, some_windows()
     assert isinstance(network, Coupled)
-    latents, whole = autoencoder.encode(windows), torch.ones(len(windows))
-    given = {"liveliness": whole, "noise": torch.zeros_like(latents), **changed}
-    return network.pull(latents, windows, goal, held, **given)
+    meant = torch.where(held[:, None, :, None] > 0, goal, windows)
+    latents, whole = (autoencoder.encode(windows), autoencoder.encode(meant)), torch.ones(len(windows))
+    given = {"liveliness": whole, "noise": torch.zeros_like(latents[0]), **changed}
+    return network.pull(latents, windows, meant, held, **given)
 
 
 def holding(autoencoder: Autoencoder, joint: int = 3) -> Tensor:
@@ -100,13 +101,26 @@ def holding(autoencoder: Autoencoder, joint: int = 3) -> Tensor:
 def test_a_coupled_network_sees_rotations_not_quaternions() -> None:
     """A target and its negative are the same rotation: a hand that passes half a turn makes no jump."""
     autoencoder, goal = untrained("coupled"), some_windows().roll(1, 0)
-    held = holding(autoencoder)
-    pull = coupled_pull(autoencoder, goal, held)
-    assert pull.abs().max() > 1e-3
-    torch.testing.assert_close(coupled_pull(autoencoder, -goal, held), pull)
+    held, latents, network = holding(autoencoder), autoencoder.encode(some_windows()), autoencoder.network
+    assert isinstance(network, Coupled)
+    there = network.hands(latents, goal, held)
+    assert (there - network.hands(latents, some_windows(), held)).abs().max() > 1e-3
+    torch.testing.assert_close(network.hands(latents, -goal, held), there)
     elsewhere = goal.clone()
     elsewhere[:, :, 5] = goal[:, :, 4]  # where joints that nothing holds are wanted does not matter
-    torch.testing.assert_close(coupled_pull(autoencoder, elsewhere, held), pull)
+    torch.testing.assert_close(network.hands(latents, elsewhere, held), there)
+
+
+def test_a_pull_takes_more_of_the_body_and_no_more_of_the_held_joint() -> None:
+    autoencoder, windows = untrained("coupled"), some_windows()
+    held, goal = holding(autoencoder), windows.roll(1, 0)
+    network, latents = autoencoder.network, autoencoder.encode(windows)
+    assert isinstance(network, Coupled)
+    pasted = torch.where(held[:, None, :, None] > 0, goal, windows)
+    copied = autoencoder.encode(pasted) - latents
+    learned = network.hands(latents, goal, held) - network.hands(latents, windows, held)
+    beyond = coupled_pull(autoencoder, goal, held) - copied
+    torch.testing.assert_close(beyond, (1 + BODY) * (learned - copied), atol=1e-5, rtol=0)
 
 
 def test_a_hand_where_the_phrase_has_its_joint_pulls_nothing() -> None:

@@ -12,7 +12,7 @@ from torch import Tensor
 from appliance.dancer.extrapolation import Extrapolation
 from appliance.pose import quaternion
 from appliance.studio.autoencoder import motion_critic, rotation
-from appliance.studio.autoencoder.motion_critic import HOP, WINDOWS, MotionCritic, Sequences
+from appliance.studio.autoencoder.motion_critic import HOP, WINDOWS, MotionCritic, Sequences, extrapolated
 from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.evaluation.in_play import blended
 
@@ -41,13 +41,12 @@ def test_a_sequence_is_what_was_recorded_one_window_every_second_tick(sequences:
 
 
 def test_targets_are_what_the_box_makes_of_the_joints_as_hands(dancer: Dataset) -> None:
-    sequences = Sequences(dancer, 8, CPU)
     take = quaternion.continuous(dancer.training[0].recording.poses[:, dancer.moving]).astype(np.float32)
     extrapolation = Extrapolation(take.shape[1], 8)
     out = np.empty((8, take.shape[1], 4), dtype=np.float32)
     for tick, pose in enumerate(take[:31]):
         extrapolation(pose, np.full((len(pose), 1), tick == 0), out)
-    found = sequences._extrapolated(np.array([[30]]))[0, 0]
+    found = extrapolated(take, 8)[30]
     assert np.degrees(quaternion.angle_between(found, out)).max() < 0.05
 
 

@@ -99,7 +99,7 @@ def test_the_seed_alone_decides(dancer: Dataset, tmp_path: Path) -> None:
     assert same(weights[0], weights[1]) and not same(weights[0], weights[2])
 
 
-@pytest.mark.parametrize(("network", "steps"), [("mlp", 200), ("coupled", 300)])
+@pytest.mark.parametrize(("network", "steps"), [("mlp", 200), ("coupled", 400)])
 def test_training_reduces_the_error(dancer: Dataset, tmp_path: Path, network: str, steps: int) -> None:
     training = Training(dancer, replace(TINY, network=network, steps=steps, width=64))
     training.held_windows = training.train_windows  # the tiny takes have nothing in common to generalise

@@ -88,7 +88,8 @@ class Autoencoder(nn.Module):
             meant = slerp_towards(start, goal, whole[:, None, :, None])
             lively = x.new_full((len(x),), liveliness)
             drawn = latents if noise is None else noise.expand_as(latents)
-            pull = coupled.pull(self.encode(start), start, meant, (held > 0).float(), lively, drawn)
+            plain, pasted = self.encode(torch.cat([start, meant])).chunk(2)
+            pull = coupled.pull((plain, pasted), start, meant, (held > 0).float(), lively, drawn)
         if placed is not None:
             places = placed.places.expand(len(x), -1, -1)
             place_weights = placed.weights.expand(len(x), -1)

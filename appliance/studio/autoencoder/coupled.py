@@ -8,6 +8,9 @@ the residual, stays. So the answer keeps the dance's spread and energy whatever 
 that holds a joint where the phrase has it changes nothing. A network that learns the answer itself by
 distance gives the mean of all good ones instead, and the mean stands still (docs/results.md).
 
+The hand encoder learns two thirds of what a hand changes, so its differences are too short. What putting the
+held joint into the window does to the latent is known exactly; the rest, the body's share, counts more.
+
 A hand may also want a joint at a place. The place encoder gives the mean latent while joints are at given
 places, and each interaction adds a difference again: where the joint comes to lie depends on the whole chain
 above it, so what is missing is looked at anew (once for all passes left a hand 10 cm off; anew, 2 cm).
@@ -28,6 +31,8 @@ PLACE_WIDTH = 192
 LONGEST_STEP = 0.5  # metres that one interaction asks of a joint at most
 SMALLEST_SPREAD = 0.02  # metres; of the places of a joint that hardly moves
 CALM = 0.6  # share of the residual that liveliness 0 keeps: as calm as the answers of release 0.1
+BODY = 1.2  # of the body's share of a difference vector, added to it: what the hand encoder leaves out
+LEARNED_BODY = 0.6  # the same in training: the critic works against the whole of it (docs/results.md)
 NOISE = 0.25  # of a latent's standard deviation, at liveliness 1
 
 # A rotation matrix, row by row, from the products of a quaternion's components (w, x, y, z) x (w, x, y, z).
@@ -158,18 +163,36 @@ class Coupled(Mlp):
             last.weight /= deviation[:, None]
             last.bias.sub_(mean).div_(deviation)
 
-    def pull(
-        self, latent: Tensor, start: Tensor, goal: Tensor, held: Tensor, liveliness: Tensor, noise: Tensor
-    ) -> Tensor:
-        """(B, Z): what all interactions together add to latents (B, Z) of windows start (B, T, M, 4).
-
-        goal (B, T, M, 4): where the hands want the joints that are held (B, M), 0 or 1; liveliness (B): the
-        share of the residual that stays grows with it from CALM to 1; noise (B, Z).
+    def difference(self, latent: Tensor, start: Tensor, goal: Tensor, held: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, Z) each: the mean latents near latents (B, Z) with the joints that are held (B, M), 0 or 1, as
+        in windows goal (B, T, M, 4), and as in windows start.
         """
-        there, here = self.hands(latent, goal, held), self.hands(latent, start, held)
+        return self.hands(latent, goal, held), self.hands(latent, start, held)
+
+    def pull(
+        self,
+        latents: tuple[Tensor, Tensor],
+        start: Tensor,
+        goal: Tensor,
+        held: Tensor,
+        liveliness: Tensor,
+        noise: Tensor,
+        more_of_the_body: float = BODY,
+    ) -> Tensor:
+        """(B, Z): what all interactions together add to the latents of windows start (B, T, M, 4).
+
+        goal (B, T, M, 4): start with the joints that are held (B, M), 0 or 1, where the hands want them;
+        latents (B, Z): of start and of goal; liveliness (B): the share of the residual that stays grows with
+        it from CALM to 1; noise (B, Z).
+        """
+        latent, pasted = latents
+        there, here = self.difference(latent, start, goal, held)
+        way = there - here
+        body = way - (pasted - latent)
         lively = liveliness[:, None]
         residual = (1 - CALM) * (lively - 1) * (latent - here)
-        pull: Tensor = held.amax(dim=1, keepdim=True) * (there - here + residual + NOISE * lively * noise)
+        whole = way + more_of_the_body * body + residual + NOISE * lively * noise
+        pull: Tensor = held.amax(dim=1, keepdim=True) * whole
         return pull
 
     def step_to_places(self, windows: Tensor, places: Tensor, weights: Tensor) -> Tensor:

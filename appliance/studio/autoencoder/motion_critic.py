@@ -19,6 +19,7 @@ from torch.nn import functional
 from appliance.dancer.blending import weights
 from appliance.dancer.extrapolation import SPAN, Extrapolation
 from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.answers import held_weights
 from appliance.studio.autoencoder.coupled import matrix_of_products
@@ -32,6 +33,7 @@ _MOST = 8.0
 _FEWEST_SHARE, _MOST_SHARE = 0.2, 0.35  # of the batches: with 2 passes, with the most
 _WANDERING = ("pool", "age", "end")
 _POOL, _WANDER = 64, 100  # sequences that are coded over and over, and passes at most
+_CARRIED = 4096  # ticks extrapolated at a time
 _HAND = 6.0  # of a difference of rotation matrices between joint and hand
 
 
@@ -70,8 +72,7 @@ class Sequences:
     """Sequences of a dataset's training takes, as they were recorded."""
 
     def __init__(self, dataset: Dataset, window: int, device: torch.device) -> None:
-        """Keeps the poses; windows and targets are gathered when a batch is drawn."""
-        self._window, self._device = window, device
+        """Keeps the poses, and the targets of every tick; windows are gathered when a batch is drawn."""
         span = 2 * SPAN + (WINDOWS - 1) * HOP + window
         poses, starts, offset = [], [], 0
         for take in dataset.training:
@@ -81,9 +82,13 @@ class Sequences:
                 starts.append(offset + np.flatnonzero(sound) + 2 * SPAN)
             poses.append(moving)
             offset += len(moving)
-        self._poses = np.concatenate(poses)
-        self._starts = np.concatenate(starts) if starts else np.zeros(0, dtype=np.intp)
-        shape = (_POOL, WINDOWS, window, *self._poses.shape[1:])
+        all_poses = np.concatenate(poses)
+        self._poses = torch.from_numpy(all_poses).to(device)
+        self._targets = torch.from_numpy(extrapolated(all_poses, window)).to(device)
+        self._starts = torch.from_numpy(np.concatenate(starts) if starts else np.zeros(0, np.intp)).to(device)
+        self._ticks = HOP * torch.arange(WINDOWS, device=device)
+        self._within = torch.arange(window, device=device)
+        shape = (_POOL, WINDOWS, window, *all_poses.shape[1:])
         self._pool = torch.zeros(shape, device=device)
         self._age, self._end = (torch.zeros(_POOL, device=device) for _ in range(2))
 
@@ -92,18 +97,17 @@ class Sequences:
 
     def draw(self, count: int) -> Sequence:
         """A random batch."""
-        rows = self._starts[torch.randint(len(self._starts), (count,)).numpy()]
-        ticks = rows[:, None] + HOP * np.arange(WINDOWS)
-        windows = self._poses[ticks[..., None] + np.arange(self._window)]
-        return Sequence(self._tensor(windows), self._tensor(self._extrapolated(ticks)))
+        chosen = torch.randint(len(self._starts), (count,)).to(self._starts.device)
+        ticks = self._starts[chosen, None] + self._ticks
+        return Sequence(self._poses[ticks[..., None] + self._within], self._targets[ticks])
 
     def wandering(self, count: int) -> Wandering:
         """Some of the sequences that are coded over and over; those that wandered enough begin anew."""
         ended = (self._age >= self._end).nonzero()[:, 0]
         self._pool[ended] = self.draw(len(ended)).windows
         self._age[ended] = 0
-        self._end[ended] = _WANDER * torch.rand(len(ended), device=self._device).square() + 1
-        rows = torch.randperm(_POOL)[:count].to(self._device)
+        self._end[ended] = _WANDER * torch.rand(len(ended), device=self._end.device).square() + 1
+        rows = torch.randperm(_POOL)[:count].to(self._pool.device)
         return Wandering(self._pool[rows], self._pool, self._age, rows)
 
     def state(self) -> dict[str, Tensor]:
@@ -115,20 +119,23 @@ class Sequences:
         for name in _WANDERING:
             getattr(self, f"_{name}").copy_(state[name])
 
-    def _extrapolated(self, ticks: np.ndarray) -> np.ndarray:
-        """(B, W, T, M, 4): each joint carried on from what it did up to each tick, as the box does it."""
-        joints = self._poses.shape[1]
-        count = ticks.size * joints
-        extrapolation = Extrapolation(count, self._window)
-        out = np.empty((self._window, count, 4), dtype=np.float32)
-        for back in range(2 * SPAN, -1, -1):
-            is_new = np.full((count, 1), back == 2 * SPAN)
-            extrapolation(self._poses[ticks - back].reshape(-1, 4), is_new, out)
-        by_window = out.reshape(self._window, *ticks.shape, joints, 4)
-        return np.moveaxis(by_window, 0, 2)
 
-    def _tensor(self, values: np.ndarray) -> Tensor:
-        return torch.from_numpy(np.ascontiguousarray(values)).to(self._device)
+def extrapolated(poses: Array, window: int) -> Array:
+    """(N, window, M, 4): at each tick of poses (N, M, 4), each joint carried on from what it did until then,
+    as the box does it; zero where too little is known.
+    """
+    count, joints = len(poses), poses.shape[1]
+    targets = np.zeros((count, window, joints, 4), dtype=np.float32)
+    for begin in range(2 * SPAN, count, _CARRIED):
+        ticks = np.arange(begin, min(begin + _CARRIED, count))
+        rows = ticks.size * joints
+        extrapolation = Extrapolation(rows, window)
+        out = np.empty((window, rows, 4), dtype=np.float32)
+        for back in range(2 * SPAN, -1, -1):
+            is_new = np.full((rows, 1), back == 2 * SPAN)
+            extrapolation(poses[ticks - back].reshape(-1, 4), is_new, out)
+        targets[ticks] = out.reshape(window, ticks.size, joints, 4).swapaxes(0, 1)
+    return targets
 
 
 class MotionCritic(nn.Module):

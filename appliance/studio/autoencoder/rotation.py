@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import torch
@@ -12,6 +13,8 @@ from appliance.pose.skeleton import Skeleton
 
 def multiply(a: Tensor, b: Tensor) -> Tensor:
     """Hamilton product (..., 4) x (..., 4) -> (..., 4), order w, x, y, z."""
+    if a.is_cuda:  # three kernels in place of 28: starting them costs more than what they compute
+        return torch.matmul((a[..., :, None] * b[..., None, :]).flatten(-2), _product_table(a.device))
     aw, ax, ay, az = a.unbind(-1)
     bw, bx, by, bz = b.unbind(-1)
     return torch.stack(
@@ -23,6 +26,14 @@ def multiply(a: Tensor, b: Tensor) -> Tensor:
         ],
         dim=-1,
     )
+
+
+@functools.cache
+def _product_table(device: torch.device) -> Tensor:
+    """(16, 4): from the products of the components of two quaternions to their Hamilton product."""
+    units = torch.eye(4)
+    left, right = units.repeat_interleave(4, dim=0), units.repeat(4, 1)
+    return multiply(left, right).to(device)
 
 
 def inverse(q: Tensor) -> Tensor:
@@ -105,26 +116,30 @@ class MovingSkeleton(torch.nn.Module):
     def __init__(self, bones: Bones) -> None:
         super().__init__()
         # Joints of the same depth are turned together: a third of the operations of joint by joint.
-        self.levels = bones.levels
-        self.above = [
-            [self.levels[level - 1].index(bones.parents[j]) for j in joints]
-            for level, joints in enumerate(self.levels[1:], start=1)
-        ]
-        order = [joint for level in self.levels for joint in level]
-        self.places = [order.index(joint) for joint in range(len(order))]
+        levels = bones.levels
+        self.depth = len(levels)
+        for depth, joints in enumerate(levels):
+            above = [levels[depth - 1].index(bones.parents[joint]) for joint in joints] if depth else []
+            self.register_buffer(f"joints{depth}", torch.tensor(joints), persistent=False)
+            self.register_buffer(f"above{depth}", torch.tensor(above), persistent=False)
+        order = [joint for level in levels for joint in level]
+        self.order: Tensor
         self.turns: Tensor
         self.reaches: Tensor
+        places = torch.tensor([order.index(joint) for joint in range(len(order))])
+        self.register_buffer("order", places, persistent=False)
         self.register_buffer("turns", bones.turns)
         self.register_buffer("reaches", bones.reaches)
 
     def forward(self, pose: Tensor) -> Tensor:
         """(..., M, 4) -> positions (..., M, 3) in metres, relative to the root joint."""
-        world = pose[..., self.levels[0], :]
+        world = pose[..., self.get_buffer("joints0"), :]
         places = [torch.zeros_like(world[..., 1:])]
-        for joints, above in zip(self.levels[1:], self.above, strict=True):
+        for depth in range(1, self.depth):
+            joints, above = self.get_buffer(f"joints{depth}"), self.get_buffer(f"above{depth}")
             parents = world[..., above, :]
             reach = rotate(parents, self.reaches[joints].expand(*parents.shape[:-1], 3))
             places.append(places[-1][..., above, :] + reach)
             turned = multiply(parents, self.turns[joints].expand_as(parents))
             world = multiply(turned, pose[..., joints, :])
-        return torch.cat(places, dim=-2)[..., self.places, :]
+        return torch.cat(places, dim=-2)[..., self.order, :]

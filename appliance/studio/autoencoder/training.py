@@ -17,7 +17,7 @@ from appliance.studio.autoencoder import losses, motion_critic, rotation
 from appliance.studio.autoencoder.answers import Answers, AnswerSettings, held_weights
 from appliance.studio.autoencoder.architectures import DEFAULT, build
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.autoencoder.coupled import Coupled, share_of_pass
+from appliance.studio.autoencoder.coupled import LEARNED_BODY, Coupled, share_of_pass
 from appliance.studio.autoencoder.lessons import Copies, Hands, Lesson, Lessons
 from appliance.studio.autoencoder.motion_critic import MotionCritic, Sequences
 from appliance.studio.autoencoder.networks import Mlp
@@ -61,7 +61,7 @@ class Settings:
     critic_every: int = 2  # steps; the prior moves slowly
     sequences: int = 20  # dances that the motion critic sees in a step; 0: there is no critic
     passes: int = 10  # of them at most, the last one without hands
-    free_sequences: float = 0.25  # of them without a hand: half of these wander, coded again and again
+    free_sequences: float = 0.4  # of them without a hand: half of these wander, coded again and again
     alive_from: float = 0.25  # of the training, when the network begins to follow the motion critic
     motion_learning_rate: float = 4e-4
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
@@ -259,20 +259,21 @@ class Training(TrainingLoop[Report]):
             coded = self.autoencoder.encode(lesson.windows).float()
             with torch.no_grad():
                 way = self.autoencoder.encode(lesson.answer).float() - coded
-            held, lively = (hands.held > 0).float(), coded.new_ones(len(coded))
-            pull = network.pull(
-                coded.detach(), lesson.windows, hands.goal, held, lively, torch.zeros_like(coded)
-            )
-        return coded, {"pull": (pull.float() - way).square().mean()}
+            held = (hands.held > 0).float()
+            there, here = network.difference(coded.detach(), lesson.windows, hands.goal, held)
+        return coded, {"pull": ((there - here).float() - way).square().mean()}
 
     def _led(self, windows: Tensor, hands: Hands, passes: int) -> Tensor:
         """Heading-free windows (B, T, M, 4) after passes in which the hands hold their joints."""
         network = self.autoencoder.network
         assert isinstance(network, Coupled)
         start, lively = windows, windows.new_ones(len(windows))
+        is_held = hands.held > 0
+        goal = torch.where(is_held[:, None, :, None], hands.goal, start)
         with self.mixed:
-            latents = self.autoencoder.encode(start)
-            pull = network.pull(latents, start, hands.goal, (hands.held > 0).float(), lively, 0 * latents)
+            latents, pasted = self.autoencoder.encode(torch.cat([start, goal])).chunk(2)
+            coded, held, noise = (latents, pasted), is_held.float(), torch.zeros_like(latents)
+            pull = network.pull(coded, start, goal, held, lively, noise, LEARNED_BODY)
             for number in range(passes):
                 if number:
                     latents = self.autoencoder.encode(windows)
