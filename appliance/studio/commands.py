@@ -32,10 +32,7 @@ class NetworkName(StrEnum):
 
     coupled = "coupled"
     mlp = "mlp"
-    conv = "conv"
     lstm = "lstm"
-    lstm_autoregressive = "lstm-autoregressive"
-    lstm256 = "lstm256"
     lstm384 = "lstm384"
     dense64 = "dense64"
     moves = "moves"

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from appliance.studio.studio_error import StudioError
+
 IMPROVISER = "improviser"  # the model of a checkpoint that is no autoencoder
 USES = {
     "puppet": "bunraku play",
@@ -9,3 +13,13 @@ USES = {
     "sequence": "bunraku vary",
     IMPROVISER: "bunraku improvise --model",
 }
+REMOVED = ("conv", "lstm-autoregressive", "lstm256")  # networks of version 0.1.0
+
+
+def require_kept(architecture: str, path: Path) -> None:
+    """Raises StudioError for a file whose architecture was removed after version 0.1.0."""
+    if architecture in REMOVED:
+        raise StudioError(
+            f"{path} is a network of the kind '{architecture}'. Only Bunraku 0.1.0 can read it. Shows that "
+            "were exported from it still play. Train a new network with --network mlp or lstm."
+        )

@@ -30,7 +30,6 @@ TITLES = {
     "coupled": "default",
     "mlp": "plain mlp",
     "lstm": "paper's LSTM",
-    "lstm-autoregressive": "paper's LSTM, autoregressive",
 }
 
 

@@ -15,9 +15,10 @@ from appliance.pose import quaternion
 from appliance.show.bundle import default_show_path
 from appliance.studio import train_command
 from appliance.studio.autoencoder.held_joints import HeldJoints
-from appliance.studio.evaluation.coders import OnnxCoder
+from appliance.studio.evaluation.coders import OnnxCoder, load_checkpoint
 from appliance.studio.export.export import export
 from appliance.studio.export.exported import read_exported
+from appliance.studio.model_uses import REMOVED
 from appliance.studio.studio_error import StudioError
 from tests.studio.conftest import Said, bunraku
 from tests.studio.test_export import NAMES
@@ -56,13 +57,25 @@ def test_the_default_show_read_and_exported_again_has_the_same_levels(tmp_path: 
             np.testing.assert_allclose(ours[name], values, atol=1e-6, err_msg=name)
 
 
+@pytest.mark.parametrize("network", REMOVED)
+def test_networks_of_an_earlier_version_are_refused_with_the_version_that_reads_them(
+    network: str, tmp_path: Path
+) -> None:
+    torch.save({"settings": {"seed": 1, "network": network}}, tmp_path / "checkpoint.pt")
+    with pytest.raises(StudioError, match=rf"'{network}'\. Only Bunraku 0\.1\.0 can read it"):
+        load_checkpoint(tmp_path / "checkpoint.pt")
+    export(untrained("mlp"), NAMES, tmp_path / "puppet.onnx", int8=False, architecture=network)
+    with pytest.raises(StudioError, match=rf"'{network}'\. Only Bunraku 0\.1\.0 can read it"):
+        read_exported(tmp_path / "puppet.onnx")
+
+
 def test_files_that_give_no_network_are_refused(tmp_path: Path) -> None:
     (tmp_path / "other.onnx").write_bytes(b"no network")
     with pytest.raises(StudioError, match=r"not a puppet that bunraku exported"):
         read_exported(tmp_path / "other.onnx")
-    export(untrained("conv"), NAMES, tmp_path / "conv.onnx", int8=False, architecture="conv")
-    with pytest.raises(StudioError, match=r"conv.*Give its checkpoint\.pt"):
-        read_exported(tmp_path / "conv.onnx")
+    export(untrained("lstm"), NAMES, tmp_path / "lstm.onnx", int8=False, architecture="lstm")
+    with pytest.raises(StudioError, match=r"lstm.*Give its checkpoint\.pt"):
+        read_exported(tmp_path / "lstm.onnx")
 
 
 def test_a_training_goes_on_from_a_show(

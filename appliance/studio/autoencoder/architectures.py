@@ -6,16 +6,13 @@ from collections.abc import Callable
 
 from appliance.studio.autoencoder.coupled import Coupled
 from appliance.studio.autoencoder.dense import Dense
-from appliance.studio.autoencoder.networks import Conv, Lstm, LstmAutoregressive, Mlp, Network, Shape
+from appliance.studio.autoencoder.networks import Lstm, Mlp, Network, Shape
 
 DEFAULT = "coupled"
 NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {
     DEFAULT: (Coupled, {"latent": 64, "width": 384, "depth": 1}),
     "mlp": (Mlp, {"latent": 64, "width": 384, "depth": 1}),
-    "conv": (Conv, {"latent": 64, "width": 160}),
     "lstm": (Lstm, {"latent": 32, "width": 512, "depth": 2}),
-    "lstm-autoregressive": (LstmAutoregressive, {"latent": 32, "width": 512, "depth": 2}),
-    "lstm256": (Lstm, {"latent": 64, "width": 256, "depth": 2}),
     "lstm384": (Lstm, {"latent": 256, "width": 384, "depth": 3}),
     "dense64": (Dense, {"latent": 32, "width": 64, "depth": 2}),
 }

@@ -33,7 +33,7 @@ class Model:
     longest: int = 128
 
 
-PUPPETS: tuple[str, ...] = (DEFAULT, "mlp", "conv", "lstm", "lstm-autoregressive", "lstm256")
+PUPPETS: tuple[str, ...] = (DEFAULT, "mlp", "lstm")
 MODELS = {
     "puppet": Model(WINDOW, {name: {} for name in PUPPETS}),
     "pose": Model(

@@ -135,7 +135,7 @@ def _dense_stack(size_in: int, width: int, depth: int, size_out: int) -> nn.Sequ
 
 def start_layer_at(layer: nn.Module, rest: Tensor) -> None:
     """Make `rest`, one number for each output of a linear layer, what the layer first gives."""
-    assert isinstance(layer, nn.Linear | nn.Conv1d) and layer.bias is not None
+    assert isinstance(layer, nn.Linear) and layer.bias is not None
     layer.bias.data.copy_(rest)
     layer.weight.data *= 0.1
 
@@ -161,48 +161,6 @@ class Mlp(Network):
         last.bias[size:] -= 2 * deviation.log()[: len(last.bias) - size]  # of a variational network
         first.bias.add_(first.weight @ mean)
         first.weight *= deviation
-
-
-class ConvEncoder(nn.Module):
-    def __init__(self, shape: Shape) -> None:
-        super().__init__()
-        self.window, self.pose = shape.window, shape.pose
-        self.first = nn.Conv1d(shape.pose, shape.width, 3, padding=1)
-        self.second = nn.Conv1d(shape.width, shape.width, 3, padding=1)
-        self.last = nn.Linear(shape.width * shape.window, shape.coded)
-
-    def forward(self, window: Tensor) -> Tensor:
-        x = window.view(-1, self.window, self.pose).transpose(1, 2)
-        x = nn.functional.elu(self.first(x))
-        x = x + nn.functional.elu(self.second(x))
-        latent: Tensor = self.last(x.flatten(1))
-        return latent
-
-
-class ConvDecoder(nn.Module):
-    def __init__(self, shape: Shape) -> None:
-        super().__init__()
-        self.window, self.width = shape.window, shape.width
-        self.first = nn.Linear(shape.latent, shape.width * shape.window)
-        self.second = nn.Conv1d(shape.width, shape.width, 3, padding=1)
-        self.last = nn.Conv1d(shape.width, shape.pose, 3, padding=1)
-
-    def forward(self, latent: Tensor) -> Tensor:
-        x = nn.functional.elu(self.first(latent)).view(-1, self.width, self.window)
-        x = x + nn.functional.elu(self.second(x))
-        window: Tensor = self.last(x).transpose(1, 2)
-        return window.flatten(1)
-
-    def start_at(self, rest: Tensor) -> None:
-        start_layer_at(self.last, rest)
-
-
-class Conv(Network):
-    """Convolution along time, with shared weights."""
-
-    def __init__(self, shape: Shape) -> None:
-        super().__init__()
-        self.encoder, self.decoder = ConvEncoder(shape), ConvDecoder(shape)
 
 
 class LstmEncoder(nn.Module):
@@ -246,35 +204,3 @@ class Lstm(Network):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.encoder, self.decoder = LstmEncoder(shape), LstmDecoder(shape)
-
-
-class AutoregressiveDecoder(nn.Module):
-    def __init__(self, shape: Shape) -> None:
-        super().__init__()
-        self.window, self.pose, self.width = shape.window, shape.pose, shape.width
-        self.state = nn.Linear(shape.latent, 4 * shape.width)
-        self.first = nn.LSTMCell(shape.pose + shape.latent, shape.width)
-        self.second = nn.LSTMCell(shape.width, shape.width)
-        self.last = nn.Linear(shape.width, shape.pose)
-
-    def forward(self, latent: Tensor) -> Tensor:
-        h0, h1, c0, c1 = torch.tanh(self.state(latent)).chunk(4, dim=-1)
-        pose = latent.new_zeros(len(latent), self.pose)
-        poses = []
-        for _ in range(self.window):
-            h0, c0 = self.first(torch.cat([pose, latent], dim=-1), (h0, c0))
-            h1, c1 = self.second(h0, (h1, c1))
-            pose = self.last(h1)
-            poses.append(pose)
-        return torch.cat(poses, dim=-1)
-
-    def start_at(self, rest: Tensor) -> None:
-        start_layer_at(self.last, rest)
-
-
-class LstmAutoregressive(Network):
-    """The paper's encoder with a decoder that receives each of its own poses as input."""
-
-    def __init__(self, shape: Shape) -> None:
-        super().__init__()
-        self.encoder, self.decoder = LstmEncoder(shape), AutoregressiveDecoder(shape)

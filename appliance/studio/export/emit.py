@@ -11,13 +11,11 @@ that int8 saves no time, and would make a third of the difference that is left.
 from __future__ import annotations
 
 import numpy as np
-import torch
 from onnx import TensorProto
 from torch import nn
 
 from appliance.studio.autoencoder import networks
 from appliance.studio.autoencoder.coupled import (
-    BODY,
     CALM,
     LONGEST_STEP,
     NOISE,
@@ -30,7 +28,7 @@ from appliance.studio.autoencoder.coupled import (
 )
 from appliance.studio.autoencoder.networks import Network, Shape
 from appliance.studio.autoencoder.rotation import Bones
-from appliance.studio.export.graph import Graph, Layers, lstm_weights
+from appliance.studio.export.graph import Graph, Layers
 
 EXACT = Layers(int8=False)
 
@@ -47,8 +45,6 @@ def encode(
         basis = graph.constant("curves", encoder.time.curves.numpy())
         amounts = _reshaped(graph, graph.op("MatMul", basis, steps), -1, shape.curves * shape.pose)
         return dense_stack(graph, layers, encoder.stack, amounts, "encoder", out, bias)
-    if isinstance(encoder, networks.ConvEncoder):
-        return _conv_encoder(graph, layers, encoder, shape, window, out)
     if isinstance(encoder, networks.LstmEncoder):
         steps = graph.op("Transpose", _reshaped(graph, window, -1, shape.window, shape.pose), perm=[1, 0, 2])
         last = layers.lstm(graph, steps, encoder.lstm, "encoder.lstm", "last")
@@ -65,19 +61,14 @@ def pulls(
     start, goal (P, T, M, 4), the goal brought as near as the weights say; held (P, M), 0 or 1; gates (K, P).
     """
     axis_last = graph.constant("axis_last", [-1], np.int64)
-    windows = graph.op("Concat", start, goal, axis=0)
-    both = encode(graph, layers, network, shape, windows, graph.name("latents"))
-    latent, pasted = graph.name("latent"), graph.name("pasted")
-    graph.ops("Split", [both], [latent, pasted], axis=0, num_outputs=2)
+    latent = encode(graph, layers, network, shape, start, graph.name("latent"))
     here, there = (_hands(graph, network.hands, shape, latent, each, held) for each in (start, goal))
     lively = graph.unsqueezed("liveliness", 1)
     less = graph.op("Sub", lively, graph.constant("plus", 1.0))
     calmed = graph.op("Mul", less, graph.constant("calmable", 1 - CALM))
     residual = graph.op("Mul", calmed, graph.op("Sub", latent, here))
     drawn = graph.op("Mul", graph.op("Mul", lively, graph.constant("noise_share", NOISE)), "noise")
-    way = graph.op("Sub", there, here)
-    body = graph.op("Sub", way, graph.op("Sub", pasted, latent))
-    pull = graph.op("Sum", way, graph.op("Mul", body, graph.constant("body_share", BODY)), residual, drawn)
+    pull = graph.op("Sum", graph.op("Sub", there, here), residual, drawn)
     pull = graph.op("Mul", graph.op("ReduceMax", held, axis_last, keepdims=1), pull)
     numbers = graph.op("Cast", passes(graph), to=TensorProto.FLOAT)
     left = graph.op("Pow", graph.constant("left_by_a_pass", 1 - STEP), numbers)
@@ -193,8 +184,6 @@ def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent:
         amounts = _reshaped(graph, amounts, -1, shape.curves, shape.pose)
         basis = graph.constant("curves_back", decoder.time.curves.numpy().T)
         flat = graph.op("MatMul", basis, amounts)
-    elif isinstance(decoder, networks.ConvDecoder):
-        flat = _conv_decoder(graph, layers, decoder, shape, latent)
     elif isinstance(decoder, networks.LstmDecoder):
         held = layers.elu(graph, layers.linear(graph, latent, decoder.dense, "decoder.dense"))
         steps = layers.lstm_of_repeated(graph, held, decoder.lstm, "decoder.lstm.0", shape.window)
@@ -202,8 +191,6 @@ def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent:
         steps = graph.op("Transpose", steps, perm=[1, 0, 2])
         rows = _reshaped(graph, steps, -1, shape.width)
         flat = layers.linear(graph, rows, decoder.last, "decoder.last")
-    elif isinstance(decoder, networks.AutoregressiveDecoder):
-        flat = _autoregressive_decoder(graph, layers, decoder, shape, latent)
     else:
         raise TypeError(f"No ONNX form is known for the decoder {type(decoder).__name__}.")
     return _reshaped(graph, flat, -1, shape.window, shape.joints, 4)
@@ -246,58 +233,3 @@ def dense_stack(
 def _reshaped(graph: Graph, x: str, *sizes: int) -> str:
     name = "shape_" + "x".join(map(str, sizes))
     return graph.op("Reshape", x, graph.constant(name, sizes, np.int64))
-
-
-def _conv_encoder(
-    graph: Graph, layers: Layers, encoder: networks.ConvEncoder, shape: Shape, window: str, out: str
-) -> str:
-    steps = _reshaped(graph, window, -1, shape.window, shape.pose)
-    x = layers.elu(graph, EXACT.conv_as_matmul(graph, steps, encoder.first, "encoder.first", shape.window))
-    steps = _reshaped(graph, x, -1, shape.window, shape.width)
-    more = layers.conv_as_matmul(graph, steps, encoder.second, "encoder.second", shape.window)
-    x = _reshaped(graph, graph.op("Add", x, layers.elu(graph, more)), -1, shape.window, shape.width)
-    channels_first = graph.op("Transpose", x, perm=[0, 2, 1])  # torch flattens channels before time
-    flat = _reshaped(graph, channels_first, -1, shape.width * shape.window)
-    return layers.linear(graph, flat, encoder.last, "encoder.last", out)
-
-
-def _conv_decoder(
-    graph: Graph, layers: Layers, decoder: networks.ConvDecoder, shape: Shape, latent: str
-) -> str:
-    x = layers.elu(graph, layers.linear(graph, latent, decoder.first, "decoder.first"))
-    steps = graph.op("Transpose", _reshaped(graph, x, -1, shape.width, shape.window), perm=[0, 2, 1])
-    more = layers.conv_as_matmul(graph, steps, decoder.second, "decoder.second", shape.window)
-    more = _reshaped(graph, layers.elu(graph, more), -1, shape.window, shape.width)
-    steps = graph.op("Add", steps, more)
-    return layers.conv_as_matmul(graph, steps, decoder.last, "decoder.last", shape.window)
-
-
-def _autoregressive_decoder(
-    graph: Graph, layers: Layers, decoder: networks.AutoregressiveDecoder, shape: Shape, latent: str
-) -> str:
-    """The steps stand one after the other: a Loop inside the Scan would not prepack its weights."""
-    state = graph.op("Tanh", layers.linear(graph, latent, decoder.state, "decoder.state"))
-    parts = [graph.name("state") for _ in range(4)]
-    graph.ops("Split", [state], parts, axis=1, num_outputs=4)
-    h0, h1, c0, c1 = (graph.unsqueezed(part, 0) for part in parts)
-    first, second = _cell(decoder.first), _cell(decoder.second)
-    before = graph.constant("no_pose_before", [0, shape.pose, 0, 0], np.int64)
-    seen = graph.op("Pad", latent, before)
-    poses: list[str] = []
-    for _ in range(shape.window):
-        if poses:
-            seen = graph.op("Concat", poses[-1], latent, axis=1)
-        step = graph.unsqueezed(seen, 0)
-        h0, c0 = layers.lstm_node(graph, step, first, "decoder.cell0", ["last", "cell"], h0, c0)
-        h1, c1 = layers.lstm_node(graph, h0, second, "decoder.cell1", ["last", "cell"], h1, c1)
-        rows = _reshaped(graph, h1, -1, shape.width)
-        poses.append(layers.linear(graph, rows, decoder.last, "decoder.last"))
-    return graph.op("Concat", *poses, axis=1)
-
-
-def _cell(cell: nn.LSTMCell) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    def parameter(name: str) -> torch.Tensor:
-        value: torch.Tensor = getattr(cell, name)
-        return value
-
-    return lstm_weights(*(parameter(n) for n in ("weight_ih", "weight_hh", "bias_ih", "bias_hh")))

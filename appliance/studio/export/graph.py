@@ -98,32 +98,12 @@ class Layers:
     def elu(self, graph: Graph, x: str) -> str:
         return graph.op("Elu", x, alpha=1.0)
 
-    def conv_as_matmul(self, graph: Graph, x: str, layer: nn.Conv1d, name: str, steps: int) -> str:
-        """A short convolution over (P, steps, in) as shifted matrix products: rows (P * steps, out).
-
-        Three rows side by side (zeros at the ends) times one matrix: quantizes like any dense layer.
-        """
-        taps = layer.kernel_size[0]
-        pad = graph.constant(f"pad{taps // 2}", [0, taps // 2, 0, 0, taps // 2, 0], np.int64)
-        padded = graph.op("Pad", x, pad)
-        rows = np.arange(steps)[:, None] + np.arange(taps)
-        at = graph.constant(f"taps{taps}x{steps}", rows, np.int64)
-        wide = graph.op("Gather", padded, at, axis=1)  # (P, steps, taps, in)
-        sizes = [-1, taps * layer.in_channels]
-        flat = graph.op("Reshape", wide, graph.constant(f"wide{sizes[1]}", sizes, np.int64))
-        weight = _array(layer.weight).transpose(2, 1, 0).reshape(taps * layer.in_channels, layer.out_channels)
-        dense = nn.Linear(weight.shape[0], weight.shape[1])
-        dense.weight.data = torch.from_numpy(weight.T.copy())
-        assert layer.bias is not None
-        dense.bias.data = layer.bias.data
-        return self.linear(graph, flat, dense, name)
-
     def lstm(self, graph: Graph, x: str, layer: nn.LSTM, name: str, keep: str, first: int = 0) -> str:
         """(T, P, in) -> all steps (T, P, H) for keep='steps', the last (P, H) for keep='last'."""
         for level in range(first, layer.num_layers):
             last = keep == "last" and level == layer.num_layers - 1
             kind = "last" if last else "steps"
-            out = self.lstm_node(graph, x, _level(layer, level), f"{name}.{level}", [kind])[0]
+            out = self.lstm_node(graph, x, _level(layer, level), f"{name}.{level}", kind)
             axis = graph.constant("axis0" if last else "axis1", [0 if last else 1], np.int64)
             x = graph.op("Squeeze", out, axis)
         return x
@@ -134,33 +114,28 @@ class Layers:
         x: str,
         weights: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
         name: str,
-        keep: list[str],
-        hidden: str = "",
-        cell: str = "",
-        bias: str = "",
-    ) -> list[str]:
-        """One LSTM layer as one node; keep: which of 'steps', 'last', 'cell' are wanted."""
+        keep: str,
+    ) -> str:
+        """One LSTM layer as one node; keep: which is wanted, all 'steps' or the 'last'."""
         w, r, b = weights
-        outputs = [graph.name(kind) if kind in keep else "" for kind in ("steps", "last", "cell")]
-        while not outputs[-1]:
-            outputs.pop()
-        bias = bias or graph.constant(f"{name}.bias", b)
-        size = r.shape[-1]
+        out = graph.name(keep)
+        outputs = [out] if keep == "steps" else ["", out]
+        bias, size = graph.constant(f"{name}.bias", b), r.shape[-1]
         if self.int8:
             wq, ws, wz = _quantized(graph, f"{name}.w", w[0].T, lead=True)
             rq, rs, rz = _quantized(graph, f"{name}.r", r[0].T, lead=True)
-            inputs = [x, wq, rq, bias, "", hidden, cell, "", ws, wz, rs, rz]
+            inputs = [x, wq, rq, bias, "", "", "", "", ws, wz, rs, rz]
             graph.ops("DynamicQuantizeLSTM", inputs, outputs, MICROSOFT, hidden_size=size)
         else:
             w_name, r_name = graph.constant(f"{name}.w", w), graph.constant(f"{name}.r", r)
-            graph.ops("LSTM", [x, w_name, r_name, bias, "", hidden, cell], outputs, hidden_size=size)
-        return [out for out in outputs if out]
+            graph.ops("LSTM", [x, w_name, r_name, bias], outputs, hidden_size=size)
+        return out
 
     def lstm_of_repeated(self, graph: Graph, x: str, layer: nn.LSTM, name: str, steps: int) -> str:
         """First level of an LSTM whose inputs (P, in) are the same at each step: (steps, P, H)."""
         sizes = graph.constant(f"repeated{steps}", [steps, 1, 1], np.int64)
         repeated = graph.op("Expand", graph.unsqueezed(x, 0), sizes)
-        out = self.lstm_node(graph, repeated, _level(layer, 0), name, ["steps"])[0]
+        out = self.lstm_node(graph, repeated, _level(layer, 0), name, "steps")
         return graph.op("Squeeze", out, graph.constant("axis1", [1], np.int64))
 
 
