@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from appliance.box.orders import Key, Order
 from appliance.levers.addresses import ADDRESSES, ANSWERS, QUESTIONS, Receiver
 from appliance.levers.lever import Lever
 from appliance.levers.show_state import Change, ShowState
@@ -27,7 +28,6 @@ from appliance.show_control.key_file import KeyFile
 from appliance.show_control.live_input import LiveInput, is_live
 from appliance.show_control.names_of_show import joint_name
 from appliance.show_control.order_dispatch import OrderDispatch
-from appliance.show_control.orders import Order
 from appliance.show_control.packet import Message, messages_in, readable
 from appliance.show_control.port import Address
 from appliance.show_control.sensor_roster import END as ROSTER_END
@@ -39,7 +39,6 @@ from appliance.show_control.trackers import TRACKERS, Trackers
 
 if TYPE_CHECKING:
     from appliance.outputs.shared_frame import Facts
-    from appliance.sensor.keys import SensorKey
 
 # What a box sends is never answered: two boxes would go on answering each other for ever.
 _ANSWERS = frozenset((*ANSWERS, REPLY, SENSORS_REPLY, PONG, END, SENSOR, ROSTER_END))
@@ -190,7 +189,9 @@ class CommandHandler:
 
     def _order(self, place: Receiver, name: str, command: Command, asker: Address, now: float) -> None:
         text = joint_name(command.text, self._observer.facts)
-        keys = self._keys.keys() if command.address == "/sensors/reload" else _no_keys()
+        keys: Mapping[str, Key] = {}
+        if command.address == "/sensors/reload":
+            keys = {sensor: (one.device_id, one.key) for sensor, one in self._keys.keys().items()}
         order = Order(name, command.values, text, keys, quiet=command.address.startswith(STREAMS))
         self._dispatch.dispatch_order(place, order, now, partial(self._reply, asker, command.address))
 
@@ -242,7 +243,3 @@ class CommandHandler:
     def _refuse(self, reason: str) -> None:
         self.refused += 1
         self.reason = readable(reason)
-
-
-def _no_keys() -> Mapping[str, SensorKey]:
-    return {}

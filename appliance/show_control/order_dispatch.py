@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import get_args
 
-from appliance.show_control.orders import Answer, Order, OrderSender, Place
+from appliance.box.orders import Answer, Order, OrderSender, Place
 
 PATIENCE_S = 0.5  # after which an order is not carried out any more
 ANSWER_S = 0.1  # within which an order carried out at the last moment is answered

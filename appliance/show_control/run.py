@@ -13,6 +13,7 @@ from pathlib import Path
 
 from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
+from appliance.box.orders import OrderSender
 from appliance.box.process_health import COMMANDS_DROPPED, ProcessHealthWriter
 from appliance.box.show_state import ShowStateReader, ShowStateWriter
 from appliance.box.stop_signals import stop_signals
@@ -26,7 +27,6 @@ from appliance.show_control.key_file import KeyFile
 from appliance.show_control.listeners import Listeners
 from appliance.show_control.live_input import LiveInput
 from appliance.show_control.order_dispatch import OrderDispatch
-from appliance.show_control.orders import OrderSender
 from appliance.show_control.packet import Message
 from appliance.show_control.port import Address, Port
 from appliance.show_control.settings import Settings

@@ -3,32 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
+from appliance.box.roster import UNKNOWN_S as UNKNOWN_S
+from appliance.box.roster import RosterLine as RosterLine
 from appliance.show_control.packet import Message
 
 SENSOR, END = "/sensors/sensor", "/sensors/end"
-UNKNOWN_S = -1.0  # a round trip or an age that there is none of; the look of a box that is still starting
-
-
-class RosterLine(NamedTuple):
-    """One sensor, as the arguments of `/sensors/sensor` in this order; docs/osc.md explains them."""
-
-    name: str
-    device_id: str  # 8 hexadecimal digits
-    state: str  # absent, greeted, linked, lost
-    way: str
-    rate_hz: float
-    loss: float
-    round_trip_s: float
-    age_s: float
-    battery: int  # percent; 255 unknown
-    calibration: int  # BNO055 register 0x35
-    flags: int  # wire.HAS_PROFILE and the others, wire.signal_dbm
-    firmware: str
-    imu_id: str
-    neutral: str  # taken, wanted, kept, assumed; empty: no hand of the show
-    complaint: str
 
 
 def roster_messages(health: Mapping[str, Any], key_file: str, now: float) -> Iterator[Message]:

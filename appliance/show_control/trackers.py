@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from appliance.box.orders import Order
 from appliance.outputs.shared_frame import Facts
 from appliance.show_control.command import require_read
-from appliance.show_control.orders import Order
 from appliance.show_control.vmc_input import PREFIX, parsed
 
 TRACKERS = frozenset(f"{PREFIX}{kind}/Pos" for kind in ("Tra", "Con", "Hmd"))  # tracker, controller, headset

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from appliance.box.orders import Order
 from appliance.dancer.held_places import RemotePlace
 from appliance.dancer.puppeteers import Remote
 from appliance.dancer.springs import Springs
@@ -24,9 +25,9 @@ from appliance.levers.table import (
     WIND,
 )
 from appliance.pose import quaternion
+from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink
 from appliance.show.config_error import did_you_mean
-from appliance.show_control.orders import Order
 from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
@@ -86,7 +87,7 @@ def obey_for_sensors(order: Order, parts: StageParts, wearing: SensorFit, now: f
 
 
 def _admit(order: Order, parts: StageParts) -> str:
-    parts.link.set_keys(order.keys)
+    parts.link.set_keys({name: SensorKey(name, *key) for name, key in order.keys.items()})
     known = f"The box knows {len(order.keys)} sensor{'' if len(order.keys) == 1 else 's'} now"
     missing = [name for name in parts.worn if name not in order.keys]
     if not missing:

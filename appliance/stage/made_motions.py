@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionReader
+from appliance.box.orders import Order
 from appliance.dancer.loop import Loop
 from appliance.dancer.material.material_file import SUFFIX, Material, parsed_recipe, read_material
 from appliance.dancer.motion_source import Playback
 from appliance.levers.sources import GRANULAR, IMPROVISE, LIVE, VARY
 from appliance.show.show import Show
-from appliance.show_control.orders import Order
 from appliance.stage.stage_parts import StageParts
 
 LATE_S = 3.0  # after which a source that was called and has not come is late

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from appliance.box.orders import Order
 from appliance.box.show_state import ShowStateReader
 from appliance.dancer.material.material_file import Material
 from appliance.levers.fade import Fade
 from appliance.levers.lever import AT_ONCE, Lever, at_once
 from appliance.levers.sources import LIVE, MAIN
 from appliance.levers.table import PHRASE, RATE, SPRINGS, find_lever
-from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
 from appliance.stage.made_motions import MELT_S, MadeMotions

@@ -11,6 +11,7 @@ import numpy as np
 
 from appliance.box.clock import Slot
 from appliance.box.live_pose import LivePose, LivePoseReader
+from appliance.box.orders import Order
 from appliance.dancer.puppet import PuppetNetwork
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import unpacked
@@ -19,7 +20,6 @@ from appliance.recorder.record import DAMAGED, NOT_FINITE, ORDER, puppets_of
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show
-from appliance.show_control.orders import Order
 from appliance.stage.carry_out import carry_out
 from appliance.stage.comparison import Comparison
 from appliance.stage.iterations import Iterations

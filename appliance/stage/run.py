@@ -9,6 +9,7 @@ from pathlib import Path
 from appliance.box.clock import Slot, TickClock
 from appliance.box.live_pose import LivePoseReader
 from appliance.box.notify import Notifier
+from appliance.box.orders import Order, OrderInbox
 from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.runtime_folder import renew_lost
 from appliance.box.show_state import ShowStateReader
@@ -16,7 +17,6 @@ from appliance.dancer.phrase_cache import MEMORY
 from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
-from appliance.show_control.orders import Order, OrderInbox
 from appliance.stage.admission import Admission, SecondLook
 from appliance.stage.admission_cache import admitted
 from appliance.stage.carry_out import carry_out

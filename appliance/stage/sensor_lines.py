@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from appliance.box.roster import UNKNOWN_S, RosterLine
 from appliance.sensor.link import SensorState
-from appliance.show_control.sensor_roster import UNKNOWN_S, RosterLine
 
 
 def roster_lines(states: Sequence[SensorState], neutral_of: Callable[[str], str]) -> list[RosterLine]:

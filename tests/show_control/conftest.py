@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from appliance.box.orders import OrderInbox, OrderSender
 from appliance.sensor.keys import create_keys
 from appliance.show_control import order_dispatch
-from appliance.show_control.orders import OrderInbox, OrderSender
 from tests.show_control.doubles import Asker, Clock, ControlInThread, StageDouble
 
 

@@ -18,10 +18,10 @@ from typing import Any
 from pythonosc.osc_message import OscMessage
 
 from appliance.box.notify import Notifier
+from appliance.box.orders import Order, OrderInbox, Place
 from appliance.box.show_state import ShowStateReader
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import Facts, FrameWriter
-from appliance.show_control.orders import Order, OrderInbox, Place
 from appliance.show_control.packet import datagram
 from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess

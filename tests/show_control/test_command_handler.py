@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from appliance.box.orders import Order
 from appliance.levers.addresses import ADDRESSES
 from appliance.levers.lever import Lever
 from appliance.levers.table import (
@@ -22,7 +23,6 @@ from appliance.levers.table import (
     SEED,
     hand,
 )
-from appliance.show_control.orders import Order
 from appliance.show_control.show_state_commands import OWN
 from tests.show_control.doubles import Asker, ControlInThread, InboxDouble, StageDouble, until
 from tests.show_control.in_force import declared, show_state

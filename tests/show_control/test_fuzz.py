@@ -7,13 +7,13 @@ import random
 import time
 from pathlib import Path
 
+from appliance.box.orders import OrderSender
 from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.levers.table import LOOK, MASTER
 from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.key_file import KeyFile
 from appliance.show_control.live_input import LiveInput
 from appliance.show_control.order_dispatch import WAITING, OrderDispatch
-from appliance.show_control.orders import OrderSender
 from appliance.show_control.packet import Message, datagram
 from appliance.show_control.port import LARGEST_DATAGRAM, Address
 from appliance.show_control.stage_observer import StageObserver

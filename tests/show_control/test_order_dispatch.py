@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from appliance.box.orders import Order, OrderInbox, OrderSender
 from appliance.show_control.order_dispatch import (
     ANSWER_S,
     AT_ONCE,
@@ -16,7 +17,6 @@ from appliance.show_control.order_dispatch import (
     WAITING,
     OrderDispatch,
 )
-from appliance.show_control.orders import Order, OrderInbox, OrderSender
 from tests.show_control.doubles import Clock, until
 
 NOW = Clock().now

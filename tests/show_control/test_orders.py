@@ -12,12 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from appliance.sensor.keys import SensorKey
-from appliance.show_control.orders import Answer, Order, OrderInbox, OrderSender
+from appliance.box.orders import Answer, Order, OrderInbox, OrderSender
 from tests.show_control.doubles import Clock
 
 NOW = Clock().now
-KEY = SensorKey("left-wrist", 0x1A2B3C4D, bytes(range(16)))
+KEY = (0x1A2B3C4D, bytes(range(16)))
 
 
 @pytest.mark.parametrize(
@@ -39,7 +38,7 @@ def test_an_order_arrives_whole(sender: OrderSender, inbox: OrderInbox, order: O
     assert (taken.keys, taken.ask, taken.quiet, taken.until) == (
         *(dict(order.keys), order.ask, order.quiet, order.until),
     )
-    assert KEY.key.hex() not in repr(taken)
+    assert KEY[1].hex() not in repr(taken)
 
 
 def test_an_answer_comes_back_to_who_asked(sender: OrderSender, inbox: OrderInbox) -> None:
@@ -115,7 +114,7 @@ def test_who_was_killed_leaves_a_socket_that_the_next_one_takes_over(
     folder: Path, sender: OrderSender
 ) -> None:
     script = (
-        "import sys, time\nfrom pathlib import Path\nfrom appliance.show_control.orders import OrderInbox\n"
+        "import sys, time\nfrom pathlib import Path\nfrom appliance.box.orders import OrderInbox\n"
         "inbox = OrderInbox(Path(sys.argv[1]), 'stage')\nprint('open', flush=True)\ntime.sleep(60)\n"
     )
     killed = subprocess.Popen([sys.executable, "-c", script, str(folder)], stdout=subprocess.PIPE)

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
+from appliance.box.orders import Order, OrderInbox
 from appliance.levers.lever import Lever
 from appliance.levers.table import GOING, ITERATIONS, LIGHTS, LOOK, MASTER, PHRASE
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.show_control.order_dispatch import ANSWER_S, PATIENCE_S
-from appliance.show_control.orders import Order, OrderInbox
 from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
 from appliance.show_control.settings import Settings
@@ -162,8 +162,8 @@ def test_another_show_does_not_get_what_was_declared_for_the_one_before(
         clock.now += 0.3
         process.turn()
         now = process.handler.show_state
-        assert (now.show, [*now.settings], now[LOOK].value) == (
-            *("Another", ["master", "look", "card", "lights"], "ink"),
+        assert (now.show, {*now.settings}, now[LOOK].value) == (
+            *("Another", {"master", "look", "card", "lights"}, "ink"),
         )
         asker.tell("/iterations", 4, 3)
         process.turn()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.show_control.orders import Order
+from appliance.box.orders import Order
 from appliance.show_control.trackers import EVERY_S, SILENT_S, TRACKERS, Trackers
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts
 from tests.system.processes import wait_until

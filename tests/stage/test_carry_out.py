@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.box.orders import Order
 from appliance.pose import quaternion
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey, obey_for_sensors
 from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit
@@ -118,7 +118,7 @@ def worn(tmp_path: Path) -> Iterator[StageParts]:
         (Order("heading"), True, "is the front"),
         (Order("heading", text="nobody"), False, "No hand of this show"),
         (
-            Order("reload", keys={"left-wrist": SensorKey("left-wrist", 1, bytes(16))}),
+            Order("reload", keys={"left-wrist": (1, bytes(16))}),
             True,
             "The box knows 1 sensor now, but not head of this show",
         ),
@@ -134,7 +134,7 @@ def test_commands_about_sensors_are_done_or_refused_in_words(
     assert outcome[0] == done
     assert words in outcome[1]
     assert worn.link.strobed == ([order.text] if order.name == "strobe" and done else [])
-    assert worn.link.admitted == order.keys
+    assert {name: (one.device_id, one.key) for name, one in worn.link.admitted.items()} == order.keys
 
 
 @pytest.mark.parametrize("name", ["neutral", "heading"])

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from appliance.box.clock import Slot
+from appliance.box.orders import Order
 from appliance.dancer.latent_noise import LatentNoise
 from appliance.recorder.keyframe import packed, unpacked
 from appliance.show.show import Show, load_show
-from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey
 from appliance.stage.liveliness import LEAST_FADE_S
 from appliance.stage.reconcile import Reconciler

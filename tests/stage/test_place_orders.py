@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from appliance.box.orders import Order
 from appliance.dancer.held_places import RemotePlace
 from appliance.show.show import load_show
-from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
 from appliance.stage.sharing import facts_of

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from appliance.box.orders import Order
 from appliance.dancer.puppeteers import Remote
 from appliance.levers.show_state import Change, ShowState
 from appliance.levers.table import CUE, GOING, ITERATIONS, PHRASE, RATE, hand
 from appliance.pose import quaternion
-from appliance.show_control.orders import Order
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.stage_parts import StageParts

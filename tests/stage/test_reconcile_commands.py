@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from appliance.box.clock import Slot
+from appliance.box.orders import Order
 from appliance.pose import quaternion
 from appliance.show.show import load_show
-from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler

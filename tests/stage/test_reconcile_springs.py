@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.box.orders import Order
 from appliance.show.show import load_show
 from appliance.show_control.command import Command
-from appliance.show_control.orders import Order
 from appliance.show_control.show_state_commands import declare
 from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from appliance.box.clock import TICK_S
+from appliance.box.orders import Order
 from appliance.dancer.motion_source import Playback
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import GOING, ITERATIONS, PHRASE, RATE
 from appliance.pose import quaternion
-from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import Resumption

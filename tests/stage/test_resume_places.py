@@ -12,10 +12,10 @@ import pytest
 
 from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, boot_id, packed
 from appliance.box.clock import TICK_S
+from appliance.box.orders import Order
 from appliance.box.record import SlotFile
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import ITERATIONS
-from appliance.show_control.orders import Order
 from appliance.stage.fallback import PLACE_DROPPED
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import TRIES, Resumption

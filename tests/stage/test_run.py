@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from appliance.box.clock import TICK_S, TickClock
+from appliance.box.orders import Order
 from appliance.box.show_state import ShowStateWriter
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import ITERATIONS, PHRASE
@@ -18,7 +19,6 @@ from appliance.pose.bvh import write_bvh
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.show_control.orders import Order
 from appliance.stage import run
 from appliance.stage.admission import SecondLook
 from appliance.stage.fallback import SENSOR_SILENT
