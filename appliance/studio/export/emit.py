@@ -16,6 +16,7 @@ from torch import nn
 
 from appliance.studio.autoencoder import networks
 from appliance.studio.autoencoder.coupled import (
+    BODY,
     CALM,
     LONGEST_STEP,
     NOISE,
@@ -61,14 +62,19 @@ def pulls(
     start, goal (P, T, M, 4), the goal brought as near as the weights say; held (P, M), 0 or 1; gates (K, P).
     """
     axis_last = graph.constant("axis_last", [-1], np.int64)
-    latent = encode(graph, layers, network, shape, start, graph.name("latent"))
+    windows = graph.op("Concat", start, goal, axis=0)
+    both = encode(graph, layers, network, shape, windows, graph.name("latents"))
+    latent, pasted = graph.name("latent"), graph.name("pasted")
+    graph.ops("Split", [both], [latent, pasted], axis=0, num_outputs=2)
     here, there = (_hands(graph, network.hands, shape, latent, each, held) for each in (start, goal))
     lively = graph.unsqueezed("liveliness", 1)
     less = graph.op("Sub", lively, graph.constant("plus", 1.0))
     calmed = graph.op("Mul", less, graph.constant("calmable", 1 - CALM))
     residual = graph.op("Mul", calmed, graph.op("Sub", latent, here))
     drawn = graph.op("Mul", graph.op("Mul", lively, graph.constant("noise_share", NOISE)), "noise")
-    pull = graph.op("Sum", graph.op("Sub", there, here), residual, drawn)
+    way = graph.op("Sub", there, here)
+    body = graph.op("Sub", way, graph.op("Sub", pasted, latent))
+    pull = graph.op("Sum", way, graph.op("Mul", body, graph.constant("body_share", BODY)), residual, drawn)
     pull = graph.op("Mul", graph.op("ReduceMax", held, axis_last, keepdims=1), pull)
     numbers = graph.op("Cast", passes(graph), to=TensorProto.FLOAT)
     left = graph.op("Pow", graph.constant("left_by_a_pass", 1 - STEP), numbers)
