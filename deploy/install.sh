@@ -115,11 +115,12 @@ read_options() {
     store=$kept
 }
 
-# An image's root lies under an overlay in memory.
+# An overlay in memory covers an image's root.
 forgets() { [ "$(stat -f -c %T "$root/opt")" = overlayfs ] && { [ -z "$root" ] || has_data; }; }
 has_data() { mountpoint --quiet "$root/data"; }
 
-# What is written to $1 is gone with the power: the file system in memory on which it lies, or nothing. An overlay keeps
+# Data written to $1 is lost at power-off: prints the file system in memory that holds it, or nothing. An
+# overlay keeps
 # it where its upper folder lies; under one over the root that is memory, as far as can be seen.
 memory_of() {
     local where=$1 kind upper
@@ -135,8 +136,8 @@ memory_of() {
     esac
 }
 
-# A root that does not run has no /proc of its own, and the packages ask it for the processor. What this machine's
-# environment says (where its libraries lie) means nothing in there.
+# A root that does not run has no /proc, and the packages ask it for the processor. This machine's environment
+# (library paths) is meaningless in there.
 in_root() {
     # shellcheck disable=SC2016 # $0 and $@ belong to the inner shell
     if [ -z "$root" ]; then "$@"; else
@@ -160,7 +161,7 @@ installed() {
     done | sort -n | uniq
 }
 
-# The release that came with the image: the oldest one that does not lie on the data partition.
+# The release that came with the image: the oldest one that is not on the data partition.
 own() {
     local name
     while read -r _ name; do
@@ -192,8 +193,8 @@ begin() {
 
 # ---- before anything is written
 
-# Nothing of a release is believed before its signature has been checked. What a stick says may change between two
-# looks, so that a copy is looked at.
+# Nothing of a release is believed before its signature has been checked. A stick may change between two
+# reads, so a copy is checked.
 check_source() {
     local file
     [[ -f $source/release && -f $source/SHA256SUMS ]] ||
@@ -274,7 +275,7 @@ check_machine() {
         "Nothing was changed. Make room, or use a larger card."
 }
 
-# What a release needs while it is tried, and misses only minutes later.
+# Files that a release needs during its trial, and would only miss minutes later.
 check_shared_memory() {
     in_root sh -c 'touch /dev/shm/.bunraku-install && rm /dev/shm/.bunraku-install' 2>/dev/null ||
         fail "$root/dev/shm is missing, or cannot be written: the release cannot be tried. Nothing was changed." \
@@ -305,7 +306,7 @@ check_data() {
 
 belongs_to_root() { [ "$(stat -c %u:%a "$@" | sort -u)" = 0:755 ]; }
 
-# ---- a release of its own beside the others
+# ---- a separate release next to the others
 
 copy_and_verify() {
     local file from left=$((needs << 20)) # a file that has grown on the stick does not fill the disk
@@ -327,7 +328,7 @@ copy_and_verify() {
     install -m 644 "$head/SHA256SUMS" "$part/source/"
 }
 
-# A wheel is an archive of what lies in site-packages; each was checked against its sum before.
+# A wheel is an archive of files for site-packages; each was checked against its sum before.
 UNPACK='import sys, zipfile
 for wheel in sys.argv[2:]:
     zipfile.ZipFile(wheel).extractall(sys.argv[1])'
@@ -342,7 +343,7 @@ build() {
     write_command
     in_root "$inside/bin/python" -I -m compileall -q -j 0 -s "$inside" -p "$home/releases/$name" "$inside/lib" ||
         fail "a part of bunraku $version cannot be read by Python (above). The box dances as before."
-    # What the show that comes with the box needs at its start is worked out now, not at each power-on.
+    # The built-in show's start-up data is computed now, not at each power-on.
     in_root "$inside/bin/python" -I -m appliance.cli.prepare_show ||
         echo "The show that comes with the box is not prepared (above): the box starts somewhat slower."
     for file in system release SHA256SUMS install.sh; do mv "$part/source/$file" "$part/"; done
@@ -506,7 +507,7 @@ copy() {
     mv -T "$here.new" "$here"
 }
 
-# What one of the last lines of a unit says ([Install] WantedBy=), so that it starts with the box.
+# One of the last lines of a unit ([Install] WantedBy=), so that it starts with the box.
 enable_units() {
     local file target
     { (cd "$releases/$name/system" && grep -sH '^WantedBy=' "$units"/*) || true; } | while IFS=: read -r file target; do
@@ -609,7 +610,7 @@ switch_or_go_back() {
     fail "bunraku $1 did not start (above). Back on $before, which dances. Report what stands above."
 }
 
-# Of an image's releases those count that lie on the data partition; its own stays.
+# Only an image's releases on the data partition count; its own stays.
 forget_old() {
     local name
     for name in $(installed | cut -d ' ' -f 2 | grep -vxF "$(current)" |
@@ -628,7 +629,7 @@ discard() {
 
 # ---- a box made from the image: its root forgets, its data partition does not
 
-# What every file of a release is: kind, rights, owner, size, name, and where a link leads.
+# Facts about every file of a release: kind, permissions, owner, size, name, and a link's target.
 contents() {
     (cd "$1" && find . -mindepth 1 -not -name whole \( -type d -printf 'd %m %U %P\n' -o \
         -printf '%y %m %U %s %P %l\n' \) | LC_ALL=C sort)
@@ -651,7 +652,7 @@ flaw() {
     [ -x "$root/usr/bin/python$(fact "$folder" python)" ] || echo "it needs Python $(fact "$folder" python)"
 }
 
-# What this box dances at the next power-on.
+# The show and box file that this box uses at the next power-on.
 keep_choice() {
     if ! forgets || [[ $fleeting = yes || ! -d $kept ]]; then return; fi
     if [ -L "$releases/$1" ]; then
@@ -786,7 +787,7 @@ uninstall() {
     if [ "$purge" = yes ]; then rm -rf "${root:?}$data" && say "and so are all shows, keys and the journal"; fi
 }
 
-# What came with the image stays, and dances.
+# The release that came with the image stays, and dances.
 uninstall_kept() {
     local name
     if [ "$purge" = yes ]; then

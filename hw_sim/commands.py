@@ -34,7 +34,7 @@ app.command()(measure)
 
 
 class NetworkKind(StrEnum):
-    """What the network does."""
+    """Behaviour of the network."""
 
     venue = "venue"
     perfect = "perfect"
@@ -114,7 +114,7 @@ def emulate(
 ) -> None:
     """Emulate one to eight wearable sensors: they pair with the box, then send signed readings at 50 Hz each.
 
-    Packets cross a lifelike network in both directions, each sensor from an address of its own. The box must
+    Packets cross a lifelike network in both directions, each sensor from its own address. The box must
     read the same key file.
     """
 

@@ -24,8 +24,8 @@ class Sample(NamedTuple):
     boot_nonce: int
     sequence: int
     sampled_at: float
-    orientation: Quaternion  # of the hand itself, stage axes
-    power_on_at: float  # of this boot
+    orientation: Quaternion  # the hand's own, stage axes
+    power_on_at: float  # when this boot began
 
 
 class Outgoing(NamedTuple):
@@ -34,7 +34,7 @@ class Outgoing(NamedTuple):
     data: bytes
     lane: Lane
     at: float  # when it left, seconds of the emulator's clock, at most the time of its step
-    sample: Sample | None = None  # of a reading; None for every other packet
+    sample: Sample | None = None  # the reading in it; None for every other packet
 
 
 class Device(Protocol):
@@ -61,7 +61,7 @@ class Device(Protocol):
         """The network is joined or lost, the cable plugged in or pulled out. Only called on a change."""
 
     def step(self, now: float) -> list[Outgoing]:
-        """What left since the last step. After a long sleep of the machine readings are skipped."""
+        """Packets sent since the last step. After a long sleep of the machine readings are skipped."""
 
     def receive_packet(self, data: bytes, now: float, lane: Lane) -> None:
         """Take a packet from the box, perhaps damaged, repeated or for another sensor. Never raises."""

@@ -1,4 +1,4 @@
-"""A wearable in Python: power, the IMU's start-up, a clock of its own, pairing, signed readings at 50 Hz."""
+"""A wearable in Python: power, the IMU's start-up, its own clock, pairing, signed readings at 50 Hz."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class EmulatedSensor:
         self._pairing: Pairing | None = None  # None: switched off
         self._power_on_at = 0.0
         self._power_change_at = float("inf")
-        self._grid_us = 0  # of the device clock, from power-on to the next measurement
+        self._grid_us = 0  # microseconds of the device clock, from power-on to the next measurement
         self._readings = 0
         self._profiles = 0  # sent of this power-on
         self._profiles_due = 0
@@ -88,7 +88,7 @@ class EmulatedSensor:
 
     @property
     def boot_nonce(self) -> int:
-        """Of the present power-on; 0 while off."""
+        """The nonce of the present power-on; 0 while off."""
         return self._pairing.boot_nonce if self._pairing else 0
 
     @property

@@ -49,8 +49,8 @@ class Emulator:
     """One to eight wearables on one network, each with its own senders to the box.
 
     `clock` and `sleep` replace the monotonic clock in tests; without `sleep` it receives while it waits.
-    Use `run` in a thread or process of its own, `start` and `step` in lockstep with something else.
-    counts: packets sent, readings among them, unsent, and what the network did to them.
+    Use `run` in a separate thread or process, `start` and `step` in lockstep with something else.
+    counts: packets sent, readings among them, unsent, and the network's effects on them.
     """
 
     def __init__(

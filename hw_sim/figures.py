@@ -80,7 +80,7 @@ class Limit(NamedTuple):
 
 
 def _light(run: Run | None) -> dict[str, Any]:
-    """What the projector's run adds: hand to light, pictures a second; nothing without it."""
+    """Figures that the projector's run adds: hand to light, pictures a second; nothing without it."""
     if run is None:
         return {}
     standing = [moment for moment in steps(run.readings) if moment >= run.stood_from + 0.5]
@@ -161,7 +161,7 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
 
 
 def table(figures: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
-    """What a technician reads."""
+    """The report for a technician."""
     way, free, response = (
         figures["transport_ms"],
         figures["free_running_transport_ms"],

@@ -36,7 +36,7 @@ class State(IntEnum):
 
 
 class Status(ctypes.Structure):
-    """What the wearable and its world count: wearable_status in wearable_c.h, field by field."""
+    """Counters of the wearable and its world: wearable_status in wearable_c.h, field by field."""
 
     now_us: U64
     booted_at_us: U64
@@ -173,7 +173,7 @@ class CompiledWearable:
         return taken
 
     def take_serial(self) -> bytes:
-        """What the wearable wrote since the last call."""
+        """Bytes that the wearable wrote since the last call."""
         count = self._library.wearable_take_serial(self._world, self._buffer, SERIAL_ROOM)
         return bytes(self._buffer[:count])
 

@@ -1,4 +1,4 @@
-"""What a run was like, in numbers: pure functions from what was sent and what was received."""
+"""A run in numbers: pure functions of the packets sent and received."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Reading(NamedTuple):
     sent_at: float
     sampled_at: float
     orientation: tuple[float, float, float, float]
-    power_on_at: float = 0.0  # of the sensor's boot that made it
+    power_on_at: float = 0.0  # start of the sensor's boot that made it
 
 
 class Frame(NamedTuple):
@@ -49,7 +49,7 @@ class Transport(NamedTuple):
 
     sent_at: Floats
     latency_ms: Floats
-    overtaken: int  # of them, readings that no frame carries: a newer one came before the next tick
+    overtaken: int  # among them, readings that no frame carries: a newer one came before the next tick
 
 
 def transport(readings: Sequence[Reading], frames: Sequence[Frame]) -> Transport:

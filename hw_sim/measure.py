@@ -22,7 +22,7 @@ from hw_sim.progress import Progress
 
 REFUSED, FAILED = 2, 1
 BEAT_S = 0.02
-FEWEST_STEPS_S = 3.0  # of the shortest run: two or three steps
+FEWEST_STEPS_S = 3.0  # seconds of the shortest run: two or three steps
 _LARGEST_YAML = 1 << 20
 LOCKED_DRIFT_PPM = 60.0  # what a wearable's crystal may be off by; the lock has to follow it
 POWERED_S = 1.5  # how long a sensor is on until it is switched off again

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 @dataclass(frozen=True)
 class NetworkProfile:
-    """What a network does to datagrams. Shares are of all datagrams, 0..1."""
+    """The effects of a network on datagrams. Shares are of all datagrams, 0..1."""
 
     least_delay_s: float = 0.0
     jitter_s: float = 0.0  # mean of what is added to each delay, exponential
@@ -83,7 +83,7 @@ class VenueNetwork:
         self._last: dict[tuple[int, bool], float] = {}
 
     def carry(self, data: bytes, now: float, flow: int = 0, to_box: bool = True) -> list[Delivery]:
-        """What becomes of a datagram sent at `now` (seconds, never going back) by the sensor number `flow`.
+        """The fate of a datagram sent at `now` (seconds, never going back) by the sensor number `flow`.
 
         Or to it by the box. Each flow and direction keeps its order, except for datagrams that are reordered
         on purpose; what the box says does not change what becomes of the sensors' datagrams.

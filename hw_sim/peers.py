@@ -42,7 +42,8 @@ class ProbeError(RuntimeError):
 
 @dataclass(frozen=True)
 class Setting:
-    """What is measured: a show, settings of the venue's box file, keys, the followed sensor and its joint.
+    """The subject of a measurement: a show, settings of the venue's box file, keys, the followed sensor and
+    its joint.
 
     firmware: the sensor runs the compiled firmware instead of the one in Python.
     """
@@ -79,7 +80,7 @@ def emulate_command(setting: Setting, port: int, log: Path, *options: str) -> li
 def write_box_file(setting: Setting, folder: Path, ports: tuple[int, int, int], **own: object) -> Path:
     """The venue's limits and real-time settings with the run's own ports: sensors, control, frames.
 
-    What it learns and where it meets its processes are its own too; it serves no page and makes no sound.
+    Its state and runtime folders are separate too; it serves no page and makes no sound.
     """
     sensors, control, frames = ports
     values = {

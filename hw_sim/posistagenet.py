@@ -45,7 +45,7 @@ class Packet:
     time_us: int
     version: tuple[int, int]
     frame: int
-    packets: int  # of this frame
+    packets: int  # in this frame
     trackers: dict[int, Tracker] = field(default_factory=dict)
     system: str = ""
     names: dict[int, str] = field(default_factory=dict)

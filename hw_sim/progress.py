@@ -1,4 +1,4 @@
-"""What a measurement tells while it runs: a file of JSON objects, one a line, for a page that draws it."""
+"""The progress of a measurement: a file of JSON objects, one a line, for a page that draws it."""
 
 from __future__ import annotations
 

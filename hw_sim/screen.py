@@ -1,4 +1,4 @@
-"""What an X11 screen shows: reads the time stamp that `project --stamp` draws into each picture.
+"""Reads an X11 screen: the time stamp that `project --stamp` draws into each picture.
 
 Xlib by ctypes, as xwd reads a screen. Nothing of the projector is used here: the stamp is decoded anew.
 """
@@ -18,7 +18,7 @@ from hw_sim.peers import ProbeError
 CELL = 8  # pixels
 CELLS = 36
 UNIT_S = 1e-4
-_PERIOD = 1 << 28  # of the stamp's counter
+_PERIOD = 1 << 28  # period of the stamp's counter
 _ALL_PLANES, _Z_PIXMAP = c_ulong(-1), 2
 _EVERY_S = 0.001
 

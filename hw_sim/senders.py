@@ -1,4 +1,4 @@
-"""A wearable's lanes to the box: a UDP socket of its own or a serial device; and the log of readings."""
+"""A wearable's lanes to the box: its own UDP socket or a serial device; and the log of readings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LOG_HEADER = "sensor,boot_nonce,sequence,sent_s,sampled_s,power_on_s,w,x,y,z,not
 
 
 class UdpSender:
-    """Datagrams to `host`:`port` from an address of its own. Raises OSError when the host is unknown.
+    """Datagrams to `host`:`port` from its own address. Raises OSError when the host is unknown.
 
     Answers are checked by tag, not by address, as in the firmware.
     """

@@ -128,7 +128,8 @@ settle() {
     : >"$root/etc/machine-id"
     rm -f "$root/etc/resolv.conf" "$root/var/lib/dbus/machine-id" "$root/usr/bin/ssh-agent"
     mkdir -p "$root/data" "$root/media/bunraku"
-    # Whoever can plug a keyboard into the box could take its disk as well: there is no password and no ssh.
+    # Anyone who can plug a keyboard into the box could take its disk as well: there is no password and no
+    # ssh.
     sed -i 's|^root:[^:]*:|root::|' "$root/etc/shadow"
     systemctl --root="$root" set-default multi-user.target >/dev/null 2>&1
     systemctl --root="$root" mask getty@tty1.service systemd-random-seed.service apt-daily.timer \
@@ -140,7 +141,8 @@ settle() {
     first_start_done
 }
 
-# What systemd does once after a change of /usr takes a second; a root that forgets would do it at each start.
+# systemd's one-time work after a change of /usr takes a second; a root in memory would repeat it at each
+# start.
 first_start_done() {
     chroot "$root" systemd-sysusers
     chroot "$root" journalctl --quiet --update-catalog

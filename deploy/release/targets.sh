@@ -1,5 +1,5 @@
-# What a box runs, for the scripts of this folder: Python, processors, and which wheels fit them.
-# shellcheck shell=bash
+# The box's target, for the scripts of this folder: Python, processors, and which wheels fit them. shellcheck
+# shell=bash
 
 PYTHON=3.13
 # Debian 13 has glibc 2.41: every wheel for an older one fits.
@@ -15,7 +15,7 @@ machine() {
 
 uv_platform() { echo "$(machine "$1")-unknown-linux-gnu"; }
 
-# An environment of its own in build/release, so that a release does not depend on the developer's.
+# A separate environment in build/release, so that a release does not depend on the developer's.
 prepare_tools() {
     tools=${checkout:?}/build/release/tools
     [ -x "$tools/bin/python" ] || python3 -m venv "$tools"
@@ -25,7 +25,7 @@ prepare_tools() {
 
 pip() { "${tools:?}/bin/python" -m pip --disable-pip-version-check "$@" 2> >(grep -v '^WARNING: Location' >&2); }
 
-# $1 processor, $2 folder, then what pip shall fetch: wheels alone, each by its name, nothing that it depends on.
+# $1 processor, $2 folder, then the packages for pip to fetch: only wheels, each by its name, no dependencies.
 fetch_wheels() {
     local arch=$1 folder=$2 glibc platforms=()
     shift 2
@@ -35,7 +35,7 @@ fetch_wheels() {
         "${platforms[@]}" --dest "$folder" "$@"
 }
 
-# SHA256SUMS over all that lies in the release in folder $1.
+# SHA256SUMS over all files of the release in folder $1.
 write_sums() {
     (cd "$1" && find . -type f -not -name 'SHA256SUMS*' | LC_ALL=C sort | xargs -d '\n' sha256sum) >"$1.sums"
     mv "$1.sums" "$1/SHA256SUMS"

@@ -4,8 +4,8 @@ Usage: budget.py ELF FOLDER. ELF is the linked core; FOLDER holds the call graph
 objects (`-fcallgraph-info=su`).
 
 The stack is the deepest path of calls from the entry point, each function with its frame. A call through a
-pointer may reach every function without a direct caller. What comes from the C library counts LIBRARY_STACK
-bytes; the ports' own code is outside, and so is what the linker threw away.
+pointer may reach every function without a direct caller. Functions of the C library count as LIBRARY_STACK
+bytes; the ports' own code is outside, and so are parts removed by the linker.
 """
 
 from __future__ import annotations

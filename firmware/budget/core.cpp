@@ -1,4 +1,4 @@
-// What the budget counts: one wearable that runs, with its ports outside.
+// The code that the budget counts: one running wearable, with its ports outside.
 #include "wearable.h"
 
 extern "C" void run_wearable(const bunraku::Ports& ports) {

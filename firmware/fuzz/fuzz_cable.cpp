@@ -1,4 +1,5 @@
-// Whatever a host writes to the cable meets the framing and the console. No answer tells the key or the password.
+// Feeds arbitrary bytes from the cable to the framing and the console. No answer tells the key or the
+// password.
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-// Whatever arrives by Wi-Fi or cable, in any order and at any time, meets the pairing. The input is a script of
-// operations; some of them sign a packet with the right key, so that fuzzing reaches what lies behind the tag.
+// Feeds arbitrary packets, by Wi-Fi or cable, in any order and at any time, to the pairing. The input is a
+// script of operations; some of them sign a packet with the right key, so that fuzzing gets past the tag.
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 """Writes the seeds of the fuzzing corpus from the golden vectors and from the console's commands.
 
-`python firmware/fuzz/seeds.py` in the repository regenerates them; inputs found by fuzzing lie beside them.
+`python firmware/fuzz/seeds.py` in the repository regenerates them; inputs found by fuzzing are in the same
+folders.
 """
 
 from __future__ import annotations

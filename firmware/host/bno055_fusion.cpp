@@ -1,4 +1,4 @@
-// What the simulated BNO055 feels: orientation, acceleration, taps, its heading's drift, its calibration.
+// Inputs of the simulated BNO055: orientation, acceleration, taps, its heading's drift, its calibration.
 #include <algorithm>
 #include <cmath>
 
@@ -27,7 +27,7 @@ Quaternion product(const Quaternion& a, const Quaternion& b) {
 
 Quaternion about_z(double radians) { return {std::cos(radians / 2), 0, 0, std::sin(radians / 2)}; }
 
-double heading(const Quaternion& q) {  // of the x axis, about z
+double heading(const Quaternion& q) {  // angle of the x axis, about z
   return std::atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
 }
 

@@ -220,7 +220,7 @@ bool Bno055Model::write_trigger(uint8_t value) {
   return (value & 0x5E) == 0;
 }
 
-// What became of the chip since it was last looked at.
+// The chip's events since the last look.
 void Bno055Model::settle() {
   const uint64_t now_us = clock_.now_us();
   if (!is_powered_ || now_us < answers_us_) return;

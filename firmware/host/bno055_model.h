@@ -69,7 +69,7 @@ class Bno055Model final : public I2cBus {
   uint32_t stretch_us_byte = 180;            // clock stretching
   bool has_crystal = true;
 
-  // What tests and the world look at.
+  // State for tests and the world.
   const ImuModelCounts& counts() const { return counts_; }
   const std::array<uint8_t, 16>& unique_id() const { return unique_id_; }
   bool is_fusing();

@@ -17,7 +17,7 @@ typedef struct {
   uint64_t longest_unfed_us;        /* the longest that the watchdog was not fed */
   uint64_t longest_linked_step_us;  /* the longest turn of the loop while linked */
   uint32_t boot_nonce, session;
-  uint32_t readings, skipped, unsent;  /* of this power-on */
+  uint32_t readings, skipped, unsent;  /* counts of this power-on */
   uint32_t malformed, foreign, forged, replayed, damaged_frames;
   uint32_t joins, failed_joins, sent, refused, lost, unheard;  /* Wi-Fi */
   uint32_t flash_saves, power_ons, restarts, watchdog_bites;

@@ -79,7 +79,7 @@ class WifiModel : public DatagramLink {
     bool is_on;
   };
   bool is_on_air(uint64_t at_us) const;
-  uint64_t next_change(bool is_on, uint64_t after_us) const;  // of the access point; never: the last moment
+  uint64_t next_change(bool is_on, uint64_t after_us) const;  // never: the end of time
   uint64_t chosen(const uint32_t (&range)[2]) { return random_.between(range[0], range[1]); }
   bool emit(const Address& to, const uint8_t* data, uint16_t count);
 

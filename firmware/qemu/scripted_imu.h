@@ -1,5 +1,5 @@
-// A BNO055 small enough for the micro:bit: answers, switches modes, turns slowly about its z axis. What goes wrong
-// with a real one is the host simulation's business.
+// A BNO055 small enough for the micro:bit: answers, switches modes, turns slowly about its z axis. Faults of
+// a real one are simulated on the host.
 #pragma once
 
 #include "bno055_registers.h"

@@ -1,4 +1,5 @@
-// What the sketch uses of Arduino.h, SAMD core 1.8.14 with API 1.5, variant mkr1000. Signatures alone.
+// The part of Arduino.h that the sketch uses, SAMD core 1.8.14 with API 1.5, variant mkr1000. Only
+// signatures.
 #pragma once
 
 #include <stddef.h>

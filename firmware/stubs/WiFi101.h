@@ -1,4 +1,4 @@
-// What the sketch uses of WiFi101 0.16.1. Signatures alone.
+// The part of WiFi101 0.16.1 that the sketch uses. Only signatures.
 #pragma once
 
 #include <Arduino.h>
@@ -24,7 +24,7 @@ class WiFiClass {
   uint32_t subnetMask();
   uint8_t status();
   char* firmwareVersion();
-  int32_t RSSI();  // of the network that is joined, dBm; waits for the module, up to 1 s
+  int32_t RSSI();  // signal of the joined network, dBm; waits for the module, up to 1 s
   void noLowPowerMode();
   void setTimeout(unsigned long timeout_ms);
 };

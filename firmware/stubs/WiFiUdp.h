@@ -1,4 +1,4 @@
-// What the sketch uses of the UDP socket of WiFi101 0.16.1. Signatures alone.
+// The part of the UDP socket of WiFi101 0.16.1 that the sketch uses. Only signatures.
 #pragma once
 
 #include <Arduino.h>

@@ -1,4 +1,4 @@
-// What the sketch uses of Wire, SAMD core 1.8.14. Signatures alone.
+// The part of Wire that the sketch uses, SAMD core 1.8.14. Only signatures.
 #pragma once
 
 #include <stddef.h>

@@ -1,4 +1,4 @@
-// What a box says, for tests of the wearable's side: packets signed with a key, every field open to be wrong.
+// The box's side, for tests of the wearable: packets signed with a key, every field open to be wrong.
 #pragma once
 
 #include <vector>
@@ -65,7 +65,7 @@ struct BoxSide {
     memcpy(packet.imu_id, imu_id, sizeof packet.imu_id);
     packet.offsets[0] = first_offset;
     packet.offsets[18] = 0xE8, packet.offsets[19] = 0x03;  // radius of the accelerometer: 1000
-    packet.offsets[20] = 0xE0, packet.offsets[21] = 0x01;  // of the magnetometer: 480
+    packet.offsets[20] = 0xE0, packet.offsets[21] = 0x01;  // magnetometer radius: 480
     return packet;
   }
 };

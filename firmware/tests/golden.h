@@ -19,7 +19,7 @@ struct Value {
   std::map<std::string, Value> members;
 
   const Value& operator[](const std::string& name) const { return members.at(name); }
-  std::vector<uint8_t> bytes() const {  // of hexadecimal text
+  std::vector<uint8_t> bytes() const {  // bytes of hexadecimal text
     std::vector<uint8_t> all;
     for (size_t at = 0; at + 1 < text.size(); at += 2)
       all.push_back(static_cast<uint8_t>(std::stoul(text.substr(at, 2), nullptr, 16)));

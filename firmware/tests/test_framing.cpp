@@ -22,7 +22,7 @@ Bytes framed(const Bytes& packet) {
 
 Bytes text(const std::string& line) { return Bytes(line.begin(), line.end()); }
 
-// Feeds everything and tells what was found, as "packet:<bytes>", "line:<text>", "overlong".
+// Feeds everything and returns what was found, as "packet:<bytes>", "line:<text>", "overlong".
 struct Line {
   CableInput input;
   uint32_t now_us = 0xFFFFFFF0;  // shortly before the clock's wrap

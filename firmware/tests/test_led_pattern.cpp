@@ -1,4 +1,4 @@
-// What the lamp shows: flashes counted over time.
+// The lamp's signals: flashes counted over time.
 #include <doctest/doctest.h>
 
 #include <initializer_list>

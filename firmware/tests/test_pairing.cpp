@@ -101,7 +101,7 @@ TEST_CASE("a restarted box calls; the wearable greets it and joins its session")
   CHECK(wearer.streams());  // goes on meanwhile
   CHECK(wearer.hear(restarted.assignment(wearer.newest_hello())) == Received::kAssignment);
   CHECK(wearer.pairing.session() == 0x22222222);
-  CHECK(wearer.hear(wearer.box.heartbeat()) == Received::kNothing);  // of the old session
+  CHECK(wearer.hear(wearer.box.heartbeat()) == Received::kNothing);  // packets of the old session
   CHECK(wearer.hear(restarted.heartbeat()) == Received::kHeartbeat);  // its sequence restarted
 }
 

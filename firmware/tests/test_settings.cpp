@@ -1,4 +1,4 @@
-// What survives power-off, and what a power cut or a changed layout does to it.
+// Settings that survive power-off, also after a power cut or a changed layout.
 #include <doctest/doctest.h>
 
 #include <cstring>

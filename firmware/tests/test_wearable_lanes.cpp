@@ -1,4 +1,5 @@
-// The wearable's two lanes: the cable alone or beside Wi-Fi, networks that go and come back, strangers.
+// The wearable's two lanes: only the cable, or both cable and Wi-Fi; networks that go and come back;
+// strangers.
 #include <doctest/doctest.h>
 
 #include "stage.h"

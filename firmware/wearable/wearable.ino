@@ -1,4 +1,4 @@
-// The wearable on an Arduino MKR1000 with a BNO055: glue alone. What it does is in src/core.
+// The wearable on an Arduino MKR1000 with a BNO055: only glue. The logic is in src/core.
 #include "src/arduino/board_clock.h"
 #include "src/arduino/mkr_board.h"
 #include "src/arduino/nvm_store.h"

@@ -1,1 +1,3 @@
-"""What receives DMX, by itself: Art-Net and sACN nodes and USB adapters, written from their standards."""
+"""DMX receivers, independent of the box's code: Art-Net and sACN nodes and USB adapters, written from their
+standards.
+"""

@@ -39,7 +39,7 @@ class DatagramReceiver(Generic[Packet]):
         self.port: int = self.socket.getsockname()[1]
 
     def poll(self, timeout_s: float = 0.0) -> list[tuple[float, Packet]]:
-        """What has come; waits for the first one, timeout_s at most."""
+        """The datagrams received; waits for the first one, timeout_s at most."""
         select.select([self.socket], [], [], timeout_s)
         packets: list[tuple[float, Packet]] = []
         while True:

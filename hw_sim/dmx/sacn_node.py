@@ -36,7 +36,7 @@ class SacnReceiver(DatagramReceiver[sacn.Data | sacn.Discovery]):
 
 
 class SacnNode:
-    """What a fixture behind the node would show: highest priority, highest level among equals."""
+    """Levels that a fixture behind the node would show: highest priority, highest level among equals."""
 
     def __init__(self) -> None:
         self._sources: dict[tuple[int, UUID], Source] = {}

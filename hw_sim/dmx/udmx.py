@@ -28,7 +28,8 @@ class Plug:
 
 
 class UdmxBackend(usb.backend.IBackend):  # type: ignore[misc]
-    """What pyusb asks. `levels` is what the lights get; `ranges` each transfer as (first, count).
+    """The interface that pyusb calls. `levels`: the output to the lights; `ranges`: each transfer as (first,
+    count).
 
     pull_out_after: the device disappears after this many more transfers, in the middle of a universe.
     """
@@ -54,7 +55,7 @@ class UdmxBackend(usb.backend.IBackend):  # type: ignore[misc]
         self.levels = bytearray(CHANNELS)
 
     def enumerate_devices(self) -> list[Plug]:
-        """What is on the bus."""
+        """Devices on the bus."""
         return [self._plug] if self._is_in else []
 
     def get_device_descriptor(self, device: Plug) -> SimpleNamespace:

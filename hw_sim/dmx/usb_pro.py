@@ -32,7 +32,7 @@ class UsbProWidget:
         self.path = path
         self.serial_number = serial_number
         self.universes: deque[tuple[float, bytes]] = deque(maxlen=REMEMBERED)
-        self.labels: list[int] = []  # of every whole message that came in
+        self.labels: list[int] = []  # label of every whole message that came in
         self.broken = 0  # messages that did not end as they should
         self._master = self._slave = -1
         self._stop = threading.Event()
@@ -41,7 +41,7 @@ class UsbProWidget:
 
     @property
     def levels(self) -> bytes | None:
-        """What its DMX output shows: 512 levels or fewer; None before the first."""
+        """Its DMX output: 512 levels or fewer; None before the first."""
         return self.universes[-1][1][1:] if self.universes else None
 
     def plug_in(self) -> None:

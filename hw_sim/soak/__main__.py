@@ -87,7 +87,7 @@ def write(out: Path, seen: Soak, is_over: bool) -> None:
 
 
 class _Progress:
-    """One line that changes on a terminal, one each half a minute elsewhere; each minute the files."""
+    """One line that changes on a terminal, one every half a minute elsewhere; the files every minute."""
 
     def __init__(self, out: Path) -> None:
         self._out = out

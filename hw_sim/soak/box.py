@@ -1,4 +1,4 @@
-"""The box that is soaked: its processes one by one, as its units start them, in a folder of their own."""
+"""The box under test: its processes one by one, as its units start them, in a separate folder."""
 
 from __future__ import annotations
 

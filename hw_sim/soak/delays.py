@@ -13,7 +13,7 @@ SLOT_MS = 20.0
 
 
 class Delays:
-    """A histogram of delays in milliseconds. What is longer than LONGEST_MS counts as that long."""
+    """A histogram of delays in milliseconds. Longer delays count as LONGEST_MS."""
 
     def __init__(self) -> None:
         self._counts: NDArray[np.int64] = np.zeros(round(LONGEST_MS / STEP_MS) + 1, np.int64)
@@ -59,7 +59,7 @@ class Seconds:
         self.bad: Counter[int] = Counter()
 
     def note(self, second: int, delay_ms: float, bad: int) -> None:
-        """What came in this second, and how many slots it spoilt."""
+        """Delays of this second, and how many slots it spoilt."""
         self.worst_ms[second] = max(self.worst_ms.get(second, 0.0), delay_ms)
         if bad:
             self.bad[second] += bad

@@ -14,7 +14,7 @@ from hw_sim.osc_receiver import Argument, MalformedOscError, decode
 from hw_sim.peers import HOST
 
 _STATUS = "/bunraku/status"
-# What /bunraku/status has at these places (docs/osc.md).
+# Fields of /bunraku/status at these places (docs/osc.md).
 _LATE, _SKIPPED, _TICK_P50_MS = 3, 4, 5
 _WELL = (  # each of these restores what another one changed
     *(("/cue", ()), ("/cue", ()), ("/go", ()), ("/stop", (1.0,)), ("/go", ()), ("/blackout", (1,))),

@@ -19,7 +19,7 @@ METHOD = (
     "as one more. Both are shares of all periods, and the box's may be 0.001 (0.1 %) above "
     "cyclictest's."
 )
-MOST_LATE_BEYOND = 0.001  # of all slots, beyond what cyclictest shows of the machine
+MOST_LATE_BEYOND = 0.001  # share of all slots, beyond cyclictest's figure for the machine
 MOST_LATE_OF_MACHINE = 0.005  # above it the comparison says little
 MOST_GROWTH_MB = 1.0
 

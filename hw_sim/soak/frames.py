@@ -89,7 +89,7 @@ class FrameWatch:
         self.seconds.note(int(arrival - self._begun), lateness_ms, int(bad))
 
     def _count(self, tick: int, arrival: float) -> None:
-        """What is missing between the frame before and this one."""
+        """The frames missing between the previous one and this one."""
         before, self._tick, newest = self._tick, tick, self.newest
         self.newest = arrival
         if newest is None:
@@ -111,7 +111,7 @@ class FrameWatch:
         self.seconds.note(int(at - self._begun), count * SLOT_MS, count)
 
     def _arrival(self, told: list[tuple[int, int, bytes]]) -> float:
-        """Of the datagram, in monotonic seconds."""
+        """Arrival time of the datagram, in monotonic seconds."""
         at = time.monotonic()
         for _, kind, data in told:
             if kind == _SO_TIMESTAMPNS:

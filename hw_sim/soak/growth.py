@@ -15,7 +15,7 @@ _SHORTEST_LIFE_S = 3.0
 
 @dataclass(frozen=True)
 class Growth:
-    """What one process held after its first minute, and at the end; it has lived for `lived_s`.
+    """Resources of one process after its first minute, and at the end; it has lived for `lived_s`.
 
     Memory is a median over some seconds. Handles and threads come and go, with receivers or for an instant:
     what the last quarter has more than the first half, at its least and at its most, was not given back.
@@ -34,7 +34,7 @@ class Growth:
 
 
 def growth(unit: Unit, run_s: float) -> Growth | None:
-    """Of its longest life. None when that was too short to tell.
+    """Growth over its longest life. None when that was too short to tell.
 
     In a run of less than four minutes the first minute is a quarter of the run.
     """

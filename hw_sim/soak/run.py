@@ -39,7 +39,7 @@ class Second:
 
 @dataclass
 class Soak:
-    """What a soak has seen so far; `seconds` is how long it has been dancing."""
+    """Results of a soak so far; `seconds` is how long it has been dancing."""
 
     box: SoakedBox
     frames: FrameWatch

@@ -1,4 +1,4 @@
-"""What happens during a soak, and when: load, sensors that fall silent, a bad network, guests, kills."""
+"""The timeline of a soak: load, sensors that fall silent, a bad network, guests, kills."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LOADS: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 COMPRESSED_BELOW_S = 300.0  # shorter runs have the same acts, sooner
 LOAD_S, SENSORS_S, GUESTS_S, COMMAND_S, KILL_S = 60.0, 40.0, 9.0, 3.0, 100.0
-KILLS_UNTIL = 0.5  # of the run: no kills in the second half, so that memory can be compared
+KILLS_UNTIL = 0.5  # share of the run: no kills in the second half, so that memory can be compared
 
 
 class Act(NamedTuple):

@@ -61,7 +61,7 @@ class Unit:
             self._start()
 
     def sample(self, now: float) -> Vitals | None:
-        """What it holds now."""
+        """Its present resources."""
         held = None if self._process is None else vitals(self._process.pid)
         if held is not None:
             self.history.append((now, held))

@@ -1,4 +1,4 @@
-"""What a process holds: memory, handles, threads; and how warm the machine is."""
+"""Resources of a process: memory, handles, threads; and the machine's temperature."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Vitals:
-    """Of one process at one moment; memory in MB (million bytes)."""
+    """Vitals of one process at one moment; memory in MB (million bytes)."""
 
     rss_mb: float
     anonymous_mb: float
@@ -38,7 +38,7 @@ def vitals(pid: int) -> Vitals | None:
 
 
 def warmest_c() -> float | None:
-    """Of all thermal zones, degrees Celsius; None on machines that do not tell."""
+    """Highest temperature of all thermal zones, degrees Celsius; None on machines that do not report it."""
     found = []
     for zone in Path("/sys/class/thermal").glob("thermal_zone*/temp"):
         with contextlib.suppress(OSError, ValueError):

@@ -14,7 +14,7 @@ uint8_t pages_for(uint16_t count) {
   return static_cast<uint8_t>((kHeadBytes + count + kPageBytes - 1) / kPageBytes);
 }
 
-// The sequence is mixed in by hand: the CRC of the data alone would let a head of another save stand before it.
+// The sequence is added to the CRC: without it a head of another save could precede the data.
 uint16_t sum_of(uint32_t sequence, const uint8_t* data, uint16_t count) {
   uint8_t head[6];
   memcpy(head, &sequence, 4);

@@ -19,7 +19,8 @@ class FlashRows {
   ~FlashRows() = default;
 };
 
-// What a save leaves of the record before it. Kept ones cost no wear; erased ones reveal no key or password.
+// The part of the previous record that a save leaves. Kept ones cost no wear; erased ones reveal no key or
+// password.
 enum class Old : uint8_t { kKept, kErased };
 
 class PageLog {

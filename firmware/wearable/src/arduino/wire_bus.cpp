@@ -36,7 +36,7 @@ bool WireBus::write(uint8_t address, uint8_t reg, const uint8_t* data, uint8_t c
   return Wire.endTransmission(true) == 0;
 }
 
-// One register alone is read with its neighbour: for a single byte, Wire 1.8.14 decides by an unset variable
+// A single register is read with its neighbour: for a single byte, Wire 1.8.14 decides by an unset variable
 // whether to send the stop.
 bool WireBus::read(uint8_t address, uint8_t reg, uint8_t* data, uint8_t count) {
   if (!is_free()) return false;

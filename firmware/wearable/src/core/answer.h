@@ -5,7 +5,7 @@
 
 namespace bunraku {
 
-// What does not fit is cut off.
+// Text that does not fit is cut off.
 class Answer {
  public:
   static constexpr uint16_t kRoom = 280;  // its end, '\0', included

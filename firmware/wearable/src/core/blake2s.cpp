@@ -59,7 +59,7 @@ void blake2s(const Signed& message, uint8_t* digest, uint8_t digest_bytes) {
   uint32_t bytes_so_far = 0;
   const uint8_t* data = message.data;
   uint16_t left = message.count;
-  if (message.key_bytes > 0) {  // the key is a block of its own before the message
+  if (message.key_bytes > 0) {  // the key is a separate block before the message
     memcpy(block, message.key, message.key_bytes);
     bytes_so_far = kBlockBytes;
     compress(state, block, bytes_so_far, left == 0);

@@ -1,4 +1,4 @@
-// What the driver offers, and what it does while fusion runs: reads, looks after the chip, refuses nonsense.
+// The driver's public functions, and its work while fusion runs: reads, watches the chip, refuses nonsense.
 #include "bno055.h"
 
 #include <string.h>
@@ -160,7 +160,7 @@ void Bno055::take_acceleration(const uint8_t* bytes, uint32_t now_us) {
   is_linear_new_ = true;
 }
 
-// Counts what was refused; asks the chip how it is when its readings are none.
+// Counts refused readings, and asks the chip for its state when readings are invalid.
 void Bno055::weigh(ImuGate::Verdict verdict) {
   using Verdict = ImuGate::Verdict;
   if (verdict == Verdict::kRelocated) count(counts_.relocated);

@@ -50,7 +50,7 @@ class Bno055 {
 
   // Power-on or settings changed. A chip that fuses already as asked goes on: its heading is kept. Another
   // crystal than before is told to it in any case.
-  // An axis remap that is none leaves the axes as they are.
+  // An invalid axis remap leaves the axes as they are.
   void start(const ImuSettings& settings, uint32_t now_us);
 
   // Start-up, mode changes, health checks, recovery: at most one bus transaction a call, never waits.

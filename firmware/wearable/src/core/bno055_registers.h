@@ -46,7 +46,7 @@ constexpr uint32_t kToConfigUs = 20000;    // table 3-6: 19 ms
 constexpr uint32_t kToFusionUs = 8000;     // table 3-6: 7 ms
 constexpr uint32_t kCrystalUs = 50000;     // not in the datasheet; 10 ms have been seen to be too few
 
-// What two registers hold, the low one first.
+// The value of two registers, the low one first.
 inline int16_t value(const uint8_t* at) { return static_cast<int16_t>(at[0] | at[1] << 8); }
 
 }  // namespace bno055

@@ -1,4 +1,4 @@
-// The console's commands. What is not understood changes nothing.
+// The console's commands. An unknown command changes nothing.
 #include "console.h"
 
 #include <string.h>

@@ -16,7 +16,7 @@
 //   help                    ok <commands>
 //   restart                 ok restarting
 //
-// What is wrong is answered with `error: what, what to do`. A key or a password never leaves by the console.
+// Errors are answered with `error: what, what to do`. A key or a password never leaves by the console.
 #pragma once
 
 #include <stdint.h>

@@ -31,7 +31,7 @@ class CableInput {
   Found feed(uint8_t byte, uint32_t now_us);
   void reset();  // the cable was pulled
 
-  // What the last feed() found, until the next one. A line ends with '\0' and is never empty.
+  // Result of the last feed(), until the next one. A line ends with '\0' and is never empty.
   const uint8_t* packet() const { return buffer_; }
   uint8_t packet_bytes() const { return count_; }
   const char* line() const { return reinterpret_cast<const char*>(buffer_); }
@@ -50,7 +50,7 @@ class CableInput {
   uint32_t damaged_ = 0;
 };
 
-// What waits to be written. Takes a frame or an answer whole or not at all; never waits.
+// Bytes waiting to be written. Takes a frame or an answer whole or not at all; never waits.
 class CableOutput {
  public:
   bool put(const uint8_t* data, uint16_t count);

@@ -1,4 +1,4 @@
-// What makes a wearable believe a packet, follow its box from lane to lane, and look for it again.
+// Decides which packets a wearable believes, follows its box from lane to lane, and looks for it again.
 #include "pairing.h"
 
 #include "blake2s.h"
@@ -11,7 +11,7 @@ namespace {
 constexpr uint32_t kHelloEveryUs = 500'000;
 constexpr uint32_t kCallPauseUs = 200'000;
 constexpr uint32_t kSilenceUs = 3'000'000;         // without the box: the link is left
-constexpr uint32_t kRestoreWithinUs = 10'000'000;  // of the assignment
+constexpr uint32_t kRestoreWithinUs = 10'000'000;  // after the assignment
 constexpr uint32_t kProfileEveryUs = 1'000'000;
 constexpr uint8_t kProfilesToSay = 3;
 constexpr Lane kGreetingOrder[] = {Lane::kCable, Lane::kWifi};

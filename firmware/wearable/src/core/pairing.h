@@ -20,7 +20,7 @@ struct Way {
   Address address = {0, 0};
 };
 
-// What the packets tell about the wearable beside the pairing itself.
+// The packets' facts about the wearable that do not concern pairing.
 struct Condition {
   uint8_t battery;      // percent; 255 unknown
   uint8_t flags;        // wire::kHasProfile, wire::kIsNdof

@@ -1,4 +1,4 @@
-// What the core needs from the world: seven interfaces, implemented by the sketch and by the simulation.
+// The core's interfaces to the world: seven, implemented by the sketch and by the simulation.
 // No call may block longer than its comment states: the core streams at 50 Hz on one thread.
 #pragma once
 
@@ -25,7 +25,7 @@ class I2cBus {
   ~I2cBus() = default;
 };
 
-// What a Wi-Fi module tells about itself.
+// Facts that a Wi-Fi module reports about itself.
 struct Radio {
   uint8_t firmware[3] = {};  // its own firmware's version; zeros: unknown
   int8_t rssi_dbm = 0;       // how strong the access point was when it was joined; 0: unknown
@@ -66,7 +66,7 @@ class SerialPort {
 };
 
 // Small records that survive power-off; erased by an upload of new firmware. Slots 0 to 3, each up to 192
-// bytes and in an erase block of its own: a power cut while one is written loses that one alone.
+// bytes and in its own erase block: a power cut during a write loses only that one.
 class FlashStore {
  public:
   virtual bool load(uint8_t slot, uint8_t* data, uint16_t count) = 0;  // false: never written
@@ -92,7 +92,7 @@ class Board {
   virtual void feed_watchdog() = 0;
   virtual void restart() = 0;  // does not return on the real board
   virtual bool was_reset_by_watchdog() { return false; }  // the start before this one hung
-  virtual uint32_t serial_number() { return 0; }  // of the board's processor, folded; 0: it has none
+  virtual uint32_t serial_number() { return 0; }  // the processor's, folded; 0: it has none
 
  protected:
   ~Board() = default;

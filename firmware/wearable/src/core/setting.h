@@ -6,7 +6,8 @@
 
 namespace bunraku {
 
-// `what`: the setting's name, a space, its value. What breaks a rule changes nothing; the rule is the answer.
+// `what`: the setting's name, a space, its value. A value that breaks a rule changes nothing; the rule is the
+// answer.
 void change_setting(const char* what, Settings& settings, Answer& answer);
 
 const char* fusion_name(Fusion fusion);

@@ -1,4 +1,5 @@
-// Records in flash: version, content, CRC. What is damaged or of another layout counts as never written.
+// Records in flash: version, content, CRC. A damaged record, or one with another layout, counts as never
+// written.
 #include "settings.h"
 
 #include <string.h>

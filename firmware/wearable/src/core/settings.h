@@ -1,4 +1,4 @@
-// What a wearable remembers over power-off: settings, a calibration profile, how often it was switched on.
+// A wearable's memory over power-off: settings, a calibration profile, how often it was switched on.
 #pragma once
 
 #include <stdint.h>
@@ -10,7 +10,7 @@
 namespace bunraku {
 
 constexpr uint8_t kLongestName = 24, kLongestNetwork = 32, kLongestPassword = 63;
-constexpr uint16_t kDefaultPort = 9750;  // of the box, UDP
+constexpr uint16_t kDefaultPort = 9750;  // port of the box, UDP
 constexpr uint8_t kProfileBytes = 22;    // BNO055 registers 0x55 to 0x6A
 constexpr uint8_t kImuIdBytes = 16;
 
@@ -19,7 +19,7 @@ struct Settings {
   uint32_t device_id = 0;  // 0: none
   bool has_key = false;
   uint8_t key[wire::kKeyBytes] = {};
-  char network[kLongestNetwork + 1] = "";  // empty: lives on the cable alone
+  char network[kLongestNetwork + 1] = "";  // empty: only the cable
   char password[kLongestPassword + 1] = "";
   uint16_t port = kDefaultPort;
   ImuSettings imu = {Fusion::kImuPlus, 0x24, 0x00};

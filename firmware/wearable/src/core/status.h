@@ -1,4 +1,4 @@
-// What a wearable can tell about itself at any moment: for the console, the simulation and the tests.
+// A wearable's own report at any moment: for the console, the simulation and the tests.
 #pragma once
 
 #include <stdint.h>
@@ -17,7 +17,7 @@ enum class State : uint8_t {
 
 struct Status {
   State state = State::kNotProvisioned;
-  Lane lane = Lane::kNone;  // of the link
+  Lane lane = Lane::kNone;  // the link's
   bool has_imu = false;     // fusion runs and gives data
   bool has_imu_id = false;
   bool has_profile = false;

@@ -1,4 +1,4 @@
-// A span of time that ends by itself. Safe at the clock's wrap if it is asked at least each 35 minutes.
+// A span of time that ends by itself. Safe at the clock's wrap if it is asked at least every 35 minutes.
 #pragma once
 
 #include <stdint.h>

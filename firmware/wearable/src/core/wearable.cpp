@@ -21,7 +21,7 @@ bool is_older(const uint8_t (&version)[3], const uint8_t (&other)[3]) {
   return memcmp(version, other, sizeof version) < 0;
 }
 
-// What of it has room in a packet's flags: old firmware, and how strong the access point was, 4 dB a step.
+// The part that fits into a packet's flags: old firmware, and the strength of the access point, 4 dB a step.
 uint8_t radio_flags(const Radio& radio) {
   if (!radio.is_known()) return 0;
   const uint8_t old = is_older(radio.firmware, kSoundFirmware) ? wire::kRadioIsOld : uint8_t{0};
