@@ -10,6 +10,7 @@ from appliance.box.show_state import ShowStateReader
 from appliance.dancer.material.material_file import Material
 from appliance.levers.fade import Fade
 from appliance.levers.lever import AT_ONCE, Lever, at_once
+from appliance.levers.show_state import ShowState
 from appliance.levers.sources import LIVE, MAIN
 from appliance.levers.table import PHRASE, RATE, SPRINGS, find_lever
 from appliance.stage.carry_out import obey
@@ -50,11 +51,16 @@ class Reconciler:
         self._gate = True
         self._made, self.source, self.wanted = made, source, ""
         self.motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
+        self._seen: ShowState | None = None
+        self._goes = self._going = True
+        self._declared: Fade[str] | None = None
 
     def pending(self, now: float) -> Sequence[Order]:
         """Orders that make the dance follow the show state; none in nearly every tick."""
         orders: list[Order] = []
         show_state = self._reader.read()
+        if show_state is not self._seen:
+            self._see(show_state)
         has_news = self._is_first or show_state.generation != self.generation
         if has_news and show_state.show == self._show:
             before, self.generation = self.generation, show_state.generation
@@ -74,12 +80,11 @@ class Reconciler:
                 elif self._is_first and name in _OF_SPRINGS:  # it was in force
                     orders.append(order_of(one, at_once(fade)))
             self._is_first = False
-        if (gate := show_state.going and not (show_state.panic or show_state.blackout)) != self._gate:
-            self._gate = gate
+        if self._goes != self._gate:
+            self._gate = self._goes
             if self.parts.springs:
-                orders.append(Order("gate", (float(gate), GATE_S if gate else 0.0)))
-        live, is_ours = self.parts.live, show_state.show == self._show
-        declared = show_state.settings.get(PHRASE.name) if is_ours else None
+                orders.append(Order("gate", (float(self._gate), GATE_S if self._gate else 0.0)))
+        live, declared = self.parts.live, self._declared
         wanted = declared.value if declared else self.source
         melt_s = declared.seconds if declared else MELT_S
         self.wanted = "" if wanted in self.parts.motion.phrases else wanted
@@ -92,10 +97,17 @@ class Reconciler:
                 source, fade_s = wanted if self._is_made(wanted) else "", melt_s
             if (order := made.order(source, fade_s, now)) is not None:
                 orders.append(order)
-        rate = 0.0 if show_state.stands(now) else self.rate
+        rate = self.rate if self._going or not show_state.stands(now) else 0.0
         if rate != self.parts.motion.rate:
             orders.append(Order("rate", (rate,)))
         return orders
+
+    def _see(self, show_state: ShowState) -> None:
+        """Another show state: what each tick asks of it."""
+        self._seen, self._going = show_state, show_state.going
+        self._goes = self._going and not (show_state.panic or show_state.blackout)
+        is_declared = show_state.show == self._show and PHRASE in show_state
+        self._declared = show_state[PHRASE] if is_declared else None
 
     def _is_made(self, name: str) -> bool:
         """Whether the generator makes it: a source, or a motion that was kept."""
