@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 import signal
@@ -12,8 +11,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from appliance.box.child import await_end, environment, start_child
 from appliance.box.notify import ALIVE, ENDING, READY, NotifyListener
-from appliance.box.parent_death import PARENT, TOLD
+from appliance.box.parent_death import TOLD
 
 SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0
 UNAVAILABLE = 69  # sysexits.h: what it needs is not here, or not yet: a projector is switched on late
@@ -26,7 +26,7 @@ READY_S = 30.0  # from its start to its first sign, as its unit has it
 _STOOD_STILL_S = 1.0  # between two looks: this process itself was held up, and blames nobody for it
 _OF_OURS = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID")  # a supervisor's of this process
 _LAST_LINE_S = 0.3  # after SIGABRT, at which Python prints where it hangs
-LAST_WORDS_S, _KILLED_WITHIN_S = 3.0, 1.0
+LAST_WORDS_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -160,25 +160,19 @@ class _Running:
 
     def await_end(self, within_s: float) -> None:
         """Wait for its end; kill what does not end, and leave behind what hangs in the kernel."""
-        if self._process is None:
-            return
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(within_s)
-        self._process.kill()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(_KILLED_WITHIN_S)
+        if self._process is not None:
+            await_end(self._process, within_s)
 
     def _start(self, now: float) -> None:
         self._started_at = self._looked_at = now
         is_watched = self._listener is not None and self._companion.watchdog_s < math.inf
         self._silent_at, self._killed_at = now + READY_S if is_watched else math.inf, math.inf
         try:
-            self._process = subprocess.Popen(
+            self._process = start_child(
                 self._companion.command,
-                stdin=subprocess.DEVNULL,
                 env=self._environment(),
-                pass_fds=self._companion.descriptors,
-                start_new_session=True,  # Ctrl-C is for the box, which then ends them
+                descriptors=self._companion.descriptors,
+                has_own_session=True,  # Ctrl-C is for the box, which then ends them
             )
         except OSError as error:
             self._start_later(f"cannot be started ({error.strerror})", now)
@@ -189,7 +183,7 @@ class _Running:
         if self._listener is not None and self._companion.watchdog_s < math.inf:
             watched = self._listener.environ(self._companion.watchdog_s) | {"PYTHONFAULTHANDLER": "1"}
         inherited = {name: value for name, value in os.environ.items() if name not in _OF_OURS}
-        return {**inherited, PARENT: str(os.getpid()), **told, **watched}
+        return environment(inherited, **told, **watched)
 
     def _note_exit(self, status: int, now: float) -> None:
         companion = self._companion

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import subprocess
 import sys
 import time
@@ -11,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from appliance.box.parent_death import PARENT
+from appliance.box.child import BUNRAKU, end_child, start_child
 from appliance.sensor.keys import create_keys
 from appliance.show.box import BoxConfig, UdpConfig
 from appliance.show.show import Show
@@ -38,30 +36,24 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     create_keys(keys, names)
     udp = box.sensors.udp or UdpConfig()
     command = [
-        *(sys.executable, "-m", "appliance.cli", "emulate", "--keys", str(keys), "--motion", "dance"),
+        *(*BUNRAKU, "emulate", "--keys", str(keys), "--motion", "dance"),
         *("--host", udp.host, "--port", str(udp.port), "--stand-still", str(_STAND_STILL_S), "--tap"),
     ]
     sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
     journal = box.journal.model_copy(update={"folder": None})
     with words.open("wb") as output:
-        process = subprocess.Popen(
+        process = start_child(
             command,
-            stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=subprocess.STDOUT,
-            env={**os.environ, PARENT: str(os.getpid())},
-            start_new_session=True,  # Ctrl-C is for the box, which then ends the emulator
+            has_own_session=True,  # Ctrl-C is for the box, which then ends the emulator
         )
     try:
         yield box.model_copy(update={"sensors": sensors, "state": None, "journal": journal})
     finally:
         if process.poll():
             print(f"The emulated sensors ended by themselves: {words.read_text()}", file=sys.stderr)
-        process.terminate()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(_LAST_WORDS_S)
-        process.kill()
-        process.wait()
+        end_child(process, _LAST_WORDS_S)
 
 
 def wait_until_calling(scratch: Path) -> None:

@@ -10,7 +10,6 @@ import platform
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -18,7 +17,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from appliance.box.parent_death import PARENT
+from appliance.box.child import BUNRAKU, end_child, start_child
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.doctor.finding import for_phone
 from appliance.console.proofs import Proofs
@@ -98,13 +97,7 @@ def _run(
 ) -> str:
     """What a command of ours says; ended when it is no longer wanted. at_rest: or when the show goes on."""
     with tempfile.TemporaryFile() as out, stop_signals() as is_ended:
-        child = subprocess.Popen(
-            (sys.executable, "-m", "appliance.cli", *words),
-            stdin=subprocess.DEVNULL,
-            stdout=out,
-            stderr=subprocess.STDOUT,
-            env={**os.environ, PARENT: str(os.getpid())},
-        )
+        child = start_child((*BUNRAKU, *words), stdout=out, stderr=subprocess.STDOUT)
         try:
             while child.poll() is None:
                 if proving.wanted() is None or is_ended():
@@ -117,7 +110,7 @@ def _run(
                     child.wait(_LOOK_S)
             tell()
         finally:
-            _end(child)
+            end_child(child, _ENDS_WITHIN_S, signal.SIGINT)  # measure then ends its box and its sensor
         out.seek(0)
         return out.read().decode(errors="replace")
 
@@ -138,17 +131,6 @@ def _copying(told: Path, proving: Proving) -> Callable[[], None]:
                 progress.write(part)
 
     return copy
-
-
-def _end(child: subprocess.Popen[bytes]) -> None:
-    """As Ctrl-C does: measure then ends its box and its sensor by itself."""
-    if child.poll() is None:
-        child.send_signal(signal.SIGINT)
-        try:
-            child.wait(_ENDS_WITHIN_S)
-        except subprocess.TimeoutExpired:
-            child.kill()
-            child.wait()
 
 
 def machine() -> dict[str, Any]:

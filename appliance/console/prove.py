@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
-import sys
 from pathlib import Path
 
 from aiohttp import web
 
-from appliance.box.parent_death import PARENT
+from appliance.box.child import BUNRAKU, environment
 from appliance.console.body import said
 from appliance.console.guard import Guard
 from appliance.console.proofs import FOLDER, Proofs
@@ -125,9 +123,9 @@ class Prove:
 
     async def _start(self) -> None:
         self._child = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "appliance.cli", "console", "prove", *self._options),
+            *(*BUNRAKU, "console", "prove", *self._options),
             stdin=asyncio.subprocess.DEVNULL,
-            env={**os.environ, PARENT: str(os.getpid()), "OPENBLAS_NUM_THREADS": "1"},
+            env=environment(OPENBLAS_NUM_THREADS="1"),
         )
         task = asyncio.create_task(self._child.wait())
         self._waiting.add(task)

@@ -6,9 +6,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 
-from appliance.box.parent_death import PARENT
+from appliance.box.child import await_end, start_child
 from appliance.projector.raw_stream import RawStream
 from appliance.projector.stream.pipe import WANTED, head
 from appliance.projector.window import Size
@@ -51,10 +50,7 @@ class Feed:
         self._process.terminate()  # first: then no picture waits for it
         if self._pictures is not None:
             self._pictures.close()
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(_LAST_WORDS_S)
-        self._process.kill()
-        self._process.wait()
+        await_end(self._process, _LAST_WORDS_S)
         assert self._process.stdout is not None
         self._process.stdout.close()
         self._process = self._pictures = None
@@ -70,12 +66,8 @@ class Feed:
         self.close()
         self._begun_at, self._hangs_at = now, now + _STARTS_WITHIN_S
         pictures, into = os.pipe()
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "appliance.projector.stream", self._config.model_dump_json()],
-            stdin=pictures,
-            stdout=subprocess.PIPE,
-            env={**os.environ, PARENT: str(os.getpid())},
-        )
+        command = [sys.executable, "-m", "appliance.projector.stream", self._config.model_dump_json()]
+        self._process = start_child(command, stdin=pictures, stdout=subprocess.PIPE)
         os.close(pictures)
         assert self._process.stdout is not None
         os.set_blocking(self._process.stdout.fileno(), False)
