@@ -22,7 +22,7 @@ prepare_environment()
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
 from appliance.cli.examples import ORDER, OTHER_WORDS  # noqa: E402
-from appliance.cli.help_page import give_help  # noqa: E402
+from appliance.cli.help_page import complete_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
 from appliance.pose.file_trouble import sentence  # noqa: E402
 from appliance.pose.idle_options import refuse_idle  # noqa: E402
@@ -82,7 +82,9 @@ def command_line(name: str | None = None) -> typer.Typer:
     return app
 
 
-def _bunraku() -> None:
+def _bunraku(
+    version: Annotated[bool, typer.Option("--version", help="Print the version, and end.")] = False,
+) -> None:
     """The box that lets a dancer puppeteer an AI dancer on stage."""
 
 
@@ -156,7 +158,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     command = parser(word, plugged)
     if word not in command.commands:  # help and mistakes need all
         command = parser(None, plugged)
-    give_help(command, order=ORDER)
+    complete_help(command, order=ORDER)
     _require_known(given, list(command.commands))
     gc.enable()  # spare_the_collector has put it off until the command is loaded
     try:
