@@ -16,7 +16,7 @@ SETTLED_S = (0.3, 0.45)  # and after it over this part
 SAME_FRAME_S = 0.002  # a frame's datagram arrives so much later than the frame is shared, at most
 
 
-class Reading(NamedTuple):
+class SentReading(NamedTuple):
     """A reading as the emulator's log has it; times in monotonic seconds."""
 
     sequence: int
@@ -52,7 +52,7 @@ class Transport(NamedTuple):
     overtaken: int  # among them, readings that no frame carries: a newer one came before the next tick
 
 
-def transport(readings: Sequence[Reading], frames: Sequence[Frame]) -> Transport:
+def transport(readings: Sequence[SentReading], frames: Sequence[Frame]) -> Transport:
     """Datagram in to datagram out: from a reading's sending to the first frame that knows it.
 
     A reading that came too late for its tick and was overtaken by the next one counts with the frame that
@@ -75,7 +75,7 @@ def transport(readings: Sequence[Reading], frames: Sequence[Frame]) -> Transport
     return Transport(np.array(times), np.array(latencies), overtaken)
 
 
-def power_on_s(readings: Sequence[Reading], frames: Sequence[Frame]) -> Floats:
+def power_on_s(readings: Sequence[SentReading], frames: Sequence[Frame]) -> Floats:
     """From each power-on of the sensor to the first frame that carries a reading of that power-on, seconds.
 
     A power-on of which no frame tells is left out: the run ended before.
@@ -102,7 +102,7 @@ def missing_frames(frames: Sequence[Frame]) -> int:
     return max(ticks) - min(ticks) + 1 - len(ticks) if ticks else 0
 
 
-def steps(readings: Sequence[Reading]) -> list[float]:
+def steps(readings: Sequence[SentReading]) -> list[float]:
     """The moments (s) at which the sensor's orientation jumped."""
     in_order = sorted({reading.sequence: reading for reading in readings}.values())
     return [

@@ -66,21 +66,21 @@ def measure(
     """
     try:
         with scratch_folder("bunraku-measure-") as scratch:
-            setting, told = _setting(show, box, scratch, firmware), Progress(progress)
+            setting, page = _setting(show, box, scratch, firmware), Progress(progress)
             print(f"Measuring {seconds:g} s in phase with the sensor ...", flush=True)
-            told.tell(phase="locked", seconds=seconds, settling_s=min(SETTLING_S, seconds / 2.0))
-            locked = run(setting, locked_course(seconds), told)
+            page.tell(phase="locked", seconds=seconds, settling_s=min(SETTLING_S, seconds / 2.0))
+            locked = run(setting, locked_course(seconds), page)
             free_s = max(6.0, seconds / 3.0)
             print(f"Measuring {free_s:g} s running free ...", flush=True)
-            told.tell(phase="free", seconds=free_s, settling_s=FREE_SETTLING_S)
-            free = run(setting, free_course(free_s), told)
+            page.tell(phase="free", seconds=free_s, settling_s=FREE_SETTLING_S)
+            free = run(setting, free_course(free_s), page)
             course = power_on_course(seconds, POWERED_FIRMWARE_S if firmware else POWERED_S)
             print(f"Switching the sensor on and off for {course.seconds:g} s ...", flush=True)
-            told.tell(phase="power-ons", seconds=course.seconds)
+            page.tell(phase="power-ons", seconds=course.seconds)
             power_ons = run(setting, course)
             times = min(max(2, round(seconds / 6)), MOST_RESTARTS)
             print(f"Killing and starting the box {times} times ...", flush=True)
-            told.tell(phase="restarts", times=times)
+            page.tell(phase="restarts", times=times)
             restarts = run_restarts(setting, times)
             seen = None
             if light:
@@ -88,12 +88,12 @@ def measure(
                 seen = run(setting, light_course(free_s))
             evidence = Evidence(locked, free, power_ons, restarts, firmware, seen)
     except (ProbeError, OSError, ValueError) as error:
-        words = sentence(error) if isinstance(error, OSError) else None
-        print(f"bunraku measure: {words or error}", file=sys.stderr)
+        message = sentence(error) if isinstance(error, OSError) else None
+        print(f"bunraku measure: {message or error}", file=sys.stderr)
         raise typer.Exit(REFUSED) from None
     figures = figures_of(evidence)
     limits = verdict(figures)
-    told.tell(figures=figures, limits=[limit._asdict() | {"holds": limit.holds} for limit in limits])
+    page.tell(figures=figures, limits=[limit._asdict() | {"holds": limit.holds} for limit in limits])
     for line in table(figures, limits):
         print(line)
     written = [json_file] if json_file is not None else []

@@ -89,21 +89,21 @@ class VenueNetwork:
         on purpose; what the box says does not change what becomes of the sensors' datagrams.
         """
         profile, source = self.profile, self._random if to_box else self._random_back
-        chance = source.random
-        if chance() < profile.loss_share:
+        draw = source.random
+        if draw() < profile.loss_share:
             return [Delivery(now, data, "lost")]
         at = now + self._delay_s(now, source)
         note = ""
-        if chance() < profile.reordered_share:
+        if draw() < profile.reordered_share:
             at += source.uniform(*OVERTAKING_S)
             note = "reordered"
         else:
             at = max(at, self._last.get((flow, to_box), 0.0) + self._burst_spacing_s(source))
             self._last[flow, to_box] = at
-        if chance() < profile.corrupted_share:
+        if draw() < profile.corrupted_share:
             data, note = _corrupted(data, source), "corrupted"
         deliveries = [Delivery(at, data, note)]
-        if chance() < profile.duplicated_share:
+        if draw() < profile.duplicated_share:
             deliveries.append(Delivery(at + source.uniform(*OVERTAKING_S), data, "duplicated"))
         return deliveries
 

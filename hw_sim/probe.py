@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hw_sim.journal_reader import read_journal
-from hw_sim.latency import Frame, Reading, Restart
+from hw_sim.latency import Frame, Restart, SentReading
 from hw_sim.osc_receiver import OscReceiver, decode
 from hw_sim.peers import (
     FRAME,
@@ -66,7 +66,7 @@ class Run:
     """The record of one run; times in monotonic seconds."""
 
     frames: list[Frame]
-    readings: list[Reading]
+    readings: list[SentReading]
     ticks: NDArray[Any]
     sections: tuple[str, ...]
     rss_mb: float
@@ -222,11 +222,11 @@ def _mark(datagram: bytes) -> list[Any]:
     return list(decode(datagram)[0][1])
 
 
-def _read_log(path: Path, sensor: str) -> list[Reading]:
+def _read_log(path: Path, sensor: str) -> list[SentReading]:
     with path.open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["sensor"] == sensor and row["note"] == ""]
     return [
-        Reading(
+        SentReading(
             int(row["sequence"]),
             float(row["sent_s"]),
             float(row["sampled_s"]),

@@ -68,15 +68,15 @@ def guarded(
         thread.join()
 
 
-def end_process(words: str, status: int) -> NoReturn:
+def end_process(message: str, status: int) -> NoReturn:
     """Report why, and end at once: a thread that waits for a device receives no signal either."""
     # A stopped terminal must not block this.
-    saying = threading.Thread(target=_say, args=(words,), daemon=True)
+    saying = threading.Thread(target=_say, args=(message,), daemon=True)
     saying.start()
     saying.join(_LAST_WORDS_S)
     os._exit(status)
 
 
-def _say(words: str) -> None:
-    print(f"bunraku: {words}", file=sys.stderr, flush=True)
+def _say(message: str) -> None:
+    print(f"bunraku: {message}", file=sys.stderr, flush=True)
     sys.stdout.flush()

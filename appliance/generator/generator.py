@@ -33,7 +33,7 @@ from appliance.dancer.phrase_cache import MEMORY, PhraseCache
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
 from appliance.generator.kept_motions import KeptMotions
 from appliance.generator.pointing import Pointing
-from appliance.generator.wish import AGAIN, Wish, Wishes
+from appliance.generator.request import AGAIN, Request, Requests
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.bvh import BvhError
 from appliance.show.box import BoxConfig
@@ -53,13 +53,11 @@ _WRONG = (MotionNetworkError, GroundingError, PhraseError, BvhError, OSError, Lo
 
 @dataclass
 class _Ahead:
-    """Motion made ahead for one puppet. wish: the request that the last motion was made for; returns: since
-    then.
-    """
+    """Motion made ahead for one puppet. request: the one for the last motion; returns: since then."""
 
     puppet: int
     writer: MadeMotionWriter
-    wish: Wish | None = None
+    request: Request | None = None
     recipe: str = ""
     returns: int = 0
     rests_until: float = 0.0
@@ -75,7 +73,7 @@ class Generator:
     ) -> None:
         config = show.config
         self._show, self._folder, self._stage, self._fallbacks = show, folder, stage, fallbacks
-        self._wishes = Wishes(config)
+        self._requests = Requests(config)
         self._phrases = PhraseCache(show.directory, folder / MEMORY)
         self._loops: dict[str, Loop] = {}
         grounded = config.motion.grounded
@@ -107,7 +105,7 @@ class Generator:
         self._fallbacks.set(NOT_KEPT.name, self.kept.complaint)
         state = state_reader.read()
         self._pointed = [] if self._pointing is None else self._pointing.point(self._stage.newest(now))
-        waiting_first = sorted(self._ahead, key=lambda one: one.wish is not None)
+        waiting_first = sorted(self._ahead, key=lambda one: one.request is not None)
         return any(self._look_at(one, state, now) for one in waiting_first)  # one motion, then it looks again
 
     def obey(self, order: Order) -> tuple[bool, str]:
@@ -133,25 +131,27 @@ class Generator:
         """Make what is wanted next for a puppet, if anything is; whether it did."""
         told, danced = self._told(ahead.puppet), self._danced(ahead.puppet)
         base, wanted = str(told.get("base", MAIN)), str(told.get("wanted", ""))
-        wish = self._wishes.wish(state, base, self.kept.recipes, now, wanted, ahead.puppet, self._pointed)
-        if wish is None:
-            ahead.wish = None
+        request = self._requests.request(
+            state, base, self.kept.recipes, now, wanted, ahead.puppet, self._pointed
+        )
+        if request is None:
+            ahead.request = None
             return False
-        self._adopt(ahead, wish, danced)
+        self._adopt(ahead, request, danced)
         is_used = bool(ahead.recipe) and danced == ahead.recipe
-        if wish != ahead.wish and now < ahead.rests_until:
+        if request != ahead.request and now < ahead.rests_until:
             return False  # a hand draws over the map: the newest point counts
         is_unseen = not is_used and now > ahead.taken_by
-        if wish != ahead.wish:
+        if request != ahead.request:
             ahead.returns = 0
-        elif is_used and wish.is_new_at_return:
+        elif is_used and request.is_new_at_return:
             ahead.returns += 1
         elif not is_unseen:
             return False
-        at_once = wish != ahead.wish or is_unseen
+        at_once = request != ahead.request or is_unseen
         ahead.rests_until, ahead.taken_by = now + _REST_S, now + _TAKEN_S if at_once else math.inf
-        self._make(ahead, wish, at_once)
-        ahead.wish = wish
+        self._make(ahead, request, at_once)
+        ahead.request = request
         return True
 
     def _told(self, puppet: int) -> Mapping[str, Any]:
@@ -166,31 +166,31 @@ class Generator:
         """The recipe that a puppet dances; "" for none."""
         return str(self._told(puppet).get("made", ""))
 
-    def _adopt(self, ahead: _Ahead, wish: Wish, danced: str) -> None:
-        """After a restart: what is danced was made for this wish, and the next one follows at its return."""
-        if ahead.wish is not None or not danced:
+    def _adopt(self, ahead: _Ahead, request: Request, danced: str) -> None:
+        """After a restart: the present motion was made for this request; the next follows at its return."""
+        if ahead.request is not None or not danced:
             return
-        recipe, own = parsed_recipe(danced), wish.recipe
+        recipe, own = parsed_recipe(danced), request.recipe
         returns = recipe.get("seed", 0) - own.get("seed", 0)
         if _character(recipe) == _character(own) and 0 <= returns < AGAIN:
-            ahead.wish, ahead.recipe, ahead.returns = wish, danced, returns
+            ahead.request, ahead.recipe, ahead.returns = request, danced, returns
 
-    def _make(self, ahead: _Ahead, wish: Wish, at_once: bool) -> None:
-        """Make a motion and hand it over; what cannot be made is reported, and tried with the next wish."""
+    def _make(self, ahead: _Ahead, request: Request, at_once: bool) -> None:
+        """Make a motion and hand it over; a failure is reported, and tried again at the next request."""
         self._number = 1000 + (self._number + 1) % _MOST_NUMBERS
-        recipe = {**wish.recipe, "number": self._number}
+        recipe = {**request.recipe, "number": self._number}
         if "seed" in recipe:
             recipe["seed"] += ahead.returns
         try:
             if recipe["source"] == IMPROVISE:
                 recipe |= self._going_on(ahead.puppet, at_once)
             text, file = recipe_text(recipe), self._file(self._number)
-            loop = self._numbered(wish.name) if recipe["source"] == KEPT else self._maker.make(recipe)
+            loop = self._numbered(request.name) if recipe["source"] == KEPT else self._maker.make(recipe)
             write_material(file, Material(text, loop), self._show.skeleton.names)
-            ahead.writer.write(MadeMotion(text, file.name, wish.name, at_once, recipe.get("from_s")))
+            ahead.writer.write(MadeMotion(text, file.name, request.name, at_once, recipe.get("from_s")))
         except _WRONG as error:
-            ahead.complaint = f"{wish.name}: {error} The last phrase plays on."
-            self._fallbacks.concern(NOT_MADE.name, [wish.name])
+            ahead.complaint = f"{request.name}: {error} The last phrase plays on."
+            self._fallbacks.concern(NOT_MADE.name, [request.name])
         else:
             ahead.complaint, ahead.recipe = "", text
             give_back_memory()

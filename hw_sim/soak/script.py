@@ -30,10 +30,10 @@ class Act(NamedTuple):
 def script(seconds: float, companions: list[str], guests: int, seed: int, load: bool) -> list[Act]:
     """All acts of a run of `seconds`, in order. The same seed gives the same run."""
     pace = min(1.0, seconds / COMPRESSED_BELOW_S)
-    chance = random.Random(f"soak {seed}")
-    acts = [*_sensors(seconds, pace, chance), *_guests(seconds, pace, guests, chance)]
+    rng = random.Random(f"soak {seed}")
+    acts = [*_sensors(seconds, pace, rng), *_guests(seconds, pace, guests, rng)]
     acts += [Act(at, "command") for at in _each(COMMAND_S * pace, seconds)]
-    acts += _kills(seconds, pace, companions, chance)
+    acts += _kills(seconds, pace, companions, rng)
     if load:
         acts += [
             Act(at, "load", LOADS[number % len(LOADS)][0])
@@ -42,27 +42,27 @@ def script(seconds: float, companions: list[str], guests: int, seed: int, load: 
     return sorted(acts, key=lambda act: act.at)
 
 
-def _sensors(seconds: float, pace: float, chance: random.Random) -> Iterator[Act]:
+def _sensors(seconds: float, pace: float, rng: random.Random) -> Iterator[Act]:
     """Outages of 0.2 to 8 s; and each fourth time another network, for which the sensors are off and on."""
     for number, at in enumerate(_each(SENSORS_S * pace, seconds)):
         if number % 4 == 1:
             yield Act(at, "network", "bad" if number % 8 == 1 else "venue")
         else:
             yield Act(at, "outage")
-            yield Act(at + pace * chance.uniform(0.2, 8.0), "back")
+            yield Act(at + pace * rng.uniform(0.2, 8.0), "back")
 
 
-def _guests(seconds: float, pace: float, guests: int, chance: random.Random) -> Iterator[Act]:
+def _guests(seconds: float, pace: float, guests: int, rng: random.Random) -> Iterator[Act]:
     """Receivers that come and go."""
     for at in _each(GUESTS_S * pace, seconds):
-        yield Act(at + pace * chance.uniform(0.0, 5.0), "guest", str(chance.randrange(guests)))
+        yield Act(at + pace * rng.uniform(0.0, 5.0), "guest", str(rng.randrange(guests)))
 
 
-def _kills(seconds: float, pace: float, companions: list[str], chance: random.Random) -> Iterator[Act]:
+def _kills(seconds: float, pace: float, companions: list[str], rng: random.Random) -> Iterator[Act]:
     """Each of them in turn, in an order that changes."""
     for number, at in enumerate(_each(KILL_S * pace, KILLS_UNTIL * seconds)):
         if number % len(companions) == 0:
-            chance.shuffle(companions := list(companions))
+            rng.shuffle(companions := list(companions))
         yield Act(at, "kill", companions[number % len(companions)])
 
 

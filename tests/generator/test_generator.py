@@ -14,7 +14,7 @@ import pytest
 
 from appliance.box.made_motion import MadeMotion, MadeMotionReader
 from appliance.box.show_state import ShowState
-from appliance.generator import wish as wishes
+from appliance.generator import request as requests
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
 from appliance.generator.pointing import Pointing
 from appliance.outputs.frame_reader import SeenFrame
@@ -141,10 +141,10 @@ def test_a_limb_that_a_hand_holds_points_at_the_map(tmp_path: Path) -> None:
     config = load_show(
         write_show_with_sources(tmp_path, {"path": {"by_hand": True}, "source": "path"})
     ).config
-    wishes_of = wishes.Wishes(config)
-    wish = wishes_of.wish(ShowState(show=config.name), "main", {}, 0.0, pointed=up)
-    assert wish is not None and wish.recipe["points"] == up
-    assert "points" not in wishes_of.wish(ShowState(show=config.name), "main", {}, 0.0).recipe  # type: ignore[union-attr]
+    requests_of = requests.Requests(config)
+    request = requests_of.request(ShowState(show=config.name), "main", {}, 0.0, pointed=up)
+    assert request is not None and request.recipe["points"] == up
+    assert "points" not in requests_of.request(ShowState(show=config.name), "main", {}, 0.0).recipe  # type: ignore[union-attr]
 
 
 def test_what_the_stage_could_not_take_over_is_made_again(bench: Benches, tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_a_generator_that_was_killed_goes_on_where_it_was(bench: Benches, tmp_pa
 def test_parameters_reach_their_value_in_steps(
     bench: Benches, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wishes, "STEP_S", 1000.0)
+    monkeypatch.setattr(requests, "STEP_S", 1000.0)
     one = bench(write_show_with_sources(tmp_path / "show"))
     one.declare(phrase=("vary", NO_FADE))
     assert one.recipe()["sigma"] == 1.0

@@ -10,8 +10,8 @@ import pytest
 from hw_sim.figures import Evidence, figures_of, table, verdict
 from hw_sim.latency import (
     Frame,
-    Reading,
     Restart,
+    SentReading,
     missing_frames,
     percentiles,
     power_on_s,
@@ -28,10 +28,10 @@ HALF = np.radians(40.0)
 RECORD = np.dtype([("sections_ms", "<f4", (2,)), ("flags", "<u4")])
 
 
-def readings(count: int, lost: tuple[int, ...] = ()) -> list[Reading]:
+def readings(count: int, lost: tuple[int, ...] = ()) -> list[SentReading]:
     """Every 20 ms, turning back and forth by 40 degrees every 0.6 s; 3 ms of network."""
     return [
-        Reading(
+        SentReading(
             n, 10.003 + 0.02 * n, 10.0 + 0.02 * n, about(AXIS, HALF * (int(0.02 * n / STEP_S + 1e-9) % 2))
         )
         for n in range(count)
@@ -39,7 +39,7 @@ def readings(count: int, lost: tuple[int, ...] = ()) -> list[Reading]:
     ]
 
 
-def frames(sent: list[Reading], latency_s: float = 0.0025, response_s: float = 0.08) -> list[Frame]:
+def frames(sent: list[SentReading], latency_s: float = 0.0025, response_s: float = 0.08) -> list[Frame]:
     """A frame for each reading; the joint follows each step after `response_s`, in the middle of a ramp."""
     result, moments = [], steps(sent)
     for tick, reading in enumerate(sent):
@@ -50,20 +50,20 @@ def frames(sent: list[Reading], latency_s: float = 0.0025, response_s: float = 0
     return result
 
 
-def run(sent: list[Reading], received: list[Frame]) -> Run:
+def run(sent: list[SentReading], received: list[Frame]) -> Run:
     ticks = np.zeros(len(received), RECORD)
     ticks["sections_ms"] = (0.5, 1.0)
     return Run(received, sent, ticks, ("drain", "puppet"), 80.0, 0.9, 0.0)
 
 
-def power_ons(count: int, until_reading_s: float = 0.75) -> tuple[list[Reading], list[Frame]]:
+def power_ons(count: int, until_reading_s: float = 0.75) -> tuple[list[SentReading], list[Frame]]:
     """A sensor that is on for 1.5 s and off as long; each boot counts its readings from zero."""
     sent, received = [], []
     for boot in range(count):
         power_on_at = 20.0 + 3.0 * boot
         for n in range(35):
             at = power_on_at + until_reading_s + 0.02 * n
-            sent.append(Reading(n, at, at, (1.0, 0.0, 0.0, 0.0), power_on_at))
+            sent.append(SentReading(n, at, at, (1.0, 0.0, 0.0, 0.0), power_on_at))
             received.append(Frame(at + 0.002, len(received), n, False, np.array([1.0, 0, 0, 0])))
         gap = np.arange(sent[-1].sent_at + 0.022, power_on_at + 3.0 + until_reading_s, 0.02)
         received += [Frame(at, len(received) + k, 34, False, np.zeros(4)) for k, at in enumerate(gap)]

@@ -49,9 +49,9 @@ def improvised(networks: Choreographer, heard: Numbers, moves: int, temperature:
         code = networks.code_of(heard[:, at - BEFORE : at], heard[:, at : at + MOVE])
         before = heard[:, at + MOVE - BEFORE : at + MOVE]
         mixture, cells = networks.forecast(before, code, cells)
-    chance, danced = np.random.default_rng(seed), []
+    rng, danced = np.random.default_rng(seed), []
     for _ in range(moves):
-        code = drawn(*parts_of(mixture, networks.mixtures), temperature, chance)
+        code = drawn(*parts_of(mixture, networks.mixtures), temperature, rng)
         danced.append(networks.move_of(before, code))
         before = danced[-1][:, -BEFORE:]
         mixture, cells = networks.forecast(before, code, cells)
@@ -65,11 +65,11 @@ def parts_of(mixture: Numbers, mixtures: int) -> tuple[Numbers, Numbers, Numbers
 
 
 def drawn(
-    logits: Numbers, means: Numbers, log_scales: Numbers, temperature: float, chance: np.random.Generator
+    logits: Numbers, means: Numbers, log_scales: Numbers, temperature: float, rng: np.random.Generator
 ) -> Numbers:
     """Samples (B, D); temperature 1: as learned, 0: the mean of the likeliest Gaussian."""
-    chosen = (logits + temperature * chance.gumbel(size=logits.shape)).argmax(axis=1)
+    chosen = (logits + temperature * rng.gumbel(size=logits.shape)).argmax(axis=1)
     rows = np.arange(len(logits))
-    noise = chance.standard_normal(means[:, 0].shape)
+    noise = rng.standard_normal(means[:, 0].shape)
     sample: Numbers = means[rows, chosen] + temperature * np.exp(log_scales[rows, chosen]) * noise
     return sample.astype(np.float32)

@@ -14,8 +14,8 @@ Latents = NDArray[np.float32]
 
 def sampled(windows: int, latent: int, spread: float, seed: int) -> Latents:
     """The paper's way: every window is an independent sample; blending decides how smooth it gets."""
-    chance = np.random.default_rng(seed)
-    return (spread * chance.standard_normal((windows, latent))).astype(np.float32)
+    rng = np.random.default_rng(seed)
+    return (spread * rng.standard_normal((windows, latent))).astype(np.float32)
 
 
 def walked(windows: int, latent: int, spread: float, waves: float, seed: int) -> Latents:
@@ -23,12 +23,10 @@ def walked(windows: int, latent: int, spread: float, waves: float, seed: int) ->
 
     waves: how often a number goes back and forth on the whole way, at most: terms of a Fourier series.
     """
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     terms = max(1, min(round(waves), windows // 2))
     amounts = np.zeros((windows // 2 + 1, latent), dtype=complex)
-    amounts[1 : terms + 1] = chance.standard_normal((terms, latent)) + 1j * chance.standard_normal(
-        (terms, latent)
-    )
+    amounts[1 : terms + 1] = rng.standard_normal((terms, latent)) + 1j * rng.standard_normal((terms, latent))
     path = np.fft.irfft(amounts, windows, axis=0)
     size = np.sqrt((path**2).mean(axis=0))
     walk: Latents = (spread * path / np.maximum(size, 1e-12)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Wishes: which motion the show state asks for, as recipes."""
+"""Requests for motion, which the show state makes, as recipes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from appliance.show.show import ShowConfig
 from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, PATH, POINTS
 
 STEP_S = 1.5  # seconds of a fade: each step is a separate motion, blended into the one before
-AGAIN = 1000  # how far `again` counts the seed on: each return counts it on by one
+AGAIN = 1000  # seed step per `again`; each return adds one
 APART = 10_000_000  # seeds of one puppet and the next: no two dance the same variation
 _DIGITS = 4
 
 
-class Wish(NamedTuple):
+class Request(NamedTuple):
     """name: as it is called; recipe: of the first return, without a number."""
 
     name: str
@@ -28,7 +28,7 @@ class Wish(NamedTuple):
         return self.recipe["source"] not in (PATH, KEPT)
 
 
-class Wishes:
+class Requests:
     """Reads the show state as recipes; fades start from what was in force."""
 
     def __init__(self, config: ShowConfig) -> None:
@@ -37,7 +37,7 @@ class Wishes:
         self._fading: dict[str, tuple[int, float]] = {}  # by part: its generation, the value before
         self._newest: dict[str, float] = {}  # by part: the value that was asked for last
 
-    def wish(
+    def request(
         self,
         state: ShowState,
         base: str,
@@ -46,7 +46,7 @@ class Wishes:
         wanted: str = "",
         puppet: int = 0,
         pointed: Sequence[float] = (),
-    ) -> Wish | None:
+    ) -> Request | None:
         """A puppet's open request; None: phrases or a live dancer. base: the phrase that it danced last.
 
         kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the first puppet waits for
@@ -58,7 +58,7 @@ class Wishes:
         else:
             name = dance["phrase"][1] if "phrase" in dance else wanted or self._config.motion.source
         if name in kept:
-            return Wish(name, {"source": KEPT, "name": name, "of": kept[name]})
+            return Request(name, {"source": KEPT, "name": name, "of": kept[name]})
         if name not in MADE or name not in self._sections:
             return None
         recipe: dict[str, Any] = {"source": name}
@@ -74,7 +74,7 @@ class Wishes:
         points = pointed or dance.get(f"{MOTION}{PATH} {POINTS}", (0, "", ()))[2]
         if name == PATH and points:
             recipe["points"] = [round(value, 3) for value in points]
-        return Wish(name, recipe)
+        return Request(name, recipe)
 
     def _value(self, dance: Mapping[str, Part], source: str, parameter: str, now: float) -> float:
         """A parameter at this moment; a fade goes in steps."""
