@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 LONGEST_SLEEP_S = 0.1
-PROGRAMS = {"bash", "sh", "git", "make", "true", "false", "cat", "sleep"}  # besides .venv/bin
+PROGRAMS = {"bash", "sh", "git", "make", "true", "false", "cat", "sleep", "sha256sum"}  # besides .venv/bin
 _broken: list[str] = []
 
 
@@ -46,7 +46,7 @@ def _sleep(seconds: float, sleep: Callable[[float], None] = time.sleep) -> None:
 def pytest_configure() -> None:
     """Watch this process; what a test starts is watched by its wall time only."""
     sys.addaudithook(_watch)
-    time.sleep = _sleep
+    time.sleep = _sleep  # type: ignore[assignment]
 
 
 @pytest.hookimpl(wrapper=True)
