@@ -1,5 +1,4 @@
-"""Measures a danced body as an audience sees it, from a journal: `python -m tools.body_figures JOURNAL
-[show]`.
+"""Measures a danced body as an audience sees it: `python -m tools.body_figures JOURNAL [SHOW]`.
 
 How often and how deep upper arms are in the trunk, how fast standing feet slide; beside the show's phrase.
 """

@@ -1,6 +1,4 @@
-"""Facts that the bits of the dance depend on besides the journal: the processor, the libraries, the show's
-files.
-"""
+"""Facts that the bits of a dance depend on besides the journal: processor, libraries, the show's files."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""The contents of the stick and the boot partition: listed in a moment, so checking costs nothing when
-nothing is new.
-"""
+"""The contents of the stick and the boot partition, listed so quickly that checking costs nothing."""
 
 from __future__ import annotations
 

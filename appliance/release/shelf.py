@@ -1,6 +1,4 @@
-"""The shelf: shows and box files that were copied from sticks, complete or not at all, each in a separate
-folder.
-"""
+"""The shelf: shows and box files copied from sticks, whole or not at all, each in its folder."""
 
 from __future__ import annotations
 

@@ -1,3 +1,1 @@
-"""DMX receivers, independent of the box's code: Art-Net and sACN nodes and USB adapters, written from their
-standards.
-"""
+"""DMX receivers written from the standards: Art-Net and sACN nodes, USB adapters; none of the box's code."""
