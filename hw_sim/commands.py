@@ -13,8 +13,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from appliance.options.idle_options import refuse_idle
 from appliance.pose.file_trouble import sentence
-from appliance.pose.idle_options import refuse_idle
 from hw_sim import motions
 from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
 from hw_sim.device import Lane

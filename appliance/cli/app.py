@@ -24,8 +24,8 @@ import typer  # noqa: E402  (numpy, which commands import, must find the environ
 from appliance.cli.examples import ORDER, OTHER_WORDS  # noqa: E402
 from appliance.cli.help_page import complete_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
+from appliance.options.idle_options import refuse_idle  # noqa: E402
 from appliance.pose.file_trouble import sentence  # noqa: E402
-from appliance.pose.idle_options import refuse_idle  # noqa: E402
 from appliance.show.config_error import ConfigError, nearest  # noqa: E402
 
 PLUG_INS = "bunraku.commands"

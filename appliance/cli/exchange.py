@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from appliance.pose.reading_options import ReadingOptions, reading_options
+from appliance.options.reading import reading_options
+from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.stage_frame import Guess
 from appliance.show.bundle import named_show

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from appliance.cli.options import ChosenFile, ThisBoxFile, command_group
-from appliance.pose.idle_options import refuse_idle
+from appliance.options.idle_options import refuse_idle
 from appliance.release.installed_box import box_here
 from appliance.show_control.packet import readable
 

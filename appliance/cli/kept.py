@@ -11,7 +11,7 @@ from appliance.cli.options import BoxFile, ShowFolder
 from appliance.dancer.material.material_file import SUFFIX, parsed_recipe, read_material
 from appliance.dancer.phrase import FPS, X, Z
 from appliance.generator.kept_motions import FOLDER
-from appliance.pose.idle_options import refuse_idle
+from appliance.options.idle_options import refuse_idle
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.config_error import did_you_mean

@@ -10,17 +10,12 @@ from typing import Annotated
 import typer
 
 from appliance.box.clock import TICK_S
+from appliance.options.idle_options import refuse_idle
+from appliance.options.reading import OPTIONS, reading_options
 from appliance.pictures.filmstrip import COLUMNS, MissingPicturesError, Strip, draw_filmstrip, draw_strips
 from appliance.pose.file_trouble import sentence
-from appliance.pose.idle_options import refuse_idle
 from appliance.pose.quaternion import Array
-from appliance.pose.reading_options import (
-    AS_THE_FILES_SAY,
-    OPTIONS,
-    ReadingOptions,
-    read_upright,
-    reading_options,
-)
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, read_upright
 from appliance.pose.recording import Recording
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal

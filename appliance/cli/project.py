@@ -17,7 +17,7 @@ from appliance.box.notify import Notifier
 from appliance.box.parent_death import was_told
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.options import BoxFile, ChosenFile
-from appliance.pose.idle_options import refuse_idle
+from appliance.options.idle_options import refuse_idle
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
 from appliance.projector.raw_stream import take_over_stdout
 from appliance.projector.run import Options, Run

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from appliance.cli.options import BoxFile, ChosenFile
-from appliance.pose.idle_options import refuse_idle
+from appliance.options.idle_options import refuse_idle
 from appliance.release.choice import box_of
 from appliance.show.asked_for import require_sound
 from appliance.show.bundle import default_show_path, named_show

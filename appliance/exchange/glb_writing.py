@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.body.body_mesh import body_mesh
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.glb_file import GlbBuffer
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.projector.body.body_mesh import body_mesh
 
 MAX_JOINTS = 256  # that a body's vertices can name
 _VERTICES, _INDICES = 34962, 34963

@@ -11,8 +11,9 @@ from typing import Annotated
 
 import typer
 
-from appliance.pose.idle_options import is_written, refuse_idle
-from appliance.pose.reading_options import ReadingOptions, reading_options
+from appliance.options.idle_options import is_written, refuse_idle
+from appliance.options.reading import reading_options
+from appliance.pose.reading_options import ReadingOptions
 from appliance.show.bundle import named_show
 from appliance.studio import (
     experiment_command,

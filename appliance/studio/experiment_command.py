@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from appliance.pose.reading_options import ReadingOptions, reading_options
+from appliance.options.reading import reading_options
+from appliance.pose.reading_options import ReadingOptions
 from appliance.show.bundle import default_show_path, named_show
 from appliance.studio.clear_errors import clear_errors
 

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from appliance.pose.idle_options import refuse_idle
-from appliance.pose.reading_options import ReadingOptions, reading_options
+from appliance.options.idle_options import refuse_idle
+from appliance.options.reading import reading_options
+from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.clear_errors import clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)

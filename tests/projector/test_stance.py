@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.body.body_mesh import body_mesh
+from appliance.body.rest_pose import anatomy_of
 from appliance.outputs.shared_frame import Facts
 from appliance.pose.body import Body
 from appliance.pose.body_facts import rest_positions, stands, with_stance
 from appliance.pose.bvh import read_bvh
 from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
 from appliance.pose.stage_frame import in_stage_frame
-from appliance.projector.body.body_mesh import body_mesh
-from appliance.projector.body.rest_pose import anatomy_of
 from appliance.studio.export.packing import write_skeleton
 from appliance.studio.export.release import hanging_orientation
 from tests.pose.conventions import as_the_system_writes, dance_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from appliance.body.body_mesh import body_mesh
 from appliance.pose.recording import Recording
-from appliance.projector.body.body_mesh import body_mesh
 from appliance.projector.picture.body_buffers import BodyBuffers
 from appliance.projector.picture.strands import OFF, POINTS, ribbons_of
 

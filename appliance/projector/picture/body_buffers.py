@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.projector.body.skinning import BodyMesh
+from appliance.body.skinning import BodyMesh
 from appliance.projector.picture.vertices import layout, packed
 
 COARSE = 0.02  # of the figure's height: vertices closer than this are merged for shadows

@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.projector.body.skinning import BodyMesh, dual_quaternions
+from appliance.body.skinning import BodyMesh, dual_quaternions
 from appliance.projector.moment import Moment
 
 ROWS = 48

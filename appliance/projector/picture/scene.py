@@ -12,10 +12,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.body.body_mesh import body_mesh
+from appliance.body.skinning import BodyMesh
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.body.body_mesh import body_mesh
-from appliance.projector.body.skinning import BodyMesh
 from appliance.projector.picture.body_buffers import BodyBuffers
 from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from appliance.body.extremities import foot, hand, head
+from appliance.body.volumes import Group, Slab
 from appliance.pose.anatomy import LONG_BONE, Anatomy
 from appliance.pose.quaternion import Array
-from appliance.projector.body.extremities import foot, hand, head
-from appliance.projector.body.volumes import Group, Slab
 
 # Along the spine from the pelvis (0) to the neck (1): half the width as a share of the hips' and of the
 # shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.

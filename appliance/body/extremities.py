@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from appliance.body.volumes import Cut, Slab
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
-from appliance.projector.body.volumes import Cut, Slab
 
 _UP = np.array([0.0, 1.0, 0.0])
 _LEVEL = np.array([1.0, 0.0, 1.0])

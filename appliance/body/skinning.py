@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.body.volumes import Slab
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
-from appliance.projector.body.volumes import Slab
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from appliance.body.rest_pose import anatomy_of
+from appliance.body.sculpture import sculpture
+from appliance.body.skinning import BodyMesh, weights_of
+from appliance.body.surface import surface_of
+from appliance.body.volumes import sampled
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.body.rest_pose import anatomy_of
-from appliance.projector.body.sculpture import sculpture
-from appliance.projector.body.skinning import BodyMesh, weights_of
-from appliance.projector.body.surface import surface_of
-from appliance.projector.body.volumes import sampled
 
 SPACING = 0.0065  # of the height between samples: about 14,000 vertices for a figure with fingers
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from appliance.body.body_mesh import body_mesh
+from appliance.body.skinning import BodyMesh, dual_quaternions
+from appliance.body.surface import Grid, surface_of
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.body.body_mesh import body_mesh
-from appliance.projector.body.skinning import BodyMesh, dual_quaternions
-from appliance.projector.body.surface import Grid, surface_of
 from tests.projector import skeletons
 
 Faces = NDArray[np.int32]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.body.surface import Grid
 from appliance.pose.quaternion import Array
-from appliance.projector.body.surface import Grid
 
 FAR = 1.0  # metres: the field where no volume is near
 MARGIN = 4.5  # in samples: how far around a volume its distance is known

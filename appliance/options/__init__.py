@@ -1,0 +1,1 @@
+"""Options that commands of the box, the studio and the simulation share."""
