@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from appliance.box.block import BlockWriter
@@ -81,6 +83,7 @@ class ProcessHealthWriter:
     """A process publishes its health once a second; without room for the block it works on without."""
 
     def __init__(self, folder: Path, process: str, fallbacks: Fallbacks) -> None:
+        self.told: dict[str, Any] = {}  # what else it says, for the page
         self._fallbacks = fallbacks
         self._due = 0.0
         self._block: BlockWriter | None = None
@@ -113,7 +116,7 @@ class ProcessHealthWriter:
             return
         told = self._fallbacks.happened(now)
         values = {"pid": os.getpid(), "starts": self._starts, "beat": now, "ended": ended, "fallbacks": told}
-        values["parts"] = dict(self._fallbacks.parts)
+        values |= {"parts": dict(self._fallbacks.parts), "told": self.told}
         packed = json.dumps(values).encode()
         while len(packed) > _LARGEST and told:
             values["fallbacks"] = told = told[:-1]
@@ -124,7 +127,7 @@ class ProcessHealthWriter:
 class Member(NamedTuple):
     """A process beside the stage. late: it published nothing for LATE_S, and did not end.
 
-    parts: as in `Fallbacks`.
+    parts: as in `Fallbacks`. lives: the process that published last is there. told: what else it said.
     """
 
     process: str
@@ -132,6 +135,8 @@ class Member(NamedTuple):
     late: bool
     fallbacks: tuple[Fallen, ...]
     parts: dict[str, str]
+    lives: bool = True
+    told: Mapping[str, Any] = MappingProxyType({})
 
 
 class ProcessHealth:
@@ -152,7 +157,10 @@ class ProcessHealth:
                 starts, fallbacks = int(values.get("starts", 1)), fallen(values.get("fallbacks"))
                 parts = values.get("parts")
                 told = {str(name): str(why) for name, why in parts.items()} if isinstance(parts, dict) else {}
-                found.append(Member(process, starts, late, fallbacks, told))
+                lives = block.writer_lives() and not values.get("ended")
+                said = values.get("told")
+                more = said if isinstance(said, dict) else {}
+                found.append(Member(process, starts, late, fallbacks, told, lives, more))
         return found
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:

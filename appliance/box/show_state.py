@@ -101,14 +101,26 @@ class ShowState(levers.ShowState):
     def lights_fade_s(self) -> float:
         return self[LIGHTS].seconds
 
+    @property
+    def strings(self) -> float:
+        return self[STRINGS].value
+
+    @property
+    def master(self) -> float:
+        return self[MASTER].value
+
     def strings_level(self, now: float) -> float:
         return self[STRINGS].level(now)
 
     @property
     def dance(self) -> Mapping[str, Part]:
-        """The part that stage and generator follow: generation, text and numbers by the lever's name."""
-        found = ((table.find_lever(name), fade) for name, fade in self.settings.items())
-        return {one.name: (fade.generation, *one.told(fade)) for one, fade in found if one and one.follower}
+        """The parts that stage and generator follow: generation, text, numbers; without a fade of 0 s."""
+        parts = {}
+        for name, fade in self.settings.items():
+            if (one := table.find_lever(name)) is not None and one.follower:
+                text, numbers = one.told(fade) if fade.seconds else one.kind.told(fade.value)
+                parts[name] = fade.generation, text, numbers
+        return parts
 
     def with_going(self, going: bool, now: float, fade_s: float) -> ShowState:
         return self._to(GOING, float(going), now, fade_s)

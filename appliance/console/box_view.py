@@ -4,89 +4,80 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
 from typing import Any
 
-from appliance.box.process_health import ProcessHealth
+from appliance.box.roster import RosterLine
 from appliance.box.show_state import ShowStateReader
-from appliance.console.desk import Answer, Desk, NoAnswerError
+from appliance.console.desk import NO_COMMANDS, SILENT, Desk
+from appliance.console.seen_stage import SeenStage
 from appliance.console.stage_view import StageView
 from appliance.console.verdict import Verdict, verdict
 from appliance.levers.lever import Lever
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import FEEDBACK, MADE_NUMBERS, PATH_POINTS, SPRINGS, STIFFNESS, STORM, STRINGS
-from appliance.show_control.sensor_roster import RosterLine
-from appliance.show_control.status_messages import STATUS, Status
+from appliance.show_control.status_messages import LISTED, Status, hands_of, names_of, status
 
 _NO_BATTERY = 255
 _KNOBS = (STIFFNESS, STORM, FEEDBACK)  # of the springs
 _SAME_STAGE_S = 5.0  # a stage that seems to have started this much later is another one
-_LISTS = {"/cues/cue": "cues", "/phrases/phrase": "phrases", "/looks/look": "looks", "/cards/card": "cards"}
+_FIELDS = len(RosterLine._fields)
 
 
 class BoxView:
-    """Asks show control, looks at the shared frame, and remembers what the two forget.
+    """Reads what stage, show control and the others share, and remembers what they forget.
 
-    value: the newest answer. A battery level stays after its sensor is gone; `since`: Unix seconds since
-    when no tick was late or skipped. words: the same as JSON.
+    value: the newest. A battery level stays after its sensor is gone; `since`: Unix seconds since when no
+    tick was late or skipped. words: the same as JSON.
     """
 
-    def __init__(
-        self, desk: Desk, stage: StageView, processes: ProcessHealth, show_state: ShowStateReader
-    ) -> None:
+    def __init__(self, desk: Desk, stage: StageView, seen: SeenStage, show_state: ShowStateReader) -> None:
         self._show_state = show_state
-        self._desk, self._stage, self._processes = desk, stage, processes
+        self._desk, self._stage, self._seen = desk, stage, seen
         self._batteries: dict[str, int] = {}
         self._late: tuple[int, int] | None = None
         self._since = self._started = time.time()
         self.value: dict[str, Any] = {}
         self.words = "{}"
 
-    async def refresh(self) -> None:
-        """Ask once; takes as long as show control takes to answer, two seconds at most."""
-        trouble = ""
-        try:
-            answers = await self._desk.ask_all()
-        except NoAnswerError as error:
-            trouble, answers = str(error), []
-        self.value = self._value(answers, trouble, time.monotonic())
+    def refresh(self) -> None:
+        """Look once."""
+        self.value = self._value(time.monotonic())
         self.words = json.dumps(self.value)
 
-    def _value(self, answers: Sequence[Answer], trouble: str, now: float) -> dict[str, Any]:
-        status = next((_status(values) for address, values in answers if address == STATUS), None)
-        sensors = [self._sensor(line) for line in _roster(answers)]
-        fallbacks = [_fallback(values) for address, values in answers if address == "/fallbacks/fallback"]
-        if trouble:
-            fallbacks = [
-                _fallback((one.name, process, one.times, one.active, one.words))
-                for process, one in self._processes.fallbacks(now)
-            ]
+    def _value(self, now: float) -> dict[str, Any]:
+        seen, state, members = self._seen, self._show_state.read(), self._seen.members(now)
+        control = next((one for one in members if one.process == "control" and one.lives), None)
+        trouble = "" if control else SILENT if self._desk.has_control else NO_COMMANDS
+        told = control.told if control else {}
+        counted = int(told.get("refused", 0)), int(told.get("strangers", 0))
+        known = status(state, seen, *counted, now, str(told.get("live", ""))) if control else None
         frames = self._stage.state(now)
-        lists: dict[str, list[dict[str, Any]]] = {name: [] for name in _LISTS.values()}
-        for address, values in answers:
-            if address in _LISTS and len(values) == 2:
-                lists[_LISTS[address]].append({"name": values[0], "now": bool(values[1])})
-        hands = [values for address, values in answers if address == "/hands/hand" and len(values) == 4]
-        self._note_late(status)
-        judged: Verdict = verdict(frames, status, sensors, fallbacks, self._since, trouble)
+        lines = seen.health().get("sensors", ()) if self._stage.lives else ()
+        sensors = [self._sensor(RosterLine(*line)) for line in lines if len(line) == _FIELDS]
+        fallbacks = [{"process": process, **one._asdict()} for process, one in seen.fallbacks(now)]
+        self._note_late(known)
+        judged: Verdict = verdict(frames, known, sensors, fallbacks, self._since, trouble)
         return {
             "time": time.time(),
             "trouble": trouble,
             "control": self._desk.has_control,
             "frames": frames,
-            "status": None if status is None else status._asdict(),
+            "status": None if known is None else known._asdict(),
             "verdict": judged._asdict(),
             "since": self._since,
             "sensors": sensors,
             "fallbacks": fallbacks,
-            "processes": [{"process": one.process, "late": one.late} for one in self._processes.members(now)],
-            "hands": [
-                {"joint": joint, "source": source, "holds": bool(holds), "by": by}
-                for joint, source, holds, by in hands
-            ],
+            "processes": [{"process": one.process, "late": one.late} for one in members],
+            "hands": [one._asdict() for one in hands_of(seen)] if known else [],
             "generation": self._stage.generation,
             **self._declared(),
-            **lists,
+            **{
+                question.removeprefix("/"): [
+                    {"name": name, "now": is_now}
+                    for name, is_now in (names_of(question, state, known, seen) if known else ())
+                ]
+                for question in LISTED
+            },
         }
 
     def _declared(self) -> dict[str, Any]:
@@ -131,20 +122,3 @@ class BoxView:
 def _short(lever: Lever[Any]) -> str:
     """`SOURCE NAME` of a lever of the generator's."""
     return lever.name.partition(" ")[2]
-
-
-def _status(values: Sequence[Any]) -> Status | None:
-    """None from a show control of another release."""
-    return Status(*values) if len(values) == len(Status._fields) else None
-
-
-def _roster(answers: Sequence[Answer]) -> list[RosterLine]:
-    fields = len(RosterLine._fields)
-    lines = [values for address, values in answers if address == "/sensors/sensor"]
-    return [RosterLine(*values) for values in lines if len(values) == fields]
-
-
-def _fallback(values: Sequence[Any]) -> dict[str, Any]:
-    name, process, times, active, words, about = (*values, "")[:6]  # none from an earlier release
-    told = {"name": name, "process": process, "times": times, "active": bool(active)}
-    return told | {"words": words, "about": about}

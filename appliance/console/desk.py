@@ -1,24 +1,21 @@
-"""The page as a desk of show control: commands and questions by OSC, without waiting for each other."""
+"""The page as a desk of show control: commands by OSC, without waiting for each other."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import struct
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any
 
 from appliance.show_control.command import REPLY, SENSORS_REPLY, STREAMS
-from appliance.show_control.packet import BUNDLE, Message, datagram, messages_in, readable
+from appliance.show_control.packet import datagram, messages_in, readable
 
-QUESTIONS = ("/status", "/fallbacks", "/cues", "/phrases", "/looks", "/cards", "/hands", "/sensors/list")
 PATIENCE_S = 2.0  # show control answers within 0.6 s, and later while it starts
 _STREAM_S = 0.25  # of a stream's command only the refusal is answered
 _MOST_WAITING = 512
 _AT_ONCE = 32
-_NO_COMMANDS = "This box takes no commands: its box file says `control: null`."
-_SILENT = "Show control does not answer. What is in force stays in force; try again."
-_NOW = struct.pack(">Q", 1)  # OSC's time tag for 'immediately'
+NO_COMMANDS = "This box takes no commands: its box file says `control: null`."
+SILENT = "Show control does not answer. What is in force stays in force; try again."
 
 Answer = tuple[str, list[Any]]
 
@@ -28,7 +25,7 @@ class NoAnswerError(Exception):
 
 
 class Desk:
-    """Show control at an address; None: this box has none. Each question has a socket of its own."""
+    """Show control at an address; None: this box has none. Each command has a socket of its own."""
 
     def __init__(self, control: tuple[str, int] | None) -> None:
         self._control = control
@@ -38,19 +35,6 @@ class Desk:
     def has_control(self) -> bool:
         """Whether this box takes commands."""
         return self._control is not None
-
-    async def ask_all(self) -> list[Answer]:
-        """Everything that show control tells, once. Raises NoAnswerError."""
-        open_questions, answers = set(QUESTIONS), list[Answer]()
-        async with self._asking(_bundle([(question,) for question in QUESTIONS]), PATIENCE_S) as replies:
-            while open_questions:
-                address, values = await replies()
-                answers.append((address, values))
-                if address == "/end":
-                    open_questions.discard(str(values[0]))
-                elif address == "/sensors/end" or (address, values[:1]) == (SENSORS_REPLY, ["/sensors/list"]):
-                    open_questions.discard("/sensors/list")
-        return answers
 
     async def send_command(self, address: str, arguments: Sequence[str | int | float]) -> tuple[bool, str]:
         """Whether show control carried it out, and its sentence. Raises NoAnswerError, ValueError."""
@@ -72,13 +56,13 @@ class Desk:
     async def streaming(self) -> AsyncIterator[Stream]:
         """A socket for a stream of commands that nothing waits for. Raises NoAnswerError."""
         if self._control is None:
-            raise NoAnswerError(_NO_COMMANDS)
+            raise NoAnswerError(NO_COMMANDS)
         try:
             transport, replies = await asyncio.get_running_loop().create_datagram_endpoint(
                 _Replies, remote_addr=self._control
             )
         except OSError:
-            raise NoAnswerError(_SILENT) from None
+            raise NoAnswerError(SILENT) from None
         try:
             yield Stream(transport, replies.waiting)
         finally:
@@ -88,8 +72,8 @@ class Desk:
     async def _asking(self, question: bytes, patience_s: float) -> AsyncIterator[Callable[[], Any]]:
         """Send a datagram; inside, awaiting what is given returns the next message that comes back."""
         if self._control is None:
-            raise NoAnswerError(_NO_COMMANDS)
-        silent = NoAnswerError(_SILENT)
+            raise NoAnswerError(NO_COMMANDS)
+        silent = NoAnswerError(SILENT)
         async with self._free:
             try:
                 transport, replies = await asyncio.get_running_loop().create_datagram_endpoint(
@@ -135,8 +119,3 @@ class _Replies(asyncio.DatagramProtocol):
         with contextlib.suppress(ValueError, asyncio.QueueFull):
             for message in messages_in(received):
                 self.waiting.put_nowait(message)
-
-
-def _bundle(messages: Sequence[Message]) -> bytes:
-    packed = map(datagram, messages)
-    return BUNDLE + _NOW + b"".join(struct.pack(">i", len(one)) + one for one in packed)

@@ -17,7 +17,7 @@ from appliance.box.fallback import Fallbacks
 from appliance.box.log_limit import limit_log
 from appliance.box.notify import Notifier
 from appliance.box.open_files import open_more_files
-from appliance.box.process_health import ProcessHealth, ProcessHealthWriter
+from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.realtime import give_way
 from appliance.box.runtime_folder import kept_file
 from appliance.box.show_state import ShowStateReader
@@ -35,6 +35,7 @@ from appliance.console.pose_map import PoseMap
 from appliance.console.prove import Prove
 from appliance.console.rehearsed import FOLDER, ZIP, Rehearsed
 from appliance.console.rig import Rig
+from appliance.console.seen_stage import SeenStage
 from appliance.console.sensor_changes import SensorChanges
 from appliance.console.server import Server
 from appliance.console.settings import WHERE, Settings
@@ -69,7 +70,8 @@ async def _serve(settings: Settings) -> int:
     fallbacks = Fallbacks(OF_THE_PAGE)
     door, desk = Door(partial(note_crowd, fallbacks)), Desk(settings.control)
     guard = Guard(settings.viewers, settings.names, devices, door)
-    box = BoxView(desk, stage, ProcessHealth(folder), ShowStateReader(folder))
+    seen = SeenStage(folder, stage)
+    box = BoxView(desk, stage, seen, ShowStateReader(folder))
     health, notifier = ProcessHealthWriter(folder, "console", fallbacks), Notifier()
     happened, about = Happened(guard, settings.journal), About(settings.about)
     prove = Prove(guard, folder, Path(settings.kept).parent, settings.about, settings.is_installed)
@@ -119,6 +121,7 @@ async def _serve(settings: Settings) -> int:
     health.end(time.monotonic())
     health.close()
     stage.close()
+    seen.close()
     rig.close()
     return 0
 
@@ -137,7 +140,7 @@ async def _pulse(notifier: Notifier, health: ProcessHealthWriter) -> None:
 
 async def _refresh(box: BoxView, watchers: Watchers) -> None:
     while True:
-        await box.refresh()
+        box.refresh()
         watchers.put_words(box.words)
         await asyncio.sleep(_REFRESH_S)
 

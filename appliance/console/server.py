@@ -179,7 +179,7 @@ class Server:
             task.add_done_callback(self._refreshing.discard)
 
     async def _refresh(self) -> None:
-        await self._box.refresh()
+        self._box.refresh()
         self._watchers.put_words(self._box.words)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, Literal
+from types import SimpleNamespace
+from typing import Any, Literal, cast
 
 from appliance.box.ring_file import RingFileReader
 from appliance.outputs.frame_layout import (
@@ -15,12 +16,14 @@ from appliance.outputs.frame_layout import (
     FRAME_HEAD,
     FRAMES,
     GHOST,
+    HEALTH,
     KIND,
     LATE,
     WRITER,
     FrameLayout,
 )
 from appliance.pose.foreign_file import plain_json
+from appliance.show_control.status_messages import SeenFacts
 
 STALE_S = 0.5
 _LOOK_S = 0.1
@@ -29,7 +32,8 @@ _LOOK_S = 0.1
 class StageView:
     """The shared frame of a runtime folder, read without numpy; never waits, never raises.
 
-    facts: show, skeleton and hands, as the page gets them; empty before the first stage. show_directory: for
+    facts: show, skeleton and hands, as the page gets them; empty before the first stage. seen_facts: as the
+    stage wrote them. show_directory: for
     this box's own processes; None before the first stage. generation: another number for each new stage.
     with_ghost: the frame that `newest` gave last, with what the puppet starts from.
     """
@@ -42,6 +46,7 @@ class StageView:
         self.with_ghost = b""
         self._frame_time = -math.inf
         self.facts: dict[str, Any] = {}
+        self.seen_facts: SeenFacts | None = None
         self.show_directory: Path | None = None
         self.generation = 0
 
@@ -73,6 +78,20 @@ class StageView:
         is_fresh = self._file.writer_lives() and now - self._frame_time <= STALE_S
         return "fresh" if is_fresh else "stale"
 
+    @property
+    def lives(self) -> bool:
+        """Whether the process that writes the frames is there."""
+        return self._file.is_there and self._file.writer_lives()
+
+    def health(self) -> dict[str, Any]:
+        """What the stage last said about itself; empty before it did."""
+        found = self._file.rings[HEALTH].newest() if len(self._file.rings) > HEALTH else None
+        try:
+            said = plain_json(found[1]) if found else {}
+        except ValueError:
+            return {}
+        return said if isinstance(said, dict) else {}
+
     def close(self) -> None:
         """Let go of the file."""
         self._file.close()
@@ -89,11 +108,19 @@ class StageView:
         try:
             facts = plain_json(found[1] if found else b"")
             self.facts, self.show_directory = _for_browsers(facts), Path(facts["show_directory"])
+            self.seen_facts = _seen(facts)
         except (ValueError, KeyError, TypeError, IndexError):
             self._file.refuse(f"holds no facts about a show. Start {WRITER} again.")
             return
         self._layout = FrameLayout(len(self.facts["joints"]), len(self.facts["puppets"]) or 1)
         self.generation += 1
+
+
+def _seen(facts: dict[str, Any]) -> SeenFacts:
+    """By attribute; what an earlier release did not tell is empty."""
+    empty: dict[str, Any] = {"cards": (), "springs": (), "motion": {}}
+    skeleton = SimpleNamespace(names=tuple(facts["skeleton"]["joints"]))
+    return cast(SeenFacts, SimpleNamespace(**empty | facts | {"skeleton": skeleton}))
 
 
 def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:

@@ -129,6 +129,10 @@ class CommandHandler:
         self._note_live(now)
         self.acknowledgements.send_due(now)
 
+    def told(self, strangers: int, now: float) -> dict[str, Any]:
+        """What only this process knows of the box's status."""
+        return {"refused": self.refused, "strangers": strangers, "live": self._live.came(now)}
+
     def status(self, strangers: int, now: float) -> Status:
         """How the box is."""
         return status(self.show_state, self._observer, self.refused, strangers, now, self._live.came(now))

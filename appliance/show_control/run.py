@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
 from appliance.box.orders import OrderSender
 from appliance.box.process_health import COMMANDS_DROPPED, ProcessHealthWriter
@@ -58,7 +57,7 @@ class ControlProcess:
             opened.callback(sender.close)
             self.observer = StageObserver(folder)
             opened.callback(self.observer.close)
-            self._health = ProcessHealthWriter(folder, "control", Fallbacks(()))
+            self._health = ProcessHealthWriter(folder, "control", self.observer.own)
             opened.callback(self._health.close)
             self._dispatch = OrderDispatch(sender)
             self._heartbeat = Heartbeat(settings.heartbeat, now)
@@ -121,6 +120,7 @@ class ControlProcess:
         now = self._monotonic()
         self._count(now)
         self.handler.follow_stage(now)
+        self._health.told = self.handler.told(self.port.strangers, now)
         self._health.publish_health(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from appliance.box.fallback import Fallbacks, Fallen, fallen
 from appliance.box.made_motion import KeptNamesReader
@@ -11,8 +11,7 @@ from appliance.box.process_health import COMMANDS_DROPPED, STAGE_HUNG, ProcessHe
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
 from appliance.show_control.fallback import OF_CONTROL
-
-StageState = Literal["dancing", "stopped", "hung", "absent"]
+from appliance.show_control.status_messages import StageState
 
 
 class StageObserver:
@@ -54,7 +53,10 @@ class StageObserver:
         """Process and fallback, of all processes of the box, as far as they ever happened."""
         own = [("control", one) for one in self.own.happened(now)]
         stage = fallen(self.health().get("fallbacks")) if self.state(now) != "absent" else ()
-        return [*(("stage", one) for one in stage), *own, *self._process_health.fallbacks(now)]
+        own_names = {(process, one.name) for process, one in own}
+        others = self._process_health.fallbacks(now)
+        more = [(process, one) for process, one in others if (process, one.name) not in own_names]
+        return [*(("stage", one) for one in stage), *own, *more]
 
     @property
     def facts(self) -> Facts | None:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Literal, NamedTuple, Protocol
 
+from appliance.box.fallback import Fallen
 from appliance.levers.addresses import LISTS
-from appliance.levers.lever import Lever
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import LIGHTS, LOOK, MADE_NUMBERS
 from appliance.pose.foreign_file import plain_json
 from appliance.show_control.packet import Message
 
-if TYPE_CHECKING:
-    from appliance.show_control.stage_observer import StageObserver
-
+StageState = Literal["dancing", "stopped", "hung", "absent"]
 STATUS, END = "/bunraku/status", "/end"
+LISTED = {"/cues": "/cues/cue", "/phrases": "/phrases/phrase"} | {
+    question: f"{question}/{lever.listed}" for question, lever in LISTS.items()
+}
 UNKNOWN = -1.0
 _LONGEST_WORDS = 1000  # of a sentence in an answer
 
@@ -51,9 +52,54 @@ class Status(NamedTuple):
     live: str = ""
 
 
+class SeenFacts(Protocol):
+    """What does not change while a stage runs, as far as answers tell it; Facts is one."""
+
+    @property
+    def show_name(self) -> str: ...
+    @property
+    def looks(self) -> Sequence[str]: ...
+    @property
+    def lights(self) -> Sequence[str]: ...
+    @property
+    def phrases(self) -> Sequence[str]: ...
+    @property
+    def cues(self) -> Sequence[Mapping[str, Any]]: ...
+    @property
+    def held(self) -> Sequence[int]: ...
+    @property
+    def hands(self) -> Sequence[str]: ...
+    @property
+    def by_position(self) -> Sequence[int]: ...
+    @property
+    def motion(self) -> Mapping[str, Any]: ...
+    @property
+    def skeleton(self) -> Any: ...
+
+
+class Seen(Protocol):
+    """The stage as show control and the page see it, each with a reader of its own."""
+
+    @property
+    def facts(self) -> SeenFacts | None: ...
+    def state(self, now: float) -> StageState: ...
+    def health(self) -> dict[str, Any]: ...
+    def kept(self) -> tuple[str, ...]: ...
+    def fallbacks(self, now: float) -> Sequence[tuple[str, Fallen]]: ...
+
+
+class HandLine(NamedTuple):
+    """A hand: its joint, what holds it, whether it holds, and what it gives."""
+
+    joint: str
+    source: str
+    holds: bool
+    by: str
+
+
 def status(
     show_state: ShowState,
-    observer: StageObserver,
+    observer: Seen,
     refused: int,
     strangers: int,
     now: float,
@@ -94,59 +140,62 @@ def status(
 
 
 def told(
-    question: str, show_state: ShowState, observer: StageObserver, now_status: Status, now: float
+    question: str, show_state: ShowState, observer: Seen, now_status: Status, now: float
 ) -> Iterator[Message]:
     """The answer to a question: a message for each thing, and one to end with."""
     if question == "/status":
         answers: list[Message] = [(STATUS, *now_status)]
-    elif question in LISTS:
-        answers = list(_names(LISTS[question], show_state, observer))
+    elif question in LISTED:
+        names = names_of(question, show_state, now_status, observer)
+        answers = [(LISTED[question], name, int(is_now)) for name, is_now in names]
+    elif question == "/hands":
+        answers = [
+            ("/hands/hand", one.joint, one.source, int(one.holds), one.by) for one in hands_of(observer)
+        ]
     elif question == "/motion":
         answers = [*_made(now_status, observer), *_declared(show_state, observer)]
     else:
-        answers = list(_LISTS[question](now_status, observer, now))
+        answers = list(_fallbacks(observer, now))
     yield from answers
     yield END, question, len(answers)
 
 
-def _cues(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
-    for cue in observer.facts.cues if observer.facts else ():
-        yield "/cues/cue", str(cue["name"]), int(cue["name"] == status.cue)
-
-
-def _phrases(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
-    for name in dict.fromkeys((*observer.facts.phrases, *observer.kept())) if observer.facts else ():
-        yield "/phrases/phrase", name, int(name == status.phrase)
-
-
-def _names(lever: Lever[str], show_state: ShowState, observer: StageObserver) -> Iterator[Message]:
-    """The names that the show has for a lever; where none is set, the first is in force."""
-    attribute, listed = lever.names[0], lever.listed
-    names: tuple[str, ...] = getattr(observer.facts, attribute) if observer.facts else ()
-    if observer.facts and lever.none:
-        names = lever.none, *names
-    for name in names:
-        yield f"/{attribute}/{listed}", name, int(name == (show_state[lever].value or names[0]))
-
-
-def _hands(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+def names_of(
+    question: str, show_state: ShowState, now_status: Status, observer: Seen
+) -> list[tuple[str, bool]]:
+    """The names that a question of LISTED asks for, and which is in force."""
     facts = observer.facts
     if facts is None:
+        return []
+    if question == "/cues":
+        return [(str(cue["name"]), cue["name"] == now_status.cue) for cue in facts.cues]
+    if question == "/phrases":
+        names = dict.fromkeys((*facts.phrases, *observer.kept()))
+        return [(name, name == now_status.phrase) for name in names]
+    lever = LISTS[question]
+    shown = (*([lever.none] if lever.none else ()), *getattr(facts, lever.names[0]))
+    return [(name, name == (show_state[lever].value or shown[0])) for name in shown]
+
+
+def hands_of(observer: Seen) -> Iterator[HandLine]:
+    """The hands of the show."""
+    if (facts := observer.facts) is None:
         return
     let_go = observer.health().get("let_go", ())
     for hand, (joint, source) in enumerate(zip(facts.held, facts.hands, strict=True)):
         name = facts.skeleton.names[joint]
-        by = "position" if hand in facts.by_position else "orientation"
-        yield "/hands/hand", name, source, int(name not in let_go), by
+        yield HandLine(
+            name, source, name not in let_go, "position" if hand in facts.by_position else "orientation"
+        )
 
 
-def _fallbacks(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+def _fallbacks(observer: Seen, now: float) -> Iterator[Message]:
     for process, one in observer.fallbacks(now):
         words, about = one.words[:_LONGEST_WORDS], one.about[:_LONGEST_WORDS]
         yield "/fallbacks/fallback", one.name, process, one.times, int(one.active), words, about
 
 
-def _made(status: Status, observer: StageObserver) -> Iterator[Message]:
+def _made(status: Status, observer: Seen) -> Iterator[Message]:
     """What was made ahead and is danced, number by number; nothing while a phrase or a live dancer is."""
     recipe = plain_json(str(observer.health().get("made") or "{}"))
     recipe = recipe.get("of", recipe)
@@ -155,7 +204,7 @@ def _made(status: Status, observer: StageObserver) -> Iterator[Message]:
             yield "/motion/is", name, *(value if isinstance(value, list) else (value,))
 
 
-def _declared(show_state: ShowState, observer: StageObserver) -> Iterator[Message]:
+def _declared(show_state: ShowState, observer: Seen) -> Iterator[Message]:
     """Each parameter of the show's sources that are made ahead, with the value that it has or fades to."""
     facts = observer.facts
     is_ours = facts is not None and show_state.show == facts.show_name
@@ -164,14 +213,6 @@ def _declared(show_state: ShowState, observer: StageObserver) -> Iterator[Messag
             is_set = is_ours and lever in show_state
             value = show_state[lever].value if is_set else section[name]
             yield "/motion/parameter", source, name, float(value)
-
-
-_LISTS = {
-    "/cues": _cues,
-    "/phrases": _phrases,
-    "/hands": _hands,
-    "/fallbacks": _fallbacks,
-}
 
 
 def _state(stage: str, show_state: ShowState) -> str:

@@ -1,0 +1,53 @@
+"""The stage as the page answers about it: what show control sees of it too, read without numpy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from appliance.box.fallback import Fallen, fallen
+from appliance.box.made_motion import KeptNamesReader
+from appliance.box.process_health import Member, ProcessHealth
+from appliance.console.stage_view import StageView
+from appliance.show_control.status_messages import SeenFacts, StageState
+
+
+class SeenStage:
+    """The stage and the other processes of a runtime folder; never waits, never raises."""
+
+    def __init__(self, folder: Path, view: StageView) -> None:
+        self._view, self._processes, self._kept = view, ProcessHealth(folder), KeptNamesReader(folder)
+
+    @property
+    def facts(self) -> SeenFacts | None:
+        """Of the newest stage; None before the first."""
+        return self._view.seen_facts
+
+    def state(self, now: float) -> StageState:
+        """hung: the process lives, but no frame came for half a second."""
+        frames = self._view.state(now)
+        if frames == "fresh":
+            return "stopped" if self.health().get("state") == "stopped" else "dancing"
+        return "hung" if frames == "stale" and self._view.lives else "absent"
+
+    def health(self) -> dict[str, Any]:
+        """What the stage last said about itself; empty before it did."""
+        return self._view.health()
+
+    def kept(self) -> tuple[str, ...]:
+        """Names of motions that were kept."""
+        return self._kept.read()
+
+    def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
+        """Process and fallback, of all processes of the box, as far as they ever happened."""
+        stage = fallen(self.health().get("fallbacks")) if self.state(now) != "absent" else ()
+        return [*(("stage", one) for one in stage), *self._processes.fallbacks(now)]
+
+    def members(self, now: float) -> list[Member]:
+        """The processes beside the stage."""
+        return self._processes.members(now)
+
+    def close(self) -> None:
+        """Let go of the files."""
+        self._processes.close()
+        self._kept.close()
