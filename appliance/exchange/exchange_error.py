@@ -1,4 +1,4 @@
-"""What may be wrong with a file that goes in or out, in words for people."""
+"""Faults of a file that goes in or out, in words for people."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def checked_skeleton(
     ends: Sequence[tuple[int, Sequence[float]]] = (),
     line: int = 0,
 ) -> Skeleton:
-    """A skeleton of these values. Raises ExchangeError where they are none."""
+    """A skeleton of these values. Raises ExchangeError where they are invalid."""
 
     def fail(message: str) -> ExchangeError:
         return ExchangeError(path, message, line)

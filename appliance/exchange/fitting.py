@@ -14,12 +14,12 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
 _PRIOR = 1e-4  # how much the nearest turn weighs against the children, where these leave a turn open
-_ROUNDS = 6  # of the shape of several bones at one joint; the third already changes less than 0.1 mm
+_ROUNDS = 6  # fits of the shape of several bones at one joint; the third already changes less than 0.1 mm
 _TWIST_S = (
     0.1  # standard deviation of the filter of open twists: a bone that points backwards would flip them
 )
 _TOES = np.array([0.0, -0.2, 0.98])
-_TIP = 0.4  # of the last bone: how far the figure reaches beyond a last point
+_TIP = 0.4  # fraction of the last bone: how far the figure reaches beyond a last point
 
 
 @dataclass(frozen=True)

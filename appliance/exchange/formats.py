@@ -21,7 +21,7 @@ _WRITERS: dict[str, Callable[[Path, Recording], None]] = {
     ".npz": write_npz,
     ".csv": write_csv,
 }
-_METRE = 1.0  # of all formats but BVH
+_METRE = 1.0  # in all formats but BVH
 ENDINGS = (".bvh", *_WRITERS)
 
 

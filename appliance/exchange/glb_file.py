@@ -26,7 +26,7 @@ _SHAPES: dict[str, tuple[int, ...]] = {
     "VEC4": (4,),
     "MAT4": (4, 4),  # column by column
 }
-_SCALES = {5120: 127, 5121: 255, 5122: 32767, 5123: 65535}  # of normalised integers
+_SCALES = {5120: 127, 5121: 255, 5122: 32767, 5123: 65535}  # ranges of normalised integers
 
 
 class GlbBuffer:

@@ -22,7 +22,7 @@ from appliance.pose.recording import Recording
 _DAMAGED = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError)
 _STILL_SCALE = 1e-3  # a joint that is scaled by less is not scaled
 _SHORTEST_ROTATION = 0.5  # length of a quaternion; a shorter one is a hole in the data
-_PROP = 0.5  # of the joints of the largest skeleton: a smaller one is no second dancer
+_PROP = 0.5  # fraction of the joints of the largest skeleton: a smaller one is not a second dancer
 _SHOWN = 8
 _WHOLE_RATE = 1e-5  # a rate this near to a whole number is that number: times are stored in single precision
 
@@ -53,7 +53,7 @@ def read_glb(path: Path, true_fps: float | None = None, choice: Choice = WHOLE) 
 
 
 class _Track(NamedTuple):
-    """What an animation says of one property of a node: at `times` (K,) `values` (K, C), and between.
+    """An animation's track of one property of a node: at `times` (K,) `values` (K, C), and between.
 
     lost: keys that were no numbers.
     """

@@ -22,7 +22,7 @@ from appliance.pose.skeleton import Skeleton
 
 USUAL_FPS = 50.0
 _SHOWN_GAPS = 10
-_FAR = 0.05  # of the figure's size: a point does not come so far in a frame
+_FAR = 0.05  # fraction of the figure's size: a point moves less in a frame
 _ROOT = ("spine", 0, 0)  # chain, side and place of the hips
 _FEW_FRAMES = 2
 

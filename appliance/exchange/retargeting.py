@@ -12,7 +12,7 @@ from appliance.pose.roles import missing_roles, places_of
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.t_pose import t_pose
 
-FLOOR_PERCENTILE = 5.0  # of the lowest sole's heights over the dance
+FLOOR_PERCENTILE = 5.0  # percentile of the lowest sole's heights over the dance
 
 
 def retarget(dance: Recording, target: Skeleton) -> Recording:

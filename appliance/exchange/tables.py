@@ -88,7 +88,7 @@ def read_npz(path: Path, true_fps: float | None = None) -> Recording:
 
 
 def _columns(names: Sequence[str], stretched: bool) -> list[str]:
-    """Of a CSV; stretched: with the translations of bones that change their length."""
+    """Columns of a CSV; stretched: with the translations of bones that change their length."""
     columns = ["time", "root.x", "root.y", "root.z"]
     columns += [f"{name}.{part}" for name in names for part in "wxyz"]
     return columns + [f"{name}.t{part}" for name in names for part in "xyz"] if stretched else columns
@@ -161,7 +161,7 @@ def _some(columns: Sequence[str]) -> str:
 
 
 def separator_of(line: str) -> str:
-    """What stands between the fields of a table: where there is a semicolon or a tab, a comma is a point."""
+    """The delimiter of a table: if there is a semicolon or a tab, a comma is a decimal point."""
     return next((mark for mark in (";", "\t", ",") if mark in line), ",")
 
 

@@ -1,4 +1,4 @@
-"""What the joints of a skeleton of any kind are: trunk, limbs, hands, feet, head, and where the front is."""
+"""Finds the joints of any kind of skeleton: trunk, limbs, hands, feet, head, and the front."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from appliance.pose.joint_names import side_of
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
-LONG_BRANCH = 0.25  # of the height: a branch that reaches further is a limb, a shorter one a finger or a face
-LONG_BONE = 0.08  # of the height: where a limb's first bone of this length begins, the limb begins
+LONG_BRANCH = 0.25  # fraction of the height; a longer branch is a limb, a shorter one a finger or a face
+LONG_BONE = 0.08  # fraction of the height: a limb begins at its first bone of this length
 _UP = np.array([0.0, 1.0, 0.0])
 
 
@@ -74,7 +74,7 @@ class Anatomy:
         ]
 
     def part_of(self, joint: int) -> int:
-        """The hand or foot that a finger or toe belongs to; any other joint is a part of its own."""
+        """The hand or foot that a finger or toe belongs to; any other joint is a separate part."""
         while self.reach[joint] < 0.10 * self.height and self.skeleton.parents[joint] >= 0:
             lengths = [float(np.linalg.norm(end - start)) for _, start, end in self.bones([joint])]
             if max(lengths, default=0.0) > 0.05 * self.height:

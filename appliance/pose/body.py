@@ -11,7 +11,7 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
-LONG_BRANCH = 0.25  # of the height: a branch that reaches further is a limb, a shorter one a finger or a face
+LONG_BRANCH = 0.25  # fraction of the height; a longer branch is a limb, a shorter one a finger or a face
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a recording says of its dancer: height, floor, where the head is, where the front is."""
+"""The dancer's facts from a recording: height, floor, the head's place, the front."""
 
 from __future__ import annotations
 
@@ -13,14 +13,12 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
 SMALLEST_M, TALLEST_M = 1.2, 2.2  # a body outside is asked about
-UPRIGHT = 0.6  # of the way from hips to head lies along an axis
+UPRIGHT = 0.6  # fraction of the way from hips to head that is along an axis
 SAMPLES_A_SECOND = 5.0
-STANDING_PERCENTILE = (
-    90.0  # of the heights from sole to crown: the dancer stands upright in a tenth of the time
-)
-HANGING_SHARE = 0.5  # of a metre of height that a metre of lower hands is worth in a standing pose
+STANDING_PERCENTILE = 90.0  # percentile of the heights, sole to crown: upright in a tenth of the time
+HANGING_SHARE = 0.5  # metres of height that a metre of lower hands is worth in a standing pose
 LIMB_ENDS = ("neck", "head", "hand", "foot", "toe")
-PLANTED_PERCENTILE = 5.0  # of the heights of the lowest sole: the floor
+PLANTED_PERCENTILE = 5.0  # percentile of the heights of the lowest sole: the floor
 
 
 def sampled_positions(recording: Recording) -> Array:

@@ -6,8 +6,8 @@ import numpy as np
 
 from appliance.pose.skeleton import Skeleton
 
-SMALL = 0.042  # of the body's span: a finger has 0.04 at most, a toe 0.03, a head 0.045, a foot 0.054
-LIMB_END = 0.15  # of the skeleton's reach: what hangs below a head, hand or foot is no longer than this
+SMALL = 0.042  # fraction of the span: a finger has 0.04 at most, a toe 0.03, a head 0.045, a foot 0.054
+LIMB_END = 0.15  # fraction of the skeleton's reach: parts below a head, hand or foot are no longer than this
 
 
 def small_parts(skeleton: Skeleton) -> set[int]:

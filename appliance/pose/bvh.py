@@ -88,7 +88,7 @@ def write_bvh(path: Path | str, recording: Recording, metres_per_unit: float = 0
 
 
 def recording_of(text: BvhText, metres_per_unit: float = 0.01) -> Recording:
-    """What a file says, as a recording; its notes say what was lost.
+    """A file as a recording; its notes say what was lost.
 
     The root's OFFSET is ignored: its channels say where it is. Position channels of other joints replace
     their OFFSET, or are added to it where they are changes of it. Over rows that are missing between others

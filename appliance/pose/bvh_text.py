@@ -19,7 +19,7 @@ from appliance.pose.foreign_file import opened_text
 from appliance.pose.kept_rows import KeptRows
 
 MAX_LINE = 1 << 17  # characters; the longest honest line is one frame of some hundred channels
-MAX_BLANK_LINES = 1000  # in a row; a file of line ends alone must not block
+MAX_BLANK_LINES = 1000  # in a row; a file of only line ends must not block
 MAX_SPOILT_ROWS = 1000  # in a row; behind so many no frame is looked for
 MAX_JOINTS = 1000
 MAX_VALUES = 50_000_000  # 400 MB: 50 minutes of 132 channels at 120 poses a second
@@ -50,7 +50,7 @@ class BvhJoint:
 
 @dataclass(frozen=True)
 class BvhText:
-    """What a file says: joints with parents first, End Sites as (joint, offset), frames (N, channels).
+    """The content of a file: joints with parents first, End Sites as (joint, offset), frames (N, channels).
 
     numbers (N,): which frame of the recording each row is, rising; spoilt rows are missing. fps: as told, or
     by the header; header_fps: None where that is no rate. notes: what was lost or read another way, in words.
@@ -218,7 +218,7 @@ def _open_joint(lines: _Lines, joints: list[BvhJoint], opened: list[int], key: s
 
 
 def _open_block(lines: _Lines, words: list[str]) -> None:
-    """The brace that opens a block: at the end of its line or alone on the next one."""
+    """The brace that opens a block: at the end of its line or by itself on the next one."""
     if not words[-1].endswith("{") and lines.next("an opening brace") != ["{"]:
         lines.fail("an opening brace '{' should stand here.")
 
@@ -244,7 +244,7 @@ def _channels(lines: _Lines, words: list[str]) -> list[str]:
 
 
 def _headed(lines: _Lines, heading: str) -> str:
-    """What follows a heading such as 'Frame Time:', in any case and spacing; '' where nothing does."""
+    """The text after a heading such as 'Frame Time:', in any case and spacing; '' where there is none."""
     words = " ".join(lines.next(f"'{heading}'")).replace(":", ": ").split()
     expected = heading.upper().split()
     if [word.upper() for word in words[: len(expected)]] != expected:

@@ -1,4 +1,4 @@
-"""What the system refused about a file or folder, as a sentence: what happened, and what to do."""
+"""An operating system error about a file or folder, as a sentence: what happened, and what to do."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.
 
 
 def sentence(error: OSError, path: Path | None = None) -> str | None:
-    """What to say about it; None where neither the error nor the caller names a file, and no disk failed.
+    """A sentence about it; None where neither the error nor the caller names a file, and no disk failed.
 
     path: the file that was meant, where the error does not name one (a write to a full disk does not).
     """

@@ -1,4 +1,4 @@
-"""Files that others made: regular ones alone are opened, and no more is read than their reader takes."""
+"""Files from others: only regular ones are opened, and no more is read than their reader accepts."""
 
 from __future__ import annotations
 

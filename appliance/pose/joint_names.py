@@ -13,8 +13,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-# Words for a joint, in the order in which it lies on its chain; letter case and punctuation do not count, a
-# number at the end is the joint's number.
+# Words for a joint, in their order along the chain; letter case and punctuation do not count, a number at the
+# end is the joint's number.
 CHAINS: dict[str, tuple[tuple[str, ...], ...]] = {
     "spine": (
         (
@@ -124,8 +124,8 @@ def place_of(name: str) -> Place | None:
 def shared_prefix(names: Sequence[str]) -> str:
     """The longest beginning that at least half of the names have, up to a mark or a capital; '' without one.
 
-    A performer or a rig in front of its joints: Model_Hips, Actor01_LeftArm. What hangs from the rig
-    besides, such as props, has other beginnings.
+    A performer or a rig in front of its joints: Model_Hips, Actor01_LeftArm. Other parts of the rig, such as
+    props, have other beginnings.
     """
     counts = Counter(name[: seam.start()] for name in names for seam in _SEAM.finditer(name))
     often = (prefix for prefix, count in counts.items() if count >= max(2, len(names) / 2))

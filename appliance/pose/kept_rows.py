@@ -41,12 +41,12 @@ class KeptRows:
         self.places.append(place)
 
     def lose(self, place: int, why: str) -> None:
-        """The next row is none."""
+        """The next row is invalid."""
         self.why = self.why or why.rstrip(".")
         self.lost.append((self.count, place))
 
     def without(self, unsound: Sequence[int], why: str) -> KeptRows:
-        """The same rows where these of the frames turned out to be none."""
+        """The same rows where these of the frames turned out to be invalid."""
         off = set(unsound)
         kept = [frame for frame in range(len(self.numbers)) if frame not in off]
         lost = sorted([*self.lost, *((self.numbers[frame], self.places[frame]) for frame in off)])

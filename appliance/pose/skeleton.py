@@ -150,7 +150,7 @@ def stance_facts(skeleton: Skeleton) -> dict[str, list[list[float]]]:
 
 
 def stance_of(facts: Mapping[str, Any]) -> NDArray[np.float64] | None:
-    """The stance in plain values. Raises ValueError or TypeError where they are none."""
+    """The stance in plain values. Raises ValueError or TypeError where they are invalid."""
     if facts.get("stance") is None:
         return None
     return np.asarray(facts["stance"], np.float64).reshape(-1, 4)

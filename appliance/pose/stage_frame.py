@@ -31,7 +31,7 @@ UNITS = {"metres": 1.0, "decimetres": 0.1, "CMU's units": 0.0564, "inches": 0.02
 UNITS["millimetres"] = 0.001
 STILL_DEGREES = 0.1
 STRETCH_M = 1e-6
-FAR_FROM_HIPS = 0.4  # of the hips' reach, a leg: a root further away is no part of the body
+FAR_FROM_HIPS = 0.4  # fraction of the hips' reach, a leg: a root further away is not part of the body
 STEADY = 0.8  # length of the mean front: 1 where the dancer never turns
 TURNED_DEGREES = 67.5  # a mean front that far from the audience is turned, in quarters
 FLOOR_M = 0.15  # a floor further from 0 than this is set to 0; capture leaves it some centimetres off
@@ -52,7 +52,7 @@ class Reading:
 
 
 class Guess(NamedTuple):
-    """What was changed in a recording, in words, and the option that overrules it ('': asked for)."""
+    """A change made to a recording, in words, and the option that overrides it ('': asked for)."""
 
     words: str
     option: str

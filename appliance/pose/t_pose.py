@@ -24,7 +24,7 @@ def t_pose(skeleton: Skeleton, tolerance_degrees: float = 0.0) -> Anatomy:
     roles = skeleton.roles
 
     def aim(start: str, end: str, way: Array) -> None:
-        """Each bone from one role to another, also where unnamed joints lie between."""
+        """Each bone from one role to another, even across unnamed joints."""
         joint, first = roles.get(end, -1), roles.get(start, -1)
         chain: dict[tuple[int, int], Array] = {}
         while joint > first >= 0:  # parents come before children

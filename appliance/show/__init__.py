@@ -1,1 +1,1 @@
-"""What a show and a venue need: the show bundle and the box file, typed and bounded."""
+"""Configuration of a show and a venue: the show bundle and the box file, typed and bounded."""

@@ -27,7 +27,7 @@ def require_wires(box: Path | None) -> None:
 
 
 def no_sound(box: Path | None) -> NotAskedForError:
-    """What to say of this box file."""
+    """The sentence about this box file."""
     cure = "Write `sound: {}` for the system's own sound card."
     return _not_asked_for(box, "This box file asks for no sound.", cure)
 

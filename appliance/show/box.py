@@ -42,7 +42,7 @@ class UdpConfig(Section):
         "no other address receives that.",
         "127.0.0.1",
     )
-    port: int = key("UDP port; 0 takes any free one.", 9750, within=(0, 65535))
+    port: int = key("UDP port; 0: any free one.", 9750, within=(0, 65535))
 
 
 class SerialConfig(Section):
@@ -58,11 +58,11 @@ class SensorsConfig(Section):
     udp: UdpConfig | None = key("Sensors over the network; null: none.", UdpConfig())
     serial: list[SerialConfig] = key("Sensors on cables.", [], length=(0, 8))
     keys: LocalFile | None = key(
-        "File with the sensors' keys, relative to the box file; null: none is let in.", None
+        "File with the sensors' keys, relative to the box file; null: no sensor is let in.", None
     )
     light: bool = key(
-        "A short flash of a sensor's lamp each 3 seconds says that it is linked; false: it stays "
-        "dark on stage. Lights that ask for something are shown all the same.",
+        "A short flash of a sensor's lamp every 3 seconds shows that it is linked; false: it stays "
+        "dark on stage. Signals that ask for something are still shown.",
         True,
     )
 
@@ -70,7 +70,7 @@ class SensorsConfig(Section):
 def out_of_reach(sensors: SensorsConfig) -> str | None:
     """Why wearables on Wi-Fi do not reach the box, and what to do; None when they do.
 
-    Their hello is a broadcast, which the kernel gives to sockets on 0.0.0.0 alone.
+    Their hello is a broadcast, which the kernel delivers only to sockets on 0.0.0.0.
     """
     udp = sensors.udp
     if udp is not None and udp.host == "0.0.0.0":
@@ -106,7 +106,7 @@ class LimitsConfig(Section):
     """How much time the dance may take."""
 
     tick_budget_ms: float = key(
-        "What one tick of 20 ms may use. On stage a show that needs more runs with fewer iterations, and the "
+        "Time for one 20 ms tick. On stage a show that needs more runs with fewer iterations, and the "
         "box says so; `bunraku check` refuses it. At power-on a new show is refused only where a single "
         "iteration is too much.",
         10.0,
@@ -128,9 +128,9 @@ class JournalConfig(Section):
     """The flight recorder."""
 
     folder: LocalFolder | None = key(
-        "Folder, relative to the box file; made when missing; null: no journal.", None
+        "Folder, relative to the box file; created if missing; null: no journal.", None
     )
-    minutes: float = key("How much it keeps before the oldest goes.", 30.0, within=(0.1, 1440))
+    minutes: float = key("Minutes kept before the oldest are deleted.", 30.0, within=(0.1, 1440))
 
 
 class BoxConfig(Section):
@@ -138,8 +138,8 @@ class BoxConfig(Section):
 
     _file: YamlFile | None = PrivateAttr(default=None)
     state: LocalFolder | None = key(
-        "Folder where the box keeps what it learns (neutral poses, sensors' calibrations), "
-        "relative to the box file; made when missing; null: the key file's folder.",
+        "Folder for the box's learned data (neutral poses, sensors' calibrations), "
+        "relative to the box file; created if missing; null: the key file's folder.",
         None,
     )
     sensors: SensorsConfig = part(SensorsConfig)
@@ -150,16 +150,16 @@ class BoxConfig(Section):
     projector: ProjectorConfig = part(ProjectorConfig)
     sound: SoundConfig | None = key("The sound card for a show's strings; null: none.", None)
     runtime: LocalFolder | None = key(
-        "Folder where the box's processes meet, relative to the box file; a folder in memory. "
-        "null: the one that systemd gives, else one of the user's own.",
+        "Folder shared by the box's processes, relative to the box file; a folder in memory. "
+        "null: the one from systemd, otherwise the user's.",
         None,
     )
     limits: LimitsConfig = part(LimitsConfig)
     realtime: RealtimeConfig = part(RealtimeConfig)
     phase_lock: bool = key("Place each tick just after the primary sensor's usual arrival.", True)
     resume: Resume = key(
-        "When a show goes on at the place of the phrase where it was: always (after a crash and "
-        "after a power cut), after_crash, or never. A show that was ended begins at the beginning.",
+        "When a show continues where it was in the phrase: always (after a crash and "
+        "after a power cut), after_crash, or never. A show that was ended starts from the beginning.",
         "always",
     )
     journal: JournalConfig = part(JournalConfig)

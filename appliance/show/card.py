@@ -18,18 +18,19 @@ MOST_CARDS = 32
 class CardConfig(Section):
     """A card over the dance: text, an image, a background, or some of them."""
 
-    name: str = key("What cues and /card call it.", length=(1, 64))
-    text: str = key("Its words, in any script; a line break starts a new line.", "", length=(0, 1000))
+    name: str = key("Name for cues and /card.", length=(1, 64))
+    text: str = key("Text in any script; a line break starts a new line.", "", length=(0, 1000))
     image: PictureFile | None = key("PNG or JPEG file in the bundle, above the words.", None)
-    background: Colour = key("Left out: the dance shows through.", None)
-    colour: Colour = key("Of the words; left out: white.", None)
-    size: float = key("Height of a line of words, as a share of the picture's.", 0.08, within=(0.01, 0.5))
-    image_size: float = key("Height of the image, as a share of the picture's.", 0.4, within=(0.02, 1))
+    background: Colour = key("Default: the dance shows through.", None)
+    colour: Colour = key("Colour of the text; default: white.", None)
+    size: float = key("Height of a line of text, as a fraction of the picture's.", 0.08, within=(0.01, 0.5))
+    image_size: float = key("Height of the image, as a fraction of the picture's.", 0.4, within=(0.02, 1))
     place: Annotated[tuple[float, float], Field(strict=False)] = key(
-        "Where its middle lies, in shares of the picture's width and height from the top left.", (0.5, 0.5)
+        "Position of its middle, in fractions of the picture's width and height from the top left.",
+        (0.5, 0.5),
     )
     font: BundleFile | None = key(
-        "Font file (.ttf, .otf) in the bundle; left out, and for letters that it lacks: this machine's.", None
+        "Font file (.ttf, .otf) in the bundle; default, and for letters that it lacks: this machine's.", None
     )
 
     @field_validator("name")

@@ -37,7 +37,7 @@ _MOST_NAMED = 5  # frames in a message
 
 @dataclass(frozen=True)
 class Finding(Problem):
-    """What `bunraku check` has to say: an error keeps the show off the stage, a warning does not."""
+    """A finding of `bunraku check`: an error keeps the show off the stage, a warning does not."""
 
     level: Literal["error", "warning"] = "error"
 
@@ -51,7 +51,7 @@ class Finding(Problem):
 
 
 def not_as_packed(directory: Path) -> str:
-    """What to say of a show that is not what its checksums vouch for; '' for one that is."""
+    """A sentence about a show that differs from its checksums; '' for one that matches."""
     if not checksum_problems(directory):
         return ""
     return (

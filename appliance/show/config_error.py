@@ -1,4 +1,4 @@
-"""What is wrong with a configuration file: file, line, message and cure, several at once."""
+"""Errors in a configuration file: file, line, message and cure, several at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-MOST_PROBLEMS = 30  # of one error: nobody reads more, and a file may have twenty thousand
+MOST_PROBLEMS = 30  # in one error: nobody reads more, and a file may have twenty thousand
 _LONGEST = 2000  # characters of a message
 _LONGEST_WORD = 60
 

@@ -18,7 +18,7 @@ def _address(text: str) -> str:
     except ValueError:
         raise refusal(
             f"'{text}' is not an address in numbers.",
-            "Write 127.0.0.1 (this machine alone), '::' (every network) or one address of this machine.",
+            "Write 127.0.0.1 (only this machine), '::' (every network) or one address of this machine.",
         ) from None
 
 
@@ -40,10 +40,10 @@ class ConsoleConfig(Section):
     """The page for technicians, in any browser."""
 
     host: Host = key(
-        "Address to listen on; '::': on every network, IPv4 and IPv6, for those named under `viewers`.",
+        "Address to listen on; '::': all networks, IPv4 and IPv6; only `viewers` are served.",
         "127.0.0.1",
     )
-    port: int = key("TCP port; 0 takes any free one.", 8080, within=(0, 65535))
+    port: int = key("TCP port; 0: any free one.", 8080, within=(0, 65535))
     viewers: list[Viewers] = key(
         "Devices that may open the page: addresses or networks, IPv4 and IPv6. This machine always may. To "
         "change anything a device needs the PIN as well.",
@@ -51,13 +51,13 @@ class ConsoleConfig(Section):
         length=(0, 32),
     )
     names: list[str] = key(
-        "Names by which browsers reach the page, beside addresses, localhost and this machine's own name.",
+        "More names by which browsers reach the page besides addresses, localhost and this machine's name.",
         [],
         length=(0, 8),
     )
 
     https: bool = key(
-        "Serve the page over HTTPS, with a certificate of the box's own; `bunraku console pin` shows its "
+        "Serve the page over HTTPS, with the box's own certificate; `bunraku console pin` shows its "
         "fingerprint, which a browser asks about once.",
         False,
     )

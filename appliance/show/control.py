@@ -26,24 +26,22 @@ Senders = Annotated[str, AfterValidator(_network)]
 class HeartbeatConfig(Section):
     """A receiver of the box's status, once a second."""
 
-    host: Ipv4 = key("The listener's address in numbers.", "127.0.0.1")
+    host: Ipv4 = key("The listener's IP address.", "127.0.0.1")
     port: int = key("The listener's UDP port.", 9003, within=(1, 65535))
 
 
 class ReplyConfig(Section):
     """A receiver of the box's replies."""
 
-    host: Ipv4 = key("The listener's address in numbers.", "127.0.0.1")
+    host: Ipv4 = key("The listener's IP address.", "127.0.0.1")
     port: int = key("The listener's UDP port.", 9001, within=(1, 65535))
 
 
 class ControlConfig(Section):
     """Where commands by OSC arrive, and from whom."""
 
-    host: Ipv4 = key(
-        "Address to listen on; 0.0.0.0: on every network, for those named under `senders`.", "127.0.0.1"
-    )
-    port: int = key("UDP port; 0 takes any free one.", 9002, within=(0, 65535))
+    host: Ipv4 = key("Address to listen on; 0.0.0.0: all networks; only `senders` are heard.", "127.0.0.1")
+    port: int = key("UDP port; 0: any free one.", 9002, within=(0, 65535))
     senders: list[Senders] = key(
         "Senders that may command the box: addresses (192.168.0.20) or networks (192.168.0.0/24). "
         "This machine always may; []: no other.",
@@ -55,7 +53,7 @@ class ControlConfig(Section):
     )
 
     replies: list[ReplyConfig] = key(
-        "Receivers of each answer beside the sender of its command: desks often listen on another port than "
+        "Receivers of each answer besides the sender of its command: desks often listen on another port than "
         "they send from.",
         [],
         length=(0, 16),

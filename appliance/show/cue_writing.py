@@ -27,11 +27,11 @@ def with_cue(text: str, cue: Mapping[str, Any]) -> str:
     if not isinstance(found, yaml.SequenceNode):
         raise ValueError("its cues are no list")
     if found.flow_style:
-        end = found.end_mark.index - 1  # of the closing bracket
+        end = found.end_mark.index - 1  # the closing bracket
         return f"{text[:end]}{', ' if found.value else ''}{written}{text[end:]}"
     lines = text.splitlines(keepends=True)
     place = found.end_mark.line
     while not lines[place - 1].strip() or lines[place - 1].lstrip().startswith("#"):
-        place -= 1  # what stands behind the last cue belongs to the next section
+        place -= 1  # comments after the last cue belong to the next section
     lines.insert(place, f"{' ' * found.start_mark.column}- {written}\n")
     return "".join(lines)

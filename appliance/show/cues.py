@@ -30,12 +30,12 @@ def _key(lever: Lever[Any], **bounds: Any) -> Any:
 
 
 class CueConfig(Section):
-    """One cue. What it leaves out stays as it is."""
+    """One cue. Keys left out stay as they are."""
 
-    name: str = key("What `/cue` calls it.", length=(1, 64))
+    name: str = key("Name for `/cue`.", length=(1, 64))
     phrase: Name | None = _key(levers.PHRASE)
     motion: MotionChanges | None = key(
-        "Parameters of the sources that are made ahead, like {vary: {sigma: 1.2}}, reached over the fade.",
+        "Parameters of sources made ahead, like {vary: {sigma: 1.2}}, reached over the fade.",
         None,
     )
     iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = _key(levers.ITERATIONS)
@@ -52,7 +52,7 @@ class CueConfig(Section):
     fade_s: float = key(
         "How long phrase, iterations, liveliness, springs, strings, look, camera, card, lights and master "
         "take to change, in seconds. "
-        "Hands take 0.5 s to hold and 1 s to let go, whatever stands here.",
+        "Hands take 0.5 s to hold and 1 s to let go, regardless of this value.",
         FADE_S,
         within=(0, 60),
     )

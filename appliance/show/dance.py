@@ -1,4 +1,4 @@
-"""What dances: the sections of show.yaml about the puppet and about what it starts from."""
+"""The sections of show.yaml about the puppet and its motion source."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ class DancerConfig(Section):
         within=(1, 64),
     )
     interaction_iterations: int = key(
-        "In how many of those, from the first on, the held joints are overwritten; at most "
+        "In how many of those, counted from the first, the held joints are overwritten; at most "
         "coding_iterations. Equal to it: the output shows the held orientation itself. "
-        "Left out: one less than coding_iterations (but at least 1), so the last pass is free.",
+        "Default: one less than coding_iterations (but at least 1), so the last pass is free.",
         9,
         within=(0, 64),
     )
     liveliness: float = key(
-        "How much of the phrase's own movement stays while a hand holds. 1: as alive as the dancer; 0: the "
+        "How much of the phrase's own movement stays while a hand holds. 1: as lively as the dancer; 0: the "
         "calm answer, without noise.",
         1.0,
         within=(0, 1),
     )
     seed: int | None = key(
         "Seed of the noise in the answer to a hand. The same seed and the same hand give the same dance, so "
-        "every evening is as it was rehearsed. null: a new seed at each start of the show, which status and "
-        "journal tell. A show that goes on after a crash or a power cut keeps its seed.",
+        "every evening is as rehearsed. null: a new seed at each start of the show, reported by status and "
+        "journal. A show that continues after a crash or a power cut keeps its seed.",
         0,
         within=(0, SEEDS - 1),
     )
     hop: int = key("Ticks from one window to the next; they are blended.", 1, within=(1, 8))
     blending: Blending = key(
-        "How windows are blended. `prompt`: half of a step of the hand is in the output within 20 ms. "
+        "How windows are blended. `prompt`: half of a step of the hand reaches the output within 20 ms. "
         "`hann`: as in the papers, after 60 ms, but smoother; better from about 30 iterations on.",
         "prompt",
     )
@@ -73,15 +73,15 @@ class DancerConfig(Section):
 
 
 class MotionConfig(Section):
-    """What the puppet starts from: playback of a phrase."""
+    """The puppet's motion source: playback of a phrase."""
 
     phrase: BundleFile = key(
-        "The file in the bundle of the phrase that the show starts with; cues and `/phrase` call it `main`.",
+        "The bundle's file with the phrase that the show starts with; cues and `/phrase` call it `main`.",
         "phrase.bvh",
     )
     phrases: dict[str, BundleFile] = key(
         "Further phrases of the same skeleton, each with the name that cues and `/phrase` call "
-        "it by, like `quiet: quiet.bvh`. They are played from their start to their end.",
+        "it by, like `quiet: quiet.bvh`. They play from start to end.",
         {},
         length=(0, 32),
     )
@@ -91,26 +91,28 @@ class MotionConfig(Section):
         False,
     )
     vary: VaryConfig | None = key("The source `vary`: the phrase danced anew at every return.", None)
-    granular: GranularConfig | None = key("The source `granular`: a walk through what the dancer does.", None)
+    granular: GranularConfig | None = key(
+        "The source `granular`: a walk through the dancer's movement.", None
+    )
     path: PathConfig | None = key("The source `path`: a path through the dancer's poses that wobbles.", None)
     improvise: ImproviseConfig | None = key(
-        "The source `improvise`: goes on from what was just danced, and never comes back.", None
+        "The source `improvise`: continues from what was just danced, and never returns.", None
     )
     kept: list[Annotated[str, Field(min_length=1, max_length=64)]] = key(
-        "Names of motions that were kept on the box (`/motion/keep`) and that cues of this show call. Until "
+        "Names of motions saved on the box (`/motion/keep`) that cues of this show call. Until "
         "one is there the last phrase plays on.",
         [],
         length=(0, 16),
     )
     source: str = key(
-        "What the show starts from: `main`, a name under phrases, `live`, `vary`, `granular`, `path` or "
-        "`improvise`. The phrase plays until what is made ahead is there.",
+        "Motion at the start: `main`, a name under phrases, `live`, `vary`, `granular`, `path` or "
+        "`improvise`. The phrase plays until the motion is ready.",
         MAIN,
         length=(1, 64),
     )
-    start_s: float = key("Where in `phrase` the excerpt starts, in seconds.", 0.0, within=(0, 86400))
+    start_s: float = key("Start of the excerpt in `phrase`, in seconds.", 0.0, within=(0, 86400))
     end_s: float | None = key(
-        "Where it ends, in seconds; after start_s. null: at the phrase's end.", None, above=0, most=86400
+        "Its end, in seconds; after start_s. null: the phrase's end.", None, above=0, most=86400
     )
     rate: float = key(
         "Speed of playback: 1 as recorded, 0 stands still, below 0 runs backwards.", 1.0, within=(-4, 4)
@@ -167,7 +169,9 @@ class MotionConfig(Section):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """What the puppet can start from, by the names that cues call, the one at the start first."""
+        """The puppet's possible motion sources, by the names that cues call, the first one at the start
+        first.
+        """
         return (*self.files, *([LIVE] if self.live else []), *self.made_sources, *self.kept)
 
     @property

@@ -11,7 +11,7 @@ from appliance.show.section import Ipv4, Section, SerialDevice, key, refusal
 WireKind = Literal["artnet", "sacn", "usb-pro", "open-dmx", "udmx"]
 
 LAST_UNIVERSE = 63999
-SLOTS = 512  # of a universe
+SLOTS = 512  # channels of a universe
 FASTEST_HZ = 44.0  # a full universe lasts 22.7 ms on the wire (ANSI E1.11)
 NUMBERS = {"artnet": (0, 32767), "sacn": (1, LAST_UNIVERSE)}  # 15 bits; E1.31 section 6.2.7
 IN_WORDS = {
@@ -42,24 +42,24 @@ class DmxConfig(Section):
     """One universe of lights on one wire. A universe may leave by several wires."""
 
     universe: int = key(
-        "The universe that the show's fixtures name, and its number on the network: artnet 0 to "
+        "The universe in the show's fixtures, and its number on the network: artnet 0 to "
         "32767, sacn 1 to 63999."
     )
     wire: WireKind = key(
-        "artnet and sacn: over the network; usb-pro: ENTTEC DMX USB Pro and what speaks like it; "
+        "artnet and sacn: over the network; usb-pro: ENTTEC DMX USB Pro and compatible; "
         "open-dmx: a bare FTDI cable, not recommended for shows; udmx: anyma uDMX."
     )
     rate_hz: float | None = key(
         "Universes a second at most; null: 40, open-dmx 30.", None, within=(1, FASTEST_HZ)
     )
-    channels: int = key("How many channels are sent, from the first on.", SLOTS, within=(24, SLOTS))
+    channels: int = key("Number of channels sent, from the first.", SLOTS, within=(24, SLOTS))
     number: int | None = key(
-        "artnet (net, subnet and universe in one) and sacn: the number on the network where it "
+        "artnet (net, subnet and universe in one) and sacn: the number on the network if it "
         "differs from the universe.",
         None,
     )
     host: Ipv4 | None = key(
-        "artnet: the node's address, null: this machine; sacn: send to this address alone, null: multicast.",
+        "artnet: the node's address, null: this machine; sacn: send only to this address, null: multicast.",
         None,
     )
     port: int | None = key(
@@ -67,12 +67,12 @@ class DmxConfig(Section):
     )
     interface: Ipv4 | None = key(
         "artnet, sacn: this machine's own address in the lights' network. null: artnet takes the "
-        "way to its host; sacn stays inside this machine.",
+        "route to its host; sacn stays on this machine.",
         None,
     )
     broadcast: bool = key("artnet: host is a broadcast address.", False)
     priority: int = key("sacn: among sources of a universe, higher wins.", 100, within=(0, 200))
-    source_name: str = key("sacn: what consoles call this box.", "Bunraku", length=(1, 63))
+    source_name: str = key("sacn: the name of this box on consoles.", "Bunraku", length=(1, 63))
     preview: bool = key("sacn: for visualisers only; lights should ignore it.", False)
     ttl: int = key("sacn: how many networks multicast may reach; 1: this one only.", 1, within=(1, 255))
     device: SerialDevice | None = key(
@@ -127,7 +127,7 @@ class DmxConfig(Section):
 
     @property
     def destination(self) -> tuple[object, ...]:
-        """What two entries must not share: a light that receives both cannot tell them apart."""
+        """The identity that two entries must not share: a light that receives both cannot tell them apart."""
         if self.wire in NUMBERS:
             host = self.host or ("127.0.0.1" if self.wire == "artnet" else "multicast")
             return (self.wire, host, self.udp_port, self.number_on_wire, self.interface)

@@ -18,7 +18,7 @@ UNUSED = "-"  # a channel that nothing drives
 FINE = (" fine", " finer")  # the second and third byte of an attribute
 DIMMER, PAN, TILT = "dimmer", "pan", "tilt"
 COLOURS = ("red", "green", "blue", "white", "cyan", "magenta", "yellow")  # `colour` sets them
-LAMPS = ("amber", "uv", "lime", "indigo", "warm white", "cold white")  # those only rules of their own
+LAMPS = ("amber", "uv", "lime", "indigo", "warm white", "cold white")  # only rules that name them
 MAX_CHANNELS = 512
 
 Byte = Annotated[int, Field(ge=0, le=255)]
@@ -26,11 +26,11 @@ BytePair = Annotated[tuple[Byte, Byte], Field(strict=False)]
 
 
 class AttributeConfig(Section):
-    """What is special about an attribute; one that is not listed has the defaults."""
+    """The special properties of an attribute; one that is not listed has the defaults."""
 
     name: str = key("As in the modes' channels, without 'fine'.", length=(1, 64))
     default: float | None = key(
-        "Where it stands when no rule drives it, share of its range. Left out: pan and tilt in "
+        "Value when no rule drives it, as a fraction of its range. Default: pan and tilt in "
         "the middle, colours white, everything else 0.",
         None,
         within=(0, 1),
@@ -41,8 +41,10 @@ class AttributeConfig(Section):
     degrees: float | None = key(
         "For pan (540) and tilt (270): the whole range in degrees.", None, above=0, most=1440
     )
-    invert: bool = key("The channel runs the other way round.", False)
-    slew: float | None = key("For pan and tilt (180): the most degrees a second.", None, above=0, most=2000)
+    invert: bool = key("The channel is inverted.", False)
+    slew: float | None = key(
+        "For pan and tilt (180): the greatest speed, degrees a second.", None, above=0, most=2000
+    )
     dims: bool = key(
         "Master and blackout scale it, as they scale the dimmer: for fog, strobes, lasers.", False
     )
@@ -61,7 +63,7 @@ class AttributeConfig(Section):
 class ModeConfig(Section):
     """One layout of channels, as chosen in the fixture's own menu."""
 
-    name: str = key("What the fixture's menu calls it.", length=(1, 64))
+    name: str = key("Name in the fixture's menu.", length=(1, 64))
     channels: list[str] = key(
         "Attributes from the first channel on; 'pan fine' is the second byte of pan, 'pan finer' "
         "the third, '-' a channel that stays 0.",
@@ -95,9 +97,11 @@ class ProfileConfig(Section):
     """A fixture profile: modes and what is special about attributes."""
 
     name: str = key("Manufacturer and model.", length=(1, 200))
-    modes: list[ModeConfig] = key("Layouts; the first one is taken unless the patch says.", length=(1, 256))
+    modes: list[ModeConfig] = key(
+        "Layouts; the first one is used unless the patch names another.", length=(1, 256)
+    )
     attributes: list[AttributeConfig] = key(
-        "What is special about some of them.", [], length=(0, MAX_CHANNELS)
+        "Special properties of some of them.", [], length=(0, MAX_CHANNELS)
     )
 
     @model_validator(mode="after")
@@ -119,7 +123,7 @@ class ProfileConfig(Section):
         return {mode.name: mode for mode in self.modes}[name]
 
     def attribute(self, name: str) -> AttributeConfig:
-        """What is special about an attribute; the defaults where nothing is."""
+        """The special properties of an attribute; the defaults where there are none."""
         return next((known for known in self.attributes if known.name == name), AttributeConfig(name=name))
 
 

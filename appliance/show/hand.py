@@ -10,9 +10,9 @@ from appliance.show.section import Axis, Joint, Orientation, Section, key, refus
 
 LONGEST_SENSOR_NAME = 24  # as in the key file (appliance/sensor/keys.py) and the wearable's flash
 KINDS = ("sensor", "turning", "fixed", "kept", "osc", "springs")
-SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # of a hand, for a worn sensor alone
+SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # only for a worn sensor
 BY_POSITION = ("osc", "fixed")  # kinds that may give a position instead of an orientation
-FARTHEST_M = 100.0  # of a position from the middle of the stage: beyond is a mistake
+FARTHEST_M = 100.0  # metres from the middle of the stage: beyond is a mistake
 
 Metres = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Position = Annotated[tuple[Metres, Metres, Metres], Field(strict=False)]
@@ -43,21 +43,21 @@ class HandConfig(Section):
     turning: TurningConfig | None = key("The joint turns at a constant rate.", None)
     fixed: FixedConfig | None = key("The joint is held still.", None)
     kept: Literal[True] | None = key(
-        "The joint is kept where the phrase has it, pose by pose; with as many interaction as "
+        "The joint is kept where the phrase has it, pose by pose; with equal interaction and "
         "coding iterations it stays there exactly.",
         None,
     )
     osc: Literal[True] | None = key("Messages to the control port hold the joint.", None)
     springs: str | None = key(
-        "Springs hold the joint and all below it that no other hand holds. The name of the setting that is "
-        "in force at the start: one under `springs`, or else loose, stiff or storm.",
+        "Springs hold the joint and everything below it that no other hand holds. The setting "
+        "at the start: one under `springs`, or loose, stiff or storm.",
         None,
         length=(1, 64),
     )
-    joint: Joint = key("Name of the held joint, one that the network moves.", length=(1, None))
+    joint: Joint = key("Name of the held joint, which the network must move.", length=(1, None))
     by: Literal["orientation", "position"] = key(
-        "What the hand gives: an orientation of the joint, or its position in the room. `position`: for osc "
-        "and fixed. A joint may have one hand of each. The position of the root joint draws the whole figure "
+        "Whether the hand gives an orientation of the joint or its position in the room. `position`: for osc "
+        "and fixed. A joint may have one hand of each. The position of the root joint moves the whole figure "
         "there, its feet on the floor.",
         "orientation",
     )
@@ -67,11 +67,11 @@ class HandConfig(Section):
         length=(1, 64),
     )
     weight: float = key(
-        "How firmly it is held: how far all interactions together bring the joint to the hand; 0 not at all.",
+        "How firmly it is held: how far all interactions together move the joint to the hand; 0: not at all.",
         1.0,
         within=(0, 1),
     )
-    from_start: bool = key("Whether it holds from the start on; else a cue or `/hold` lets it.", True)
+    from_start: bool = key("Whether it holds from the start; otherwise a cue or `/hold` starts it.", True)
     facing: Axis = key(
         "For sensors: the axis of the sensor (x, y, z; x is the arrow on its case, z comes out "
         "of its lid) that points to the front while the dancer stands in the neutral pose.",

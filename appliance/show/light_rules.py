@@ -39,18 +39,18 @@ class RuleConfig(Section):
     """One rule: a reading of the dance drives an attribute of some fixtures."""
 
     fixtures: list[str] = key(
-        "Names of the fixtures; []: all that can do what `drives` says.", [], length=(0, 512)
+        "Names of the fixtures; []: all that have what `drives` names.", [], length=(0, 512)
     )
     reads: Reading = key(
         "place (for aim), across, height and depth in metres, speed in metres a second, turn "
-        "about `axis` and lean of `axis` away from its rest direction in degrees, steady (nothing moves it); "
+        "about `axis` and lean of `axis` away from its rest direction in degrees, steady (a constant); "
         "of the whole body qom (quantity of motion) and the efforts after Laban."
     )
     joint: Joint | None = key(
-        "The joint that is read; left out: the root, and for speed the whole body's mean.", None
+        "The joint that is read; default: the root, and for speed the whole body's mean.", None
     )
     puppet: str | None = key(
-        "The name of the puppet that is read, of a show with several; left out: the first.",
+        "In a show with several puppets, the name of the one that is read; default: the first.",
         None,
         length=(1, 32),
     )
@@ -59,36 +59,36 @@ class RuleConfig(Section):
         length=(1, 64),
     )
     range: Pair | None = key(
-        "The readings that count as 0 and 1. Left out: speed 0 to 2, height 0 to 2, across and "
+        "The readings that count as 0 and 1. Defaults: speed 0 to 2, height 0 to 2, across and "
         "depth -2 to 2, turn -180 to 180, lean 0 to 90, qom 0 to 2, weight_effort 0 to 4, "
         "time_effort 0 to 20, flow_effort 0 to 1000, space_effort 1 to 4.",
         None,
     )
     curve: Literal["linear", "s", "gamma", "points"] = key(
-        "How 0 to 1 is bent: s is gentle at both ends, gamma is slow at first.", "linear"
+        "Response from 0 to 1: s is gentle at both ends, gamma is slow at first.", "linear"
     )
     gamma: float = key("Exponent of the curve gamma.", 2.2, within=(0.1, 10))
     points: list[Pair] = key(
-        "Corners [in, out] of the curve points, each 0 to 1, in growing order.", [], length=(0, 32)
+        "Breakpoints [in, out] of the curve points, each 0 to 1, in ascending order.", [], length=(0, 32)
     )
     output: Pair = key(
-        "What 0 and 1 become, as shares of the attribute's range; [1, 0] turns it round.", (0.0, 1.0)
+        "The output at 0 and at 1, as fractions of the attribute's range; [1, 0] inverts it.", (0.0, 1.0)
     )
-    value: Share = key("For steady: what it gives, 0 to 1.", 1.0)
-    attack_s: float = key("Seconds that a rise from 0 to 1 takes.", 0.0, within=(0, 60))
-    release_s: float = key("Seconds that a fall from 1 to 0 takes.", 0.0, within=(0, 60))
+    value: Share = key("For steady: its value, 0 to 1.", 1.0)
+    attack_s: float = key("Seconds for a rise from 0 to 1.", 0.0, within=(0, 60))
+    release_s: float = key("Seconds for a fall from 1 to 0.", 0.0, within=(0, 60))
     colours: list[Colour] = key(
-        "For colour: from 0 to 1 through these, each [red, green, blue] as shares 0 to 1.", [], length=(0, 16)
+        "For colour: from 0 to 1 through these, each [red, green, blue] from 0 to 1.", [], length=(0, 16)
     )
     axis: Axis = key(
         "For turn and lean: the axis (x, y, z) in the joint's rest pose; [0, 1, 0] is upwards.",
         (0.0, 1.0, 0.0),
     )
-    relative: bool = key("For turn and lean: count from the parent joint instead of the stage.", False)
-    offset: Metres = key("For aim: metres (x, y, z) beside the joint to aim at.", (0.0, 0.0, 0.0))
+    relative: bool = key("For turn and lean: measured from the parent joint instead of the stage.", False)
+    offset: Metres = key("For aim: offset (x, y, z) from the joint, metres.", (0.0, 0.0, 0.0))
     at: Metres | None = key("For aim with steady: the point on the stage (x, y, z), metres.", None)
     mix: Literal["last", "highest", "sum", "product"] = key(
-        "When an earlier rule of the set drives the same attribute: the last one counts, the "
+        "When an earlier rule of the set drives the same attribute: the last one wins, the "
         "highest, their sum or their product.",
         "last",
     )
@@ -146,9 +146,9 @@ def _growing(points: Sequence[tuple[float, float]]) -> bool:
 class MappingConfig(Section):
     """A set of rules under a name: one is in force at a time; cues and /lights fade from one to the next."""
 
-    name: str = key("What cues and /lights call it.", length=(1, 64))
+    name: str = key("Name for cues and /lights.", length=(1, 64))
     rules: list[RuleConfig] = key(
-        "Its rules, in this order; what none of them drives stays at the profile's default.",
+        "Its rules, in order; an attribute that none of them drives stays at the profile's default.",
         [],
         length=(0, MAX_RULES),
     )

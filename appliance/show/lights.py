@@ -27,30 +27,31 @@ from appliance.show.venue_lights import MAX_FIXTURES, UNIVERSE_CHANNELS, Address
 class FixtureConfig(Section):
     """One fixture of the rig: what it is, where it listens, where it hangs."""
 
-    name: str = key("What rules, cues and pictures call it.", length=(1, 64))
+    name: str = key("Name for rules, cues and pictures.", length=(1, 64))
     profile: str = key(
         "Its profile: a file in the show's folder `profiles`, or a built-in one.", length=(1, 100)
     )
-    mode: str | None = key("Mode of the profile; left out: its first one.", None)
-    universe: Universe = key("Its universe; box.yaml says on which wire that is.", 1)
+    mode: str | None = key("Mode of the profile; default: its first one.", None)
+    universe: Universe = key("Its universe; box.yaml assigns the wire.", 1)
     address: Address = key("Its first channel, as on the fixture's display.")
     place: Metres = key(
-        "Where it is, metres: x to the dancer's left, y up, z towards the audience; the origin "
-        "is on the floor, where the phrase has its own.",
+        "Its place, metres: x to the dancer's left, y up, z towards the audience; the origin "
+        "is the phrase's own, on the floor.",
         (0.0, 3.0, 0.0),
     )
     pose: Pose = key("Hanging from a bar, or standing on its base.", "hanging")
     turn: Metres = key(
-        "Turned from there, in degrees: yaw about the vertical, pitch about x, roll about z.", (0.0, 0.0, 0.0)
+        "Its rotation from there, in degrees: yaw about the vertical, pitch about x, roll about z.",
+        (0.0, 0.0, 0.0),
     )
     pan_limits: Pair | None = key(
-        "Pan stays between these degrees from its middle; left out: its range.", None
+        "Pan stays between these degrees from its middle; default: its range.", None
     )
     tilt_limits: Pair | None = key(
-        "Tilt stays between these degrees from its middle; left out: its range.", None
+        "Tilt stays between these degrees from its middle; default: its range.", None
     )
-    invert_pan: bool = key("Pan runs the other way round here.", False)
-    invert_tilt: bool = key("Tilt runs the other way round here.", False)
+    invert_pan: bool = key("Pan is inverted here.", False)
+    invert_tilt: bool = key("Tilt is inverted here.", False)
 
     @field_validator("profile")
     @classmethod
@@ -96,9 +97,9 @@ class FixtureConfig(Section):
 class SafeConfig(Section):
     """The safe look: on panic, after a stop, when the stage is lost, at the end. Dark unless set here."""
 
-    dimmer: float = key("How bright; 0 is dark.", 0.0, within=(0, 1))
-    colour: Colour = key("Red, green, blue as shares 0 to 1.", (1.0, 1.0, 1.0))
-    fixtures: list[str] = key("Those that shine then; []: all of them.", [], length=(0, MAX_FIXTURES))
+    dimmer: float = key("Brightness; 0 is dark.", 0.0, within=(0, 1))
+    colour: Colour = key("Red, green, blue from 0 to 1.", (1.0, 1.0, 1.0))
+    fixtures: list[str] = key("Fixtures that shine then; []: all of them.", [], length=(0, MAX_FIXTURES))
     heads: Literal["hold", "home"] = key(
         "Moving heads stay where they point, or go to their default.", "hold"
     )
@@ -170,7 +171,9 @@ def channel_count(fixture: FixtureConfig, directory: Path | None) -> int:
 
 
 def drivable(fixture: FixtureConfig, directory: Path | None) -> tuple[str, ...]:
-    """What rules can drive on a fixture: its attributes, `red` for all of `red 1`, ..., aim and colour."""
+    """The values that rules can drive on a fixture: its attributes, `red` for all of `red 1`, ..., aim and
+    colour.
+    """
     names = list(load_profile(fixture.profile, directory).mode(fixture.mode).attributes)
     bases = {base(name) for name in names}
     if {PAN, TILT} <= bases:

@@ -23,7 +23,7 @@ class CameraConfig(Section):
         "still: stays at its angle; drift: sways slowly about it; orbit: circles the figure.", "drift"
     )
     angle_deg: float = key(
-        "From where it looks: 0 from the front (+z), 90 from the left of the figure (+x).",
+        "Direction from which it looks: 0 from the front (+z), 90 from the left of the figure (+x).",
         24.0,
         within=(-180, 180),
     )
@@ -36,14 +36,14 @@ class CameraConfig(Section):
         within=(10, 75),
     )
     figure: float = key(
-        "Share of the picture's height that the standing figure takes; in upright pictures of "
+        "Height of the standing figure as a fraction of the picture's; in upright pictures of "
         "1.35 times their width.",
         0.7,
         within=(0.1, 0.9),
     )
     follow: float = key(
-        "How far it goes along: 1 keeps the dancer in the middle, 0 lets the dancer travel; "
-        "before an arm leaves the picture it moves or draws back by itself.",
+        "How closely it follows: 1 keeps the dancer in the middle, 0 lets the dancer travel; "
+        "before an arm leaves the picture it moves or draws back.",
         0.75,
         within=(0, 1),
     )
@@ -52,7 +52,7 @@ class CameraConfig(Section):
 
 
 class CameraChange(Section):
-    """The camera in a cue, whatever the look. What it leaves out stays as the look has it; {}: all does."""
+    """The camera in a cue, whatever the look. Keys left out stay as the look has them; {}: all of them."""
 
     move: Move | None = key("still, drift or orbit.", None)
     angle_deg: float | None = key(
@@ -60,31 +60,31 @@ class CameraChange(Section):
     )
     elevation_deg: float | None = key("How steeply it looks down.", None, within=(-3, 70))
     figure: float | None = key(
-        "How near: share of the picture's height that the standing figure takes.", None, within=(0.1, 0.9)
+        "Height of the standing figure as a fraction of the picture's.", None, within=(0.1, 0.9)
     )
     lens_deg: float | None = key("Angle of view: small is flat, wide is close.", None, within=(10, 75))
-    follow: float | None = key("How far it goes along with the dancer.", None, within=(0, 1))
+    follow: float | None = key("How closely it follows the dancer.", None, within=(0, 1))
 
 
 class HeldConfig(Section):
     """How the joint is marked that a hand holds: it grows and fades as the hand takes and releases it."""
 
-    colour: Colour = key("What the held limb turns to; left out: the style's own.", None)
-    strength: float = key("How clearly; 0: not at all.", 1.0, within=(0, 1))
+    colour: Colour = key("Colour of the held limb; default: the style's own.", None)
+    strength: float = key("Strength of the mark; 0: none.", 1.0, within=(0, 1))
 
 
 class LookConfig(Section):
     """One look of the projection. A colour that is left out is the style's own."""
 
-    name: str = key("What cues and /look call it.", length=(1, 64))
+    name: str = key("Name for cues and /look.", length=(1, 64))
     style: Style = key(
         "plaster: a sculpture in stage light; lines: strands of light; ink: brush and paper; "
         "cloud: thousands of points; veil: glass and its echoes.",
         "plaster",
     )
     figure: Colour = key("The figure: plaster, strands, ink, points.", None)
-    light: Colour = key("The key light; what is fresh and fast.", None)
-    accent: Colour = key("The rim light; what fades away.", None)
+    light: Colour = key("The key light; fresh and fast movement.", None)
+    accent: Colour = key("The rim light; fading movement.", None)
     background: Colour = key("Air and floor, or the paper. Dark ones end in true black at the edges.", None)
     image: PictureFile | None = key(
         "PNG or JPEG file in the bundle, behind the figure; it fills the picture.", None
@@ -95,15 +95,15 @@ class LookConfig(Section):
         None,
     )
     exposure: float = key("Brightness of the whole picture.", 1.0, within=(0.1, 4))
-    fog: float = key("How much haze hangs in the air.", 0.5, within=(0, 1))
-    shadow: float = key("How dark shadows are (plaster), how clear the floor mirrors.", 0.8, within=(0, 1))
+    fog: float = key("Amount of haze in the air.", 0.5, within=(0, 1))
+    shadow: float = key("Darkness of shadows (plaster), clarity of the floor's mirror.", 0.8, within=(0, 1))
     trail_s: float = key("How long movement leaves its trace, in seconds; 0: none.", 1.0, within=(0, 1.2))
-    glow: float = key("How far light spills around what is bright.", 0.6, within=(0, 1))
-    density: float = key("How many strands, echoes or points; the grain of the ink.", 0.6, within=(0.1, 1))
+    glow: float = key("How far light spills around bright areas.", 0.6, within=(0, 1))
+    density: float = key("Number of strands, echoes or points; the grain of the ink.", 0.6, within=(0.1, 1))
     vignette: float = key("How far the picture fades to black towards its edges.", 0.4, within=(0, 1))
     render_scale: float | None = key(
-        "Resolution that the figure is drawn at, in proportion to the picture; smaller is softer and takes "
-        "less of a small computer. null: 1 where the machine has time for it, else 0.7.",
+        "Resolution of the figure, relative to the picture; smaller is softer and takes "
+        "less time on a small computer. null: 1 if the machine has time for it, otherwise 0.7.",
         None,
         within=(0.25, 1),
     )

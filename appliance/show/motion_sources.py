@@ -43,7 +43,7 @@ class GranularConfig(Section):
         description="A phrase whose path is danced, instead of a walk.",
         max_length=64,
     )
-    to: str | None = key("Another phrase, mixed into it.", None, length=(1, 64))
+    to: str | None = key("Another phrase, mixed into this one.", None, length=(1, 64))
     speed: float = _parameter(GRANULAR, "speed")
     spread: float = _parameter(GRANULAR, "spread")
     mix: float = _parameter(GRANULAR, "mix")
@@ -78,7 +78,7 @@ class ImproviseConfig(Section):
 
 
 class _Changes(Section):
-    """What a cue leaves out stays as it is."""
+    """Keys that a cue leaves out stay as they are."""
 
     @model_serializer
     def _given(self) -> dict[str, Any]:
@@ -88,14 +88,14 @@ class _Changes(Section):
 
 
 class VaryChanges(_Changes):
-    """Of the source vary."""
+    """Parameters of the source vary."""
 
     sigma: float | None = _parameter(VARY, "sigma", None)
     seed: int | None = _parameter(VARY, "seed", None)
 
 
 class GranularChanges(_Changes):
-    """Of the source granular."""
+    """Parameters of the source granular."""
 
     speed: float | None = _parameter(GRANULAR, "speed", None)
     spread: float | None = _parameter(GRANULAR, "spread", None)
@@ -108,7 +108,7 @@ class GranularChanges(_Changes):
 
 
 class PathChanges(_Changes):
-    """Of the source path."""
+    """Parameters of the source path."""
 
     points: list[_Share] | None = key(
         "x and y of a point of the map, or of each point of a line over it, as `/motion/path` takes them. "
@@ -129,7 +129,7 @@ class PathChanges(_Changes):
 
 
 class ImproviseChanges(_Changes):
-    """Of the source improvise."""
+    """Parameters of the source improvise."""
 
     temperature: float | None = _parameter(IMPROVISE, "temperature", None)
     seconds: float | None = _parameter(IMPROVISE, "seconds", None)
@@ -139,7 +139,7 @@ class ImproviseChanges(_Changes):
 class MotionChanges(_Changes):
     """Parameters of the sources, reached over the cue's fade."""
 
-    vary: VaryChanges | None = key("Of the source `vary`.", None)
-    granular: GranularChanges | None = key("Of the source `granular`.", None)
-    path: PathChanges | None = key("Of the source `path`.", None)
-    improvise: ImproviseChanges | None = key("Of the source `improvise`.", None)
+    vary: VaryChanges | None = key("Settings of the source `vary`.", None)
+    granular: GranularChanges | None = key("Settings of the source `granular`.", None)
+    path: PathChanges | None = key("Settings of the source `path`.", None)
+    improvise: ImproviseChanges | None = key("Settings of the source `improvise`.", None)

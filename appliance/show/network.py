@@ -76,7 +76,7 @@ def rest_pose(facts: dict[str, str], joints: int) -> np.ndarray:
 
 
 def network_inputs(joints: int, latents: int) -> dict[str, tuple[type[np.generic], tuple[int, ...]]]:
-    """What a puppet gives its network, by name: kind of numbers, and shape; the network takes P of each."""
+    """A puppet's inputs to its network, by name: kind of numbers, and shape; the network takes P of each."""
     return {
         "window": (np.float32, (WINDOW, joints, 4)),
         "mask": (np.bool_, (joints,)),
@@ -92,7 +92,7 @@ def network_inputs(joints: int, latents: int) -> dict[str, tuple[type[np.generic
 
 
 def resting_feed(rest: np.ndarray, latents: int, puppets: int) -> dict[str, np.ndarray]:
-    """Inputs of a network for puppets that stand in the rest pose (M, 4): one free pass, nothing held."""
+    """Inputs of a network for puppets in the rest pose (M, 4): one free pass, nothing held."""
     feed = {
         name: np.zeros((puppets, *shape), dtype)
         for name, (dtype, shape) in network_inputs(len(rest), latents).items()
@@ -127,7 +127,7 @@ def _outputs(joints: int) -> dict[str, _Port]:
 def _fact_complaints(
     facts: dict[str, str], joints: list[str], skeleton_joints: Sequence[str]
 ) -> Iterator[Complaint]:
-    """What is wrong with the metadata."""
+    """The faults of the metadata."""
     if not joints:
         yield "It does not say which joints it moves (bunraku.joints): it is not a puppet.", _EXPORT_AGAIN
     if len(joints) > MOST_JOINTS:

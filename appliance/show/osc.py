@@ -63,23 +63,23 @@ _OF_ONE_DIALECT = ("messages", "prefix", "joints", "ends", "scale", "axes", "rot
 class OscConfig(Section):
     """One receiver of the dancer's joints."""
 
-    host: Ipv4 = key("The receiver's address in numbers.", "127.0.0.1")
+    host: Ipv4 = key("The receiver's IP address.", "127.0.0.1")
     port: int = key("The receiver's UDP port; VMC: usually 39539.", 9004, within=(1, 65535))
     program: Program | None = key(
-        "The AI-Toolbox program that listens: sets port and the keys below as it wants them; a key that "
-        "stands here too counts more. docs/osc.md has the table.",
+        "The AI-Toolbox program that listens: sets port and the keys below to its defaults; a key that "
+        "you also write here takes precedence. docs/osc.md has the table.",
         None,
     )
     puppet: int | None = key(
-        "Of a show with several puppets: the number of the one that it gets, from 0, as if there were no "
-        "other. null: all of them, counted up in the addresses; vmc: the first.",
+        "In a show with several puppets: the number of the one that it gets, from 0, as if there were no "
+        "other. null: all of them, numbered in the addresses; vmc: the first.",
         None,
         within=(0, MOST_PUPPETS - 1),
     )
     dialect: Dialect = key("The messages that it understands; docs/osc.md shows them.", "ai-toolbox")
     frame_message: bool = key("Send /bunraku/frame (tick, time, sequence, late) before the joints.", False)
     messages: list[Message] = key(
-        "ai-toolbox: which lists it gets, in this order.",
+        "ai-toolbox: the lists it gets, in this order.",
         ["rot_local", "pos_world", "rot_world"],
         length=(1, 11),
     )
@@ -92,7 +92,7 @@ class OscConfig(Section):
         "ai-toolbox: the joints of each list, in this order; [] for all of the show.", [], length=(0, 256)
     )
     ends: bool = key(
-        "ai-toolbox: count the ends of bones as joints, each behind its joint, as BVH loaders do.", False
+        "ai-toolbox: count the ends of bones as joints, each after its joint, as BVH loaders do.", False
     )
     scale: float = key(
         "ai-toolbox: the receiver's units in a metre; 100: centimetres.", 1.0, within=(0.001, 1000)

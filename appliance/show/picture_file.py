@@ -1,4 +1,4 @@
-"""What pictures share: colours as they are written in YAML, and image files of a bundle."""
+"""Shared by pictures: colours as they are written in YAML, and image files of a bundle."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SIGNATURES = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
 def _given(value: object) -> object:
     if value is None or isinstance(value, int):
         raise refusal(
-            "This colour is empty: after a # YAML reads a comment, and digits alone are a number.",
+            "This colour is empty: after a # YAML reads a comment, and only digits make a number.",
             "Write it in quotes, for instance '#f2e6d8', or leave the key out for the look's own colour.",
         )
     return value

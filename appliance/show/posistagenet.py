@@ -20,26 +20,25 @@ class PosiStageNetConfig(Section):
     """Positions of joints for media servers and followspots, as PosiStageNet trackers."""
 
     host: Ipv4 = key(
-        "Where to: the protocol's multicast group, or the address of one receiver.", "236.10.10.10"
+        "Destination: the protocol's multicast group, or the address of one receiver.", "236.10.10.10"
     )
     port: int = key("UDP port.", 56565, within=(1, 65535))
     interface: Ipv4 = key(
-        "Address of the box's own network interface that multicast leaves by; with 127.0.0.1 "
-        "nothing leaves the machine.",
+        "Address of the box's network interface for multicast; with 127.0.0.1 nothing leaves the machine.",
         "127.0.0.1",
     )
-    system_name: str = key("What receivers call the box.", "Bunraku", length=(1, 64))
+    system_name: str = key("Name of the box for receivers.", "Bunraku", length=(1, 64))
     joints: list[str] = key(
         "Joints that become trackers, in this order; [] for all of the show.", [], length=(0, 256)
     )
     first_tracker: int = key(
         "Number of the first joint's tracker; the next ones follow, then those of the next puppet. Two "
-        "boxes in one network need numbers of their own. Some consoles count trackers from 1.",
+        "boxes in one network need different numbers. Some consoles count trackers from 1.",
         0,
         within=(0, LAST_TRACKER),
     )
-    every: int = key("Send each n-th frame: 1 is 50 a second, 2 is 25 a second.", 1, within=(1, 50))
-    speed: bool = key("Send speeds (metres a second) beside the positions.", False)
+    every: int = key("Send every n-th frame: 1 is 50 a second, 2 is 25 a second.", 1, within=(1, 50))
+    speed: bool = key("Also send speeds (metres a second).", False)
     axes: Axes = key(
         "Which of the box's axes (right-handed, Y up) become the receiver's x, y and z; "
         "[x, -z, y] for a receiver with Z up.",
@@ -58,7 +57,7 @@ class PosiStageNetConfig(Section):
 def unknown_joints(
     named: Sequence[str], joints: Sequence[str], here: Location, file: YamlFile
 ) -> list[Problem]:
-    """Of the joints that an output names under `joints`, those that a skeleton with `joints` lacks."""
+    """The joints that an output names under `joints` and a skeleton with `joints` lacks."""
     problems = []
     for number, joint in enumerate(named):
         if joint not in joints:
@@ -70,7 +69,9 @@ def unknown_joints(
 def misfits(
     outputs: Sequence[PosiStageNetConfig], joints: Sequence[str], puppets: int, file: YamlFile
 ) -> list[Problem]:
-    """What does not fit this number of puppets with these joints. file: the box file with the outputs."""
+    """Faults of the outputs for this number of puppets with these joints. file: the box file with the
+    outputs.
+    """
     problems: list[Problem] = []
     for place, output in enumerate(outputs):
         here: Location = ("outputs", "posistagenet", place)

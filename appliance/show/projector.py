@@ -17,11 +17,11 @@ _Point = Annotated[tuple[_Part, _Part], Field(strict=False)]
 
 
 class EdgeBlendConfig(Section):
-    """Two projectors side by side, each with a box file of its own; their pictures blend into one."""
+    """Two projectors side by side, each with its own box file; their pictures blend into one."""
 
-    part: Literal["left", "right"] = key("Which part of the wide picture this projector shows.")
+    part: Literal["left", "right"] = key("The part of the wide picture that this projector shows.")
     overlap: float = key(
-        "How much of this projector's width the other one lights as well.", 0.15, within=(0.01, 0.5)
+        "Fraction of this projector's width that the other one also lights.", 0.15, within=(0.01, 0.5)
     )
     gamma: float = key(
         "The projector's gamma: with the right one the overlap is neither brighter nor darker.",
@@ -31,14 +31,14 @@ class EdgeBlendConfig(Section):
 
 
 class MaskConfig(Section):
-    """What of the projector's light stays dark: a door, the edge of the set. It stays when corners move."""
+    """Dark parts of the projector's light: a door, the edge of the set. They stay when corners move."""
 
     points: list[_Point] = key(
-        "Its corners, in order, in shares of the display's width and height from the top left.",
+        "Its corners, in order, in fractions of the display's width and height from the top left.",
         length=(3, 64),
     )
-    dark: Literal["inside", "outside"] = key("outside: light falls inside of it alone.", "inside")
-    soft: float = key("Width of its soft edge, as a share of the display's height.", 0.01, within=(0, 0.2))
+    dark: Literal["inside", "outside"] = key("outside: light falls only inside it.", "inside")
+    soft: float = key("Width of its soft edge, as a fraction of the display's height.", 0.01, within=(0, 0.2))
 
 
 class ProjectorConfig(Section):
@@ -48,22 +48,22 @@ class ProjectorConfig(Section):
     fullscreen: bool = key("Fill the display; false: a window, for rehearsals on a desktop.", True)
     size: Size = key("Width and height of the window, pixels.", (1280, 720))
     picture: Size | None = key(
-        "Width and height in which the scene is drawn, pixels; null: the display's own, and "
+        "Width and height of the drawn scene, pixels; null: the display's own, and "
         "smaller while the machine does not keep up with it.",
         None,
     )
-    vsync: bool = key("Show each picture when the display asks for one: without tearing.", True)
+    vsync: bool = key("Synchronise pictures with the display: no tearing.", True)
     rate: float | None = key(
-        "Pictures a second where the display sets no pace; null: as often as it shows one.",
+        "Pictures a second if the display sets no pace; null: the display's rate.",
         None,
         within=(1, 240),
     )
-    mirror: bool = key("Left and right exchanged, for rear projection.", False)
+    mirror: bool = key("Left and right swapped, for rear projection.", False)
     upside_down: bool = key("Turned by 180 degrees, for a projector that hangs from the ceiling.", False)
     brightness: float = key("Factor on the brightness of the picture.", 1.0, within=(0.0, 2.0))
     gamma: float = key("Above 1 lifts the dark tones, below 1 deepens them.", 1.0, within=(0.3, 3.0))
     edge_blend: EdgeBlendConfig | None = key(
-        str(EdgeBlendConfig.__doc__) + " null: one projector alone.", None
+        str(EdgeBlendConfig.__doc__) + " null: only one projector.", None
     )
-    masks: list[MaskConfig] = key("What stays dark whatever the picture shows.", [], length=(0, 16))
+    masks: list[MaskConfig] = key("Areas that stay dark whatever the picture shows.", [], length=(0, 16))
     stream: StreamConfig | None = key(str(StreamConfig.__doc__) + " null: none.", None)

@@ -17,27 +17,27 @@ from appliance.show.section import Section, key, refuse_repeats
 from appliance.show.yaml_file import YamlFile
 
 MAX_HANDS = 8
-LED_BY_THE_SHOW = ("phrase", "start_s", "hands", "iterations")  # of the first puppet: not its to say
+LED_BY_THE_SHOW = ("phrase", "start_s", "hands", "iterations")  # keys that the first puppet must not have
 _Times = Annotated[int, Field(ge=0, le=MOST_ITERATIONS)]
 
 
 class PuppetConfig(Section):
     """A figure on the stage. The first dances what `motion`, `hands` and `dancer` say; cues lead it."""
 
-    name: str = key("What lights and receivers call it.", length=(1, 32))
+    name: str = key("Name for lights and receivers.", length=(1, 32))
     x: float = key(
-        "Where its phrase begins on the stage, metres to the right as the audience sees it.",
+        "Start of its phrase on the stage, metres to the right as the audience sees it.",
         0.0,
         within=(-20, 20),
     )
     z: float = key("The same, metres towards the audience.", 0.0, within=(-20, 20))
     turned: float = key(
-        "Degrees by which its dance is turned to the dancer's left; 180 shows its back.",
+        "Rotation of its dance to the dancer's left, degrees; 180 shows its back.",
         0.0,
         within=(-360, 360),
     )
     phrase: str | None = key(
-        "Not for the first puppet: what it starts from, `main`, a name under motion.phrases, `live`, `vary`, "
+        "Not for the first puppet: its motion source, `main`, a name under motion.phrases, `live`, `vary`, "
         "`granular`, `path`, `improvise` or a name under motion.kept. null: the phrase that the show starts "
         "with.",
         None,
@@ -100,8 +100,8 @@ def _light_problems(
 def puppet_problems(
     puppets: Sequence[PuppetConfig], motion: MotionConfig, mappings: Sequence[MappingConfig], file: YamlFile
 ) -> Iterator[Problem]:
-    """What the first puppet has that is not its to say, phrases of the others that the show lacks, and
-    puppets that it lacks in rules of lights.
+    """Settings that the first puppet must not have, phrases of the others that the show lacks, and puppets
+    that it lacks in rules of lights.
     """
     yield from _light_problems(puppets, mappings, file)
     for place, puppet in enumerate(puppets):

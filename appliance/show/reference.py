@@ -107,7 +107,7 @@ def reference() -> str:
         _SHOW_EXAMPLE,
         *_tables(ShowConfig, ""),
         "## box.yaml\n",
-        "Without a box file everything is at its default: all on this machine alone.\n",
+        "Without a box file everything is at its default: only this machine.\n",
         _BOX_EXAMPLE,
         *_tables(BoxConfig, ""),
     ]

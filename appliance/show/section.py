@@ -1,4 +1,4 @@
-"""What all sections of a configuration file share: strict types, no unknown keys, kinds of value."""
+"""Shared by all sections of a configuration file: strict types, no unknown keys, kinds of value."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def _inside_the_bundle(name: str, info: ValidationInfo) -> str:
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\\" in name:
         raise refusal(
-            f"'{name}' is not inside the show's folder.", "Put the file there and write its name alone."
+            f"'{name}' is not inside the show's folder.", "Put the file there and write only its name."
         )
     directory = (info.context or {}).get("directory")
     cure = "Check the name, or copy the whole bundle again."

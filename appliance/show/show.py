@@ -31,7 +31,7 @@ from appliance.show.yaml_file import Location, YamlFile, read_yaml
 class ShowConfig(Section):
     """show.yaml."""
 
-    name: str = key("What the show is called.", length=(1, 100))
+    name: str = key("Name of the show.", length=(1, 100))
     acknowledgement: str = key("Whom to thank for the recordings.", "", length=(0, 4000))
     dancer: DancerConfig = part(DancerConfig)
     motion: MotionConfig = part(MotionConfig)
@@ -56,13 +56,15 @@ class ShowConfig(Section):
         length=(0, 32),
     )
     cards: list[CardConfig] = key(
-        "What cues show over the dance: titles, logos, black. `blank` is there without being named.",
+        "Overlays that cues show over the dance: titles, logos, black. `blank` is there without being named.",
         [],
         length=(0, MOST_CARDS),
     )
     lights: LightsConfig = part(LightsConfig)
     strings: StringsConfig | None = key("Strings that the dance plays (`bunraku sound`); null: none.", None)
-    cues: list[CueConfig] = key("What show control can call up by name, in order.", [], length=(0, 200))
+    cues: list[CueConfig] = key(
+        "Changes that show control can call up by name, in order.", [], length=(0, 200)
+    )
 
     @field_validator("hands")
     @classmethod
@@ -135,7 +137,7 @@ class ShowConfig(Section):
 
     @property
     def hands_at(self) -> Iterator[tuple[Location, HandConfig]]:
-        """All hands of all puppets, and where they stand in the file."""
+        """All hands of all puppets, and their places in the file."""
         for puppet, hands in enumerate(self.hands_of_puppets):
             above: Location = ("puppets", puppet, "hands") if puppet else ("hands",)
             yield from (((*above, place), hand) for place, hand in enumerate(hands))
@@ -160,7 +162,7 @@ class ShowConfig(Section):
 
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
-        """What a cue may name under each key; first what is in force at start."""
+        """The values a cue may name under each key, the one in force at start first."""
         at_start = [hand.springs for hand in self.hands if hand.springs]
         return {
             "phrase": self.motion.sources,

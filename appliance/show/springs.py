@@ -29,9 +29,11 @@ class RegionConfig(Section):
     """
 
     mass: float = key("Kilograms at each joint.", 1.0, within=(0.05, 50))
-    stiffness: float = key("Of the spring along each bone, newtons a metre.", 5000.0, within=(0, 1e6))
+    stiffness: float = key(
+        "Stiffness of the spring along each bone, newtons a metre.", 5000.0, within=(0, 1e6)
+    )
     directional_stiffness: float = key(
-        "Of the spring that draws each bone to where it is to point, newtons a metre: with 1 kg "
+        "Stiffness of the spring that pulls each bone to its direction, newtons a metre: with 1 kg "
         "it swings once a second at 40, three times at 360.",
         60.0,
         within=(0, 1e5),
@@ -47,13 +49,13 @@ class RegionConfig(Section):
 class SpringsConfig(Section):
     """One setting of the springs."""
 
-    name: str = key("What hands, cues and `/springs` call it.", length=(1, 64))
+    name: str = key("Name for hands, cues and `/springs`.", length=(1, 64))
     trunk: RegionConfig = part(RegionConfig)
     head: RegionConfig = part(RegionConfig)
     arms: RegionConfig = part(RegionConfig)
     legs: RegionConfig = part(RegionConfig)
     follow: float = key(
-        "What the springs are drawn to: 0 the phrase, 1 the puppet's last pose, which has answered to them.",
+        "Target of the springs: 0 the phrase, 1 the puppet's last pose, which has answered them.",
         0.25,
         within=(0, 1),
     )
@@ -76,7 +78,7 @@ class SpringsConfig(Section):
     )
     feedback: float = key(
         "How strongly the strings (`strings:`) pull back the bones that draw them: 0 not at all, 1 as firmly "
-        "as a spring at which the mass alone swings 2.5 times a second.",
+        "as a spring at which the free mass swings 2.5 times a second.",
         0.0,
         within=(0, 1),
     )

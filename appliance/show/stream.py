@@ -13,7 +13,7 @@ from appliance.show.section import Section, key, refusal
 class StreamConfig(Section):
     """The projector's picture as MJPEG over HTTP, for media servers, mixers and browsers."""
 
-    host: Host = key("Address to listen on; '::': on every network, for those under `viewers`.", "127.0.0.1")
+    host: Host = key("Address to listen on; '::': all networks; only `viewers` are served.", "127.0.0.1")
     port: int = key("TCP port.", 8090, within=(1, 65535))
     viewers: list[Viewers] = key(
         "Devices that may fetch it: addresses or networks. This machine always may.", [], length=(0, 32)
@@ -30,7 +30,7 @@ class StreamConfig(Section):
         length=(1, 64),
     )
     ndi_alpha: bool = key("NDI pictures have alpha, as much as a pixel shines.", False)
-    quality: int = key("Of the JPEGs: more is finer and larger.", 85, within=(10, 100))
+    quality: int = key("Quality of the JPEGs: more is finer and larger.", 85, within=(10, 100))
 
     @model_validator(mode="after")
     def _open_to_a_viewer(self) -> StreamConfig:

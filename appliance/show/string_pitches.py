@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from appliance.pose.skeleton import Skeleton
 
-_SHORTEST = 0.15  # of the longest bone: shorter ones, like fingers, have no string
+_SHORTEST = 0.15  # fraction of the longest bone: shorter ones, like fingers, have no string
 _MOST = 24  # strings
 _LN_1000 = 6.9078  # 60 dB
 _SEMITONES = np.array([0, 2, 4, 7, 9])  # pentatonic: any of them sound together

@@ -37,7 +37,7 @@ class VenueKey(NamedTuple):
 
 
 def venue_keys(box: BoxConfig) -> list[VenueKey]:
-    """Those that this box has; of its outputs the ones that stand in its file."""
+    """The receivers of this box; of its outputs the ones in its file."""
     found = [one for location in KEYS if (one := _key(box, location)) is not None]
     for name in _LISTS:
         for place, entry in enumerate(_written(box, name)):
@@ -47,7 +47,7 @@ def venue_keys(box: BoxConfig) -> list[VenueKey]:
 
 
 def _written(box: BoxConfig, name: Location) -> list[dict[str, Any]]:
-    """The entries of a list as they stand in the file; none where it has no such list."""
+    """The entries of a list as written in the file; none where it has no such list."""
     values: Any = box.file.values
     for step in name:
         values = values.get(step) if isinstance(values, dict) else None

@@ -17,7 +17,7 @@ Pose = Literal["hanging", "standing"]
 
 
 class VenuePlaceConfig(Section):
-    """What is different about one fixture in this venue; what is left out stays as in the show."""
+    """Changes to one fixture in this venue; keys left out stay as in the show."""
 
     fixture: str = key("Its name in the show.", length=(1, None))
     universe: Universe | None = key("Its universe here.", None)

@@ -29,8 +29,9 @@ def unwired(show: Show, box: BoxConfig) -> list[str]:
 
 
 def misplaced(show: Show, box: BoxConfig) -> list[Problem]:
-    """What is wrong with the box file's changes to the rig: fixtures that the show does not have, channels
-    that are used twice or lie beyond the end of a universe."""
+    """Faults of the box file's changes to the rig: fixtures that the show does not have, channels that are
+    used twice or are beyond the end of a universe.
+    """
     names = [fixture.name for fixture in show.config.lights.fixtures]
     changed = [place.fixture for place in box.lights.places]
 

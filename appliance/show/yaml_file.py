@@ -41,7 +41,7 @@ class YamlFile:
         return 1
 
     def problem(self, location: Location, message: str, cure: str) -> Problem:
-        """What is wrong with the value there."""
+        """The fault of the value there."""
         return Problem(self.path, self.line(location), message, cure)
 
 
@@ -89,13 +89,13 @@ def _not_yaml(path: Path, text: str, error: yaml.MarkedYAMLError) -> ConfigError
     line = mark.line + 1 if mark else 1
     why = error.problem or "it breaks off"
     if "'\\t'" in why:
-        return _refused(path, line, "a tab stands on this line", "Put spaces in its place.")
+        return _refused(path, line, "this line has a tab", "Put spaces in its place.")
     first = start.line + 1 if start else line
     above = max(first - 1, 1)  # a line that breaks off is noticed on the next one
     for number, written in enumerate(text.splitlines()[above - 1 : line], start=above):
         if _BARE_COLOUR.search(written):
             cure = "Write colours in quotes, like '#f2e6d8'."
-            return _refused(path, number, "what stands behind a bare # is taken for a comment", cure)
+            return _refused(path, number, "text after a bare # is a comment", cure)
     if error.context in ("while parsing a flow mapping", "while parsing a flow sequence"):
         bracket = "{" if "mapping" in error.context else "["
         cure = "Close it where it ends, and put commas between its parts and a colon behind each key."
@@ -136,7 +136,7 @@ class _Plain:
         values: dict[Hashable, Any] = {}
         for key_node, value_node in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
-                self._problem(key_node, "A key is a single word.", "Put it on a line of its own.")
+                self._problem(key_node, "A key is a single word.", "Put it on a separate line.")
                 continue
             key: str = key_node.value
             if key in values:
