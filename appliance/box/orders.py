@@ -20,12 +20,12 @@ from appliance.box.runtime_folder import hold, is_lost
 from appliance.levers.addresses import Receiver
 
 Place = Receiver
-Key = tuple[int, bytes]  # of a sensor: its device id and its secret
+Key = tuple[int, bytes]  # a sensor's device id and its secret
 Delivery = Literal["sent", "full", "absent"]  # full: the receiver's socket is; absent: there is no receiver
 ANSWERS = "control"
 _LARGEST = 65536
 _FOLDER = os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC
-# What parsing raises for a datagram that no process of this box sent.
+# Exceptions that parsing a foreign datagram may raise.
 _NONSENSE = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
 
 
@@ -57,7 +57,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of an order: whether it was done, and a sentence for people."""
+    """The answer to an order: whether it was done, and a sentence for people."""
 
     ask: int
     done: bool
@@ -135,7 +135,7 @@ class _Mailbox:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         try:
             with contextlib.suppress(FileNotFoundError):
-                os.unlink(self._name, dir_fd=self._folder)  # of a process that was killed
+                os.unlink(self._name, dir_fd=self._folder)  # left by a process that was killed
             self._bind(self._socket)
         except OSError:
             self._socket.close()

@@ -18,7 +18,7 @@ from appliance.levers.table import FEEDBACK, MADE_NUMBERS, PATH_POINTS, SPRINGS,
 from appliance.show_control.status_messages import LISTED, Status, hands_of, names_of, status
 
 _NO_BATTERY = 255
-_KNOBS = (STIFFNESS, STORM, FEEDBACK)  # of the springs
+_KNOBS = (STIFFNESS, STORM, FEEDBACK)  # knobs of the springs
 _SAME_STAGE_S = 5.0  # a stage that seems to have started this much later is another one
 _FIELDS = len(RosterLine._fields)
 
@@ -81,8 +81,8 @@ class BoxView:
         }
 
     def _declared(self) -> dict[str, Any]:
-        """What was declared for the show of now. motion: of what is made ahead, by `SOURCE NAME`, the value
-        and its fade. springs: of springs and strings; a knob that nobody turned is left out.
+        """The levers as they are declared for the present show. motion: value and fade by `SOURCE NAME`.
+        springs: setting, strings, and the knobs that were turned.
         """
         state: ShowState = self._show_state.read()
         if state.show != self._stage.facts.get("show"):

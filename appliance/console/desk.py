@@ -11,7 +11,7 @@ from appliance.show_control.command import REPLY, SENSORS_REPLY, STREAMS
 from appliance.show_control.packet import datagram, messages_in, readable
 
 PATIENCE_S = 2.0  # show control answers within 0.6 s, and later while it starts
-_STREAM_S = 0.25  # of a stream's command only the refusal is answered
+_STREAM_S = 0.25  # only the refusal of a stream's command is answered
 _MOST_WAITING = 512
 _AT_ONCE = 32
 NO_COMMANDS = "This box takes no commands: its box file says `control: null`."
@@ -25,7 +25,7 @@ class NoAnswerError(Exception):
 
 
 class Desk:
-    """Show control at an address; None: this box has none. Each command has a socket of its own."""
+    """Show control at an address; None: this box has none. Each command has its socket."""
 
     def __init__(self, control: tuple[str, int] | None) -> None:
         self._control = control
@@ -92,7 +92,7 @@ class Desk:
 
 
 class Stream:
-    """Commands that go out one after the other; of each the refusal alone comes back."""
+    """Commands that go out one after the other; only refusals come back."""
 
     def __init__(self, transport: asyncio.DatagramTransport, waiting: asyncio.Queue[Answer]) -> None:
         self._transport, self._waiting = transport, waiting

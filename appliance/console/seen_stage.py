@@ -1,4 +1,4 @@
-"""The stage as the page answers about it: what show control sees of it too, read without numpy."""
+"""The stage as the page sees it: the same as show control sees, read without numpy."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class SeenStage:
 
     @property
     def facts(self) -> SeenFacts | None:
-        """Of the newest stage; None before the first."""
+        """The newest stage's; None before the first."""
         return self._view.seen_facts
 
     def state(self, now: float) -> StageState:
@@ -31,7 +31,7 @@ class SeenStage:
         return "hung" if frames == "stale" and self._view.lives else "absent"
 
     def health(self) -> dict[str, Any]:
-        """What the stage last said about itself; empty before it did."""
+        """The stage's last report; empty before the first."""
         return self._view.health()
 
     def kept(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What the page sees of the stage: its newest frame as bytes, and what stays the same while it runs."""
+"""The stage's frames for the page: the newest one as bytes, and what stays the same while it runs."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class StageView:
         return self._file.is_there and self._file.writer_lives()
 
     def health(self) -> dict[str, Any]:
-        """What the stage last said about itself; empty before it did."""
+        """The stage's last report; empty before the first."""
         found = self._file.rings[HEALTH].newest() if len(self._file.rings) > HEALTH else None
         try:
             said = plain_json(found[1]) if found else {}

@@ -158,7 +158,12 @@ PROJECTOR = (
     ),
     _once("projector", "corners/reset", "/projector/corners/reset", "the whole picture again"),
     _once(
-        *("projector", "brightness", "/projector/brightness", "of this projector; 1: as it is drawn"),
+        *(
+            "projector",
+            "brightness",
+            "/projector/brightness",
+            "brightness of this projector; 1: as it is drawn",
+        ),
         Number("brightness", 0, 2),
     ),
     _once("projector", "mirror", "/projector/mirror", "rear projection", _ON),

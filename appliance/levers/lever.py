@@ -17,7 +17,7 @@ AT_ONCE: float | None = None
 
 
 class Need(NamedTuple):
-    """What a show must have for a lever to move. among: an attribute of Facts.
+    """A condition on the show: without it the lever moves nothing. among: an attribute of Facts.
 
     what: a name that has to be among them, and what it is called; empty: one of any name. cure: the sentence
     where there is none.
@@ -32,10 +32,10 @@ class Need(NamedTuple):
 class Lever(Generic[T]):
     """A value that stays until it is set again.
 
-    name: in the show state and in orders; a blank ends the name of a family, of which each member has a
-    value of its own (`hand lShldr`). default: before it is set. does: for people.
+    name: in the show state and in orders; a blank ends the name of a family, whose members have a value each
+    (`hand lShldr`). default: before it is set. does: for people.
     address: OSC; empty: no address sets it directly. fade_s: how long a change takes where a command does not
-    say; AT_ONCE: it takes no fade. is_faded_by_osc: whether the address takes one, or cues alone do.
+    say; AT_ONCE: it takes no fade. is_faded_by_osc: whether the address takes one, or only cues do.
     cue: the key in a cue; empty: none. in_cue: its sentence in docs/configuration.md.
     follower: the process that has to follow before a command is answered; empty: all read it as they draw.
     names: attribute of Facts with the names that the show has, and what one is called. listed: the last word
@@ -74,7 +74,7 @@ class Lever(Generic[T]):
 
     @property
     def form(self) -> Form:
-        """What its address takes."""
+        """The form of its address."""
         kind, has_fade = self.kind, self.fade_s is not AT_ONCE and self.is_faded_by_osc
         if has_fade:
             return Form(kind.text, (*kind.numbers, FADE), 1)

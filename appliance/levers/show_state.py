@@ -25,7 +25,7 @@ class Change(NamedTuple, Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class ShowState:
-    """What show control has declared; times are monotonic seconds of this machine, names are the show's.
+    """All that show control has declared; times are monotonic seconds of this machine, names are the show's.
 
     `state[LOOK]` is the fade of a lever, which runs by itself: readers pass the time at which they draw.
     settings: the levers that were set, the newest last. generation: the newest that declared something for

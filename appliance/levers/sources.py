@@ -10,7 +10,7 @@ VARY, GRANULAR, PATH, IMPROVISE = "vary", "granular", "path", "improvise"  # mad
 MADE = (VARY, GRANULAR, PATH, IMPROVISE)
 NO_CARD = "none"  # takes a card off
 SEEDS = 2**31  # seeds of the noise in the answer are 0 to SEEDS - 1: an OSC integer holds them
-KEPT = "kept"  # of a recipe: a motion that was kept, under a name of its own
+KEPT = "kept"  # source of a recipe: a motion that was kept under a name
 
 
 class Parameter(NamedTuple):
@@ -59,5 +59,5 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "seed": _SEED,
     },
 }
-MOST_POINTS = 16  # of a stroke over the map
+MOST_POINTS = 16  # most points in a stroke over the map
 POINTS = "points"  # the part of the show state that holds them

@@ -40,13 +40,13 @@ from appliance.show_control.trackers import TRACKERS, Trackers
 if TYPE_CHECKING:
     from appliance.outputs.shared_frame import Facts
 
-# What a box sends is never answered: two boxes would go on answering each other for ever.
+# Messages of a box are never answered: two boxes would go on answering each other for ever.
 _ANSWERS = frozenset((*ANSWERS, REPLY, SENSORS_REPLY, PONG, END, SENSOR, ROSTER_END))
 _LISTED = tuple(f"{question.address}/" for question in QUESTIONS if question.address != "/motion")
 _QUESTIONS = frozenset(question.address for question in QUESTIONS)
 _ONCE_A_BUNDLE = frozenset((*_QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
-# Of the stage's cue; its checkpoint has the rest.
+# Adopted from the stage's cue; its checkpoint has the rest.
 _ADOPTED: tuple[Lever[Any], ...] = (CUE, LOOK, CARD, CAMERA, LIGHTS, SPRINGS)
 
 
@@ -117,7 +117,7 @@ class CommandHandler:
         self._observer.own.concern(COMMAND_FAILED.name, filter(None, [about]))
 
     def follow_stage(self, now: float) -> None:
-        """What has to be done without any command; call it often."""
+        """Does everything that is due without a command; call it often."""
         self._observer.state(now)
         facts = self._observer.facts
         if facts is not None and self._observer.generation != self._generation:
@@ -130,7 +130,7 @@ class CommandHandler:
         self.acknowledgements.send_due(now)
 
     def told(self, strangers: int, now: float) -> dict[str, Any]:
-        """What only this process knows of the box's status."""
+        """The part of the status that only this process knows."""
         return {"refused": self.refused, "strangers": strangers, "live": self._live.came(now)}
 
     def status(self, strangers: int, now: float) -> Status:

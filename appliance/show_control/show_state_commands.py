@@ -1,4 +1,4 @@
-"""What each command declares: functions from one show state to the next."""
+"""Declarations: functions from one show state to the next, for each command that persists."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
 
 
 def in_cue(cue: Mapping[str, Any], facts: Facts) -> Iterator[Change[Any]]:
-    """What a cue changes."""
+    """The changes of a cue."""
     fade_s = float(cue["fade_s"])
     yield Change(CUE, str(cue["name"]))
     for lever in LEVERS:
@@ -185,7 +185,7 @@ _LET_GO = {
 
 
 def let_go(command: Command) -> str:
-    """What to answer when a tablet's button, which sent 1 when it was pressed, sends 0; else empty."""
+    """The answer to a tablet's button that was let go, which sends 0; else empty."""
     return _LET_GO.get(command.address, "") if command.values == (0.0,) else ""
 
 

@@ -18,7 +18,7 @@ LISTED = {"/cues": "/cues/cue", "/phrases": "/phrases/phrase"} | {
     question: f"{question}/{lever.listed}" for question, lever in LISTS.items()
 }
 UNKNOWN = -1.0
-_LONGEST_WORDS = 1000  # of a sentence in an answer
+_LONGEST_WORDS = 1000  # longest sentence in an answer
 
 
 class Status(NamedTuple):
@@ -53,7 +53,7 @@ class Status(NamedTuple):
 
 
 class SeenFacts(Protocol):
-    """What does not change while a stage runs, as far as answers tell it; Facts is one."""
+    """The facts of a stage that answers need; Facts is one."""
 
     @property
     def show_name(self) -> str: ...
@@ -78,7 +78,7 @@ class SeenFacts(Protocol):
 
 
 class Seen(Protocol):
-    """The stage as show control and the page see it, each with a reader of its own."""
+    """The stage as show control and the page see it, each with its reader."""
 
     @property
     def facts(self) -> SeenFacts | None: ...
@@ -196,7 +196,7 @@ def _fallbacks(observer: Seen, now: float) -> Iterator[Message]:
 
 
 def _made(status: Status, observer: Seen) -> Iterator[Message]:
-    """What was made ahead and is danced, number by number; nothing while a phrase or a live dancer is."""
+    """The recipe of the motion that is danced, number by number; nothing while it is a phrase or live."""
     recipe = plain_json(str(observer.health().get("made") or "{}"))
     recipe = recipe.get("of", recipe)
     for name, value in recipe.items() if status.phrase else ():

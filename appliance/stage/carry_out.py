@@ -150,7 +150,7 @@ def _excerpt(order: Order, parts: StageParts, iterations: Iterations) -> str:
 
 
 def _note(order: Order, parts: StageParts, iterations: Iterations) -> str:
-    return ""  # a cue's parts are orders of their own; the journal notes its name
+    return ""  # each part of a cue is an order; the journal notes its name
 
 
 def _enable(order: Order, parts: StageParts, iterations: Iterations) -> str:
