@@ -147,7 +147,7 @@ def _told(one: Problem) -> dict[str, Any]:
 
 
 def _before(place: Path) -> BoxConfig:
-    """What counts until now; a file that is broken has nothing to lose."""
+    """The settings in force until now; a broken file has nothing to lose."""
     try:
         return load_box(place if place.exists() else None)
     except ConfigError:
@@ -155,7 +155,7 @@ def _before(place: Path) -> BoxConfig:
 
 
 def _questions(before: BoxConfig, after: BoxConfig) -> Iterator[str]:
-    """What a change takes from people at the venue, or gives to everybody."""
+    """Access that a change takes from people at the venue, or gives to everybody."""
     if before.control is not None and after.control is None:
         yield "control: null takes all commands away, PANIC and BLACKOUT of this page too."
     if before.console is not None and after.console is None:

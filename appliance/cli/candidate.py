@@ -1,4 +1,4 @@
-"""Can this show dance on this box? Checked in a process of its own: a broken network may crash it."""
+"""Can this show dance on this box? Checked in a separate process: a broken network may crash it."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def _sensors(box: BoxConfig) -> Iterator[str]:
 
 
 def _commands(box: BoxConfig) -> Iterator[str]:
-    """From the listed senders; with none listed, from this machine alone, which needs no rule."""
+    """From the listed senders; with none listed, only from this machine, which needs no rule."""
     control = box.control
     if control is None or _is_loopback(control.host):
         return

@@ -1,4 +1,4 @@
-"""A first run of a show's network in a process of its own: it may hang, crash, or take all memory."""
+"""A first run of a show's network in a separate process: it may hang, crash, or take all memory."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FOR_PEOPLE = (BvhError, ConfigError, PuppetError, RuntimeFolderError, StageErro
 
 
 def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> str:
-    """What `do` prints. Raises StageError with its error for the user, or with why it was ended."""
+    """The output of `do`. Raises StageError with its error for the user, or with why it was ended."""
 
     def told() -> bytes:
         limit_memory()
@@ -74,7 +74,7 @@ def prove_network(show: Show) -> str:
             puppet.hold(held, targets, weights, *config.iterations_of_puppets[number])
         try:
             network.dance()
-        except Exception as error:  # onnxruntime has a class of its own for every way to fail
+        except Exception as error:  # onnxruntime has a separate class for every kind of failure
             raise StageError(
                 f"{show.network}: the network fails when it runs ({str(error)[:200]}). Nothing is danced. "
                 "Export the show again, or copy the bundle again."

@@ -157,7 +157,7 @@ def _scratch(opened: ExitStack) -> Path:
 
 
 def _rehearsal_box(stage: Stage, scratch: Path) -> Path:
-    """The box file of a rehearsal's keeper: the rehearsal's runtime folder alone, nothing of the venue."""
+    """The box file of a rehearsal's keeper: only the rehearsal's runtime folder, nothing of the venue."""
     path = scratch / "keeper.yaml"
     path.write_text(f"runtime: {json.dumps(str(stage.sharing.noted))}\n")
     return path

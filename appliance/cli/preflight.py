@@ -62,7 +62,7 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
 
 
 def _found(options: Options, places: Places) -> Outcome:
-    """What is chosen; a stick is read in a process that can be killed."""
+    """The choice; a stick is read in a process that can be killed."""
     boot = options.boot or next((one for one in BOOTS if _is_folder(one)), BOOTS[-1])
 
     def chosen() -> Outcome:

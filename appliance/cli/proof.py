@@ -95,7 +95,9 @@ def _doctor(proving: Proving, box: Path | None) -> dict[str, Any]:
 def _run(
     proving: Proving, words: tuple[str, ...], tell: Callable[[], None] = lambda: None, at_rest: bool = False
 ) -> str:
-    """What a command of ours says; ended when it is no longer wanted. at_rest: or when the show goes on."""
+    """The output of one of our commands; ended when it is no longer wanted. at_rest: or when the show goes
+    on.
+    """
     with tempfile.TemporaryFile() as out, stop_signals() as is_ended:
         child = start_child((*BUNRAKU, *words), stdout=out, stderr=subprocess.STDOUT)
         try:
@@ -157,7 +159,7 @@ def software() -> dict[str, str]:
 
 
 def checksum(show: Path) -> str:
-    """Of names and contents of all files of a show."""
+    """Hash of names and contents of all files of a show."""
     whole = hashlib.sha256()
     for name in bundle_files(show):
         with (show / name).open("rb") as stream:

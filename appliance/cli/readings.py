@@ -1,4 +1,4 @@
-"""What became of the sensors' packets, in a line at the end of a run."""
+"""The fate of the sensors' packets, in a line at the end of a run."""
 
 from __future__ import annotations
 

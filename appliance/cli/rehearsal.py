@@ -57,7 +57,7 @@ def pictured_from(dance: RecordedDance) -> float:
 
 
 def _render(journal: Path, out: Path, show: Path, look: str, start_s: float) -> str | None:
-    """What went wrong, or None. Runs in its own process, which a broken graphics driver may crash."""
+    """The error, or None. Runs in its own process, which a broken graphics driver may crash."""
     command = [
         *(sys.executable, "-m", "appliance.cli", "filmstrip", str(journal), "--out", str(out)),
         *("--start", str(start_s), "--seconds", str(PICTURED_S), "--look", look, "--show", str(show)),

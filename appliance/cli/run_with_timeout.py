@@ -47,7 +47,7 @@ def run_with_timeout(seconds: float, do: Callable[[], bytes]) -> bytes:
 
 
 def limit_memory() -> None:
-    """Limit memory so that running out ends this process alone, not the waiting one, nor the dance."""
+    """Limit memory so that running out ends only this process, not the waiting one, nor the dance."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     most = max(_LEAST_MEMORY_BYTES, int(_OF_ALL_MEMORY * memory))
     with contextlib.suppress(OSError, ValueError):  # a lower limit holds already

@@ -1,1 +1,1 @@
-"""The page for technicians: a process of its own, which browsers at the venue open."""
+"""The page for technicians: a separate process, which browsers at the venue open."""

@@ -1,4 +1,4 @@
-"""`python -m appliance.console SETTINGS`: the page alone, and only what it needs is loaded."""
+"""`python -m appliance.console SETTINGS`: only the page, and only what it needs is loaded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the box is: its shows, release and addresses, read by a process of its own when a browser asks."""
+"""About the box: its shows, release and addresses, read by a separate process when a browser asks."""
 
 from __future__ import annotations
 

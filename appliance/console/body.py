@@ -1,4 +1,4 @@
-"""What a browser sends with a request, bounded."""
+"""The body of a browser's request, bounded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a process of its own answers: for questions that would load too much into the page's process."""
+"""Answers of a separate process: for questions that would load too much into the page's process."""
 
 from __future__ import annotations
 

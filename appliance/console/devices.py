@@ -16,7 +16,7 @@ DIGITS, LONG_DIGITS = 6, 10
 MOST_DEVICES = 32  # the one that was not seen for the longest time gives way
 LONGEST_NAME = 40
 FREE_TRIES, PAUSE_S, LONGEST_PAUSE_S = 5, 60.0, 900.0
-MOST_WRONG = 1000  # of all addresses, in a day: then a million PINs are too few
+MOST_WRONG = 1000  # wrong PINs of all addresses, in a day: then a million PINs are too few
 _MOST_ASKERS = 4096
 _DAY_S = 24 * 3600.0
 _LARGEST = 1 << 16
@@ -24,7 +24,7 @@ _LARGEST = 1 << 16
 
 @dataclass(frozen=True)
 class Device:
-    """A browser that gave the PIN. digest: of the token that it alone keeps; since: Unix seconds."""
+    """A browser that gave the PIN. digest: of the token that only it keeps; since: Unix seconds."""
 
     id: str
     name: str

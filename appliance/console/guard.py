@@ -1,4 +1,4 @@
-"""What stands before each request: from which network, for which name, from which page, by which device."""
+"""Guards each request: from which network, for which name, from which page, by which device."""
 
 from __future__ import annotations
 

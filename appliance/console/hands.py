@@ -20,7 +20,7 @@ from appliance.show_control.command import LONGEST_NAME
 
 SILENT_S = 0.5  # a browser that holds a joint says so 20 times a second
 MOST = 8  # browsers that hold joints
-_MOST_JOINTS = 8  # of all of them
+_MOST_JOINTS = 8  # in all of them
 _TRIES = 3
 _LONGEST_MESSAGE = 512  # bytes
 _LOOK_S = 0.1
@@ -30,7 +30,7 @@ _FAR_M = 100.0
 
 
 class _Said(NamedTuple):
-    """What a browser said of a joint: a command's address and numbers; without an address it lets go."""
+    """A browser's message about a joint: a command's address and numbers; without an address it lets go."""
 
     joint: str
     address: str = ""
@@ -169,7 +169,7 @@ async def _tell_refusals(stream: Stream, browser: web.WebSocketResponse) -> None
 
 
 def _said(text: str) -> _Said | None:
-    """What a browser said; None for anything else."""
+    """The browser's message; None for anything else."""
     try:
         said: Any = json.loads(text)
         joint, turned, at = said["joint"], said.get("turned"), said.get("at")

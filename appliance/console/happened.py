@@ -1,4 +1,4 @@
-"""What happened: the journal, read by a process of its own when a browser asks for it."""
+"""The journal for the page, read by a separate process when a browser asks for it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from aiohttp import web
 from appliance.console.child import answer_of
 from appliance.console.guard import Guard
 
-LONGEST_S = 60.0  # of the dance at once; 2 MB of frames
+LONGEST_S = 60.0  # seconds of the dance at once; 2 MB of frames
 _PATIENCE_S = 60.0  # for reading half an hour
 _FRESH_S = 5.0
 _LARGEST = 64 << 20  # bytes of a download; a minute of the show that comes with the box has 2 MB
@@ -85,7 +85,7 @@ class Happened:
         return ["--run", str(run), "--start", str(start_s), "--seconds", str(seconds)]
 
     async def _read(self, what: str, *options: str) -> bytes:
-        """What a reading process answers. Raises 404 with its own sentence, 503 where it takes too long."""
+        """The answer of a reading process. Raises 404 with its own sentence, 503 where it takes too long."""
         if self._journal is None:
             raise web.HTTPNotFound(
                 text="This box keeps no journal. Write `journal: {folder: journal}` into its box file."

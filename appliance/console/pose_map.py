@@ -1,4 +1,4 @@
-"""The map of the dancer's poses, made by a process of its own when a browser first asks for it."""
+"""The map of the dancer's poses, made by a separate process when a browser first asks for it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _PATIENCE_S = 60.0
 
 
 class PoseMap:
-    """Of the show that the stage dances; made once for each stage."""
+    """The map of the show that the stage dances; made once for each stage."""
 
     def __init__(self, stage: StageView) -> None:
         self._stage = stage

@@ -1,4 +1,4 @@
-"""What was proven on this box: certificates and doctor's reports, whole files, the newest are kept."""
+"""Proofs made on this box: certificates and doctor's reports, whole files, the newest are kept."""
 
 from __future__ import annotations
 

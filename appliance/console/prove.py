@@ -113,7 +113,7 @@ class Prove:
         return web.Response(body=content, content_type="application/json", headers=headers)
 
     def _running(self) -> Wanted | None:
-        """What is being proven; one that died is over."""
+        """The proof in progress; one that died is over."""
         wanted = self._proving.wanted()
         is_over = self._child is not None and self._child.returncode is not None
         if wanted is not None and (is_over or self._proving.is_silent()):

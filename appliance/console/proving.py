@@ -20,7 +20,7 @@ _SILENT_S = 30.0  # a prover that says nothing for this long is gone; it gives a
 
 
 class Wanted(NamedTuple):
-    """What is to be proven, for how long (seconds; of a latency alone)."""
+    """The kind of proof, and for how long (seconds; only for a latency)."""
 
     kind: str
     seconds: int
@@ -43,7 +43,7 @@ class Proving:
         part.replace(self._wanted)
 
     def wanted(self) -> Wanted | None:
-        """What is wanted now; None: nothing, or nothing that can be read."""
+        """The current request; None: nothing, or nothing that can be read."""
         try:
             said = kept_json(self._wanted)
             kind, seconds = said["kind"], said["seconds"]

@@ -49,7 +49,7 @@ class Rehearsed:
         return web.json_response({"words": words.decode().strip()})
 
     async def download(self, request: web.Request) -> web.StreamResponse:
-        """The copy, packed as it lies on a stick."""
+        """The copy, packed in the layout of a stick."""
         self._guard.require_device(request)
         if not (self._folder / ZIP).is_file():
             raise web.HTTPNotFound(text="No cue was kept yet.")

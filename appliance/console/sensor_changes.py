@@ -16,7 +16,7 @@ from appliance.console.guard import Guard
 from appliance.console.stage_view import StageView
 
 _LONGEST = 80  # letters of a name, a network or a password
-_MOST_BYTES = 1 << 16  # of what a command says
+_MOST_BYTES = 1 << 16  # a command's output
 _PATIENCE_S = 180.0  # a wearable on a cable that does not answer is given up before that
 _EMULATED = "These sensors are emulated for a rehearsal: there is nothing to change about them."
 

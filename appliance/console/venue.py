@@ -1,4 +1,4 @@
-"""What a venue changes of its box: keys of the box file, and which of its shows dances."""
+"""Changes that a venue makes to its box: keys of the box file, and which of its shows dances."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SHOW = re.compile(r"[0-9a-f]{0,64}\+[0-9a-f]{0,64}")
 
 
 class Venue:
-    """Each by a process of its own, one at a time.
+    """Each in a separate process, one at a time.
 
     runtime: where the box's processes meet; options: the command's, which name the box; rehearsed: where the
     copy of the show with its new cues lies.

@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 from appliance.show_control.status_messages import Status
 
-_RECENT_S = 60.0  # a late tick stands in the verdict for this long
+_RECENT_S = 60.0  # a late tick stays in the verdict for this long
 
 Level = Literal["well", "held", "warning", "fault"]
 

@@ -33,7 +33,7 @@ class _Watcher:
         self.ready.set()
 
     async def send_on(self, browser: web.WebSocketResponse) -> None:
-        """Send what lies in the slots, for as long as the browser takes it."""
+        """Send the content of the slots, for as long as the browser takes it."""
         with contextlib.suppress(ConnectionError):
             while True:
                 await self.ready.wait()
@@ -47,7 +47,7 @@ class _Watcher:
 
 
 class Watchers:
-    """All of them. A browser that takes nothing costs its slots alone."""
+    """All of them. A browser that reads nothing only costs its slots."""
 
     def __init__(self) -> None:
         self._watchers: dict[_Watcher, web.WebSocketResponse] = {}

@@ -1,1 +1,1 @@
-"""The projector, a process of its own: the shared frame in, pixels out."""
+"""The projector process: the shared frame in, pixels out."""

@@ -23,7 +23,7 @@ _HEADER = (
     "# How the picture lies on the wall; written by bunraku project, corners clockwise from the top left.\n"
 )
 _LARGEST_FILE = 4096
-LAST_WRITE_S = 1.0  # of the 3 s that systemd and `bunraku play` give the projector
+LAST_WRITE_S = 1.0  # seconds, less than the 3 s that systemd and `bunraku play` give the projector
 MOST_BRIGHT = 2.0
 
 

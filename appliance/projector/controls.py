@@ -1,4 +1,4 @@
-"""What a technician controls at the projector: corners, mirror, brightness, grid, information."""
+"""A technician's controls at the projector: corners, mirror, brightness, grid, information."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def homography(corners: Corners) -> NDArray[np.float64]:
 
 
 def complaint(corners: Corners) -> str:
-    """Why no picture can lie on these corners, and what to do; empty when one can."""
+    """Why no picture fits these corners, and what to do; empty when one does."""
     if not np.isfinite(corners).all():
         return "A corner is not a number. The picture stays as it is. Give two numbers from 0 to 1."
     if not all(-FARTHEST <= part <= 1.0 + FARTHEST for point in corners for part in point):

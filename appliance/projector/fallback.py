@@ -16,7 +16,7 @@ PICTURES_SMALLER = Fallback(
 )
 OF_THE_PROJECTOR = (STAGE_UNSEEN, PICTURES_SMALLER)
 
-_SMOOTH = 0.8  # of the display's pictures: fewer look jerky
+_SMOOTH = 0.8  # fraction of the display's pictures: fewer look jerky
 
 
 def about_resolution(share: float, display: tuple[int, int], wanted: float) -> str:

@@ -28,7 +28,9 @@ _CLIP_FROM_DISPLAY = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.
 
 @dataclass(frozen=True)
 class Part:
-    """What of the picture this display shows: where it begins and how wide it is, in shares of its width."""
+    """The part of the picture that this display shows: its start and its width, as fractions of the whole
+    width.
+    """
 
     begin: float
     width: float
@@ -79,7 +81,7 @@ class FinalPass:
         lines: tuple[str, ...] = (),
         detail: Detail = DETAILS[0],
     ) -> Wall:
-        """What a look draws its picture of that size onto, in that detail; `draw` does the rest.
+        """The target for a look's picture of that size and detail; `draw` does the rest.
 
         That is the display itself if nothing is left to do, which saves a small computer from writing the
         picture to memory and reading it back; else a texture.
@@ -159,7 +161,7 @@ class FinalPass:
         return float(controls.alignment.mirror != upside_down), float(upside_down)
 
     def _place(self, display: Size, controls: Controls) -> dict[str, Any]:
-        """Where the picture lies on the display."""
+        """The picture's place on the display."""
         width, height = display
         wall_from_picture = np.diag([width, height, 1.0]) @ homography(controls.alignment.corners)
         return {

@@ -45,7 +45,7 @@ class Figures:
     age_p50_ms: float | None
     age_p99_ms: float | None
     pictures: int
-    dances: int  # of these, how many of the last minute showed a dance
+    dances: int  # among these, how many of the last minute showed a dance
 
     def sentence(self) -> str:
         """One line for the terminal."""

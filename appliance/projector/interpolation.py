@@ -59,7 +59,7 @@ class Interpolation:
         self._follow_latency(now)
 
     def moment(self, now: float) -> Moment | None:
-        """What to draw at `now` (monotonic seconds); None before the first frame."""
+        """The moment to draw at `now` (monotonic seconds); None before the first frame."""
         if not self._seen:
             return None
         time_s = max(now - self.delay_s, self._seen[0].time)

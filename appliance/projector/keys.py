@@ -1,4 +1,4 @@
-"""What each key of the projector's keyboard does; its help goes to the terminal, never onto the wall."""
+"""The keys of the projector's keyboard; their help goes to the terminal, never onto the wall."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ Looks = Mapping[str, LookConfig]
 
 
 class Painter(Protocol):
-    """What draws the looks of one show."""
+    """Draws the looks of one show."""
 
     def draw(
         self,
@@ -259,7 +259,7 @@ class Projector:
 
 @dataclass(frozen=True)
 class ShownShow:
-    """What the projector draws of a show. changed_at: of its images and fonts."""
+    """The projector's view of a show. changed_at: of its images and fonts."""
 
     skeleton: Skeleton
     looks: Looks

@@ -14,7 +14,7 @@ TRAIL_S = 1.2  # what a look may show of the past
 
 @dataclass(slots=True)
 class Moment:
-    """What a look draws; J joints in the skeleton's order, world frame, Y up, metres.
+    """The input of a look; J joints in the skeleton's order, world frame, Y up, metres.
 
     time_s: the dance's time of this picture, monotonic seconds (at least a tick behind the clock);
     positions: (J, 3); world: (J, 4) unit quaternions w, x, y, z, both interpolated to time_s;

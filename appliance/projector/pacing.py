@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 USUAL_RATE = 60.0
 _JUDGED_AFTER = 60  # pictures: a second on most displays
-_TOO_FAST = 0.7  # of the display's period: a display that takes pictures faster sets no pace
-_ON_TIME = 0.25  # of a period that a picture may begin late and still be drawn for its place on the grid
+_TOO_FAST = 0.7  # fraction of the display's period: a display that takes pictures faster sets no pace
+_ON_TIME = 0.25  # fraction of a period that a picture may begin late and keep its place on the grid
 _FOLLOW = 0.1  # how far one measured swap moves the display's grid
 
 

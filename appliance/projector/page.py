@@ -1,4 +1,4 @@
-"""What is written over the picture for technicians: figures, corner numbers, which projector this is."""
+"""Text over the picture for technicians: figures, corner numbers, which projector this is."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from appliance.projector.stream.keying import keyed
 
-_LAST_WRITE_S = 1.0  # of the 3 s that systemd and `bunraku play` give the projector
+_LAST_WRITE_S = 1.0  # seconds, less than the 3 s that systemd and `bunraku play` give the projector
 
 
 def take_over_stdout() -> int:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections import deque
 
-SHARES = (1.0, 0.5, 0.35)  # of the display's width and height; steps in between save nothing
-_WINDOW_S = 1.5  # of pictures that a judgement is based on
+SHARES = (1.0, 0.5, 0.35)  # fractions of the display's width and height; steps in between save nothing
+_WINDOW_S = 1.5  # seconds of pictures that a judgement is based on
 _FEWEST = 15  # pictures for a judgement
 _SETTLES_S = 0.5  # after a change or a new look, whose first pictures are slow
-_MOST = 0.95  # of the display's period that drawing may take
-_EASY = 0.7  # of it that a larger picture must be expected to take at most
-_UP_AFTER_S, _UP_AFTER_MOST_S = 20.0, 640.0  # of spare time before a larger picture is tried
+_MOST = 0.95  # fraction of the display's period that drawing may take
+_EASY = 0.7  # fraction of it that a larger picture may be expected to take
+_UP_AFTER_S, _UP_AFTER_MOST_S = 20.0, 640.0  # seconds of spare time before a larger picture is tried
 _FAILED_S = 60.0  # a larger picture that lasts for less has failed
 _GAIN = 0.85  # smallest pictures that are too slow and save less than this blur for nothing
 _HOPELESS_S = 600.0  # before smaller pictures are tried again
@@ -43,7 +43,7 @@ class Resolution:
 
     @property
     def share(self) -> float:
-        """Of the display's width and height."""
+        """A size in proportion to the display's."""
         return SHARES[self._place]
 
     def note_picture(self, now: float, took_s: float, look: str | None) -> bool:
@@ -109,7 +109,7 @@ class Resolution:
         return False
 
     def _expected(self, took_s: float) -> float:
-        """What the next larger picture would take: in proportion as lately, at most to its pixels."""
+        """Expected time of the next larger picture: from recent ones, at most in proportion to its pixels."""
         by_pixels = (SHARES[self._place - 1] / SHARES[self._place]) ** 2
         return took_s * min(by_pixels, self._ratios.get(self._place, by_pixels))
 

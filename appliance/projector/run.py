@@ -116,7 +116,7 @@ class Run:
         self._warned = not self.context.is_software
 
     def introduction(self) -> list[str]:
-        """What a technician should know at the start."""
+        """Facts for the technician at the start."""
         width, height = self._window.size
         lines = [
             f"The picture is {width}x{height} ({self._window.driver}, {self.context.renderer}). "

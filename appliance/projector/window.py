@@ -142,7 +142,7 @@ def _create(kind: Kind, display: int, size: Size) -> Any:
         (sdl2.SDL_GL_CONTEXT_MAJOR_VERSION, 3),
         (sdl2.SDL_GL_CONTEXT_MINOR_VERSION, 0),
         (sdl2.SDL_GL_DOUBLEBUFFER, 1),
-        (sdl2.SDL_GL_DEPTH_SIZE, 0),  # scenes are drawn into textures with a depth of their own
+        (sdl2.SDL_GL_DEPTH_SIZE, 0),  # scenes are drawn into textures with their own depth
     ):
         sdl2.SDL_GL_SetAttribute(attribute, value)
     flags = sdl2.SDL_WINDOW_OPENGL | sdl2.SDL_WINDOW_SHOWN | sdl2.SDL_WINDOW_ALLOW_HIGHDPI

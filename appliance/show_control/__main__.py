@@ -1,4 +1,4 @@
-"""`python -m appliance.show_control SETTINGS`: show control alone, and only what it needs is loaded."""
+"""`python -m appliance.show_control SETTINGS`: only show control, and only what it needs is loaded."""
 
 from __future__ import annotations
 

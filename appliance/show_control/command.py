@@ -31,7 +31,7 @@ class Command:
 
 def command(address: str, arguments: Sequence[object]) -> Command:
     """The command in one message. Raises ValueError with one clear sentence."""
-    if address == "/panic":  # with any arguments; 0 alone is a button that is let go
+    if address == "/panic":  # with any arguments; a single 0 is a button that is let go
         return Command(address, (0.0,) if list(arguments) == [0] else ())
     if not is_readable([address, *arguments]):
         raise ValueError("A command has no control characters in it.")
@@ -59,7 +59,7 @@ def require_read(address: str, arguments: Sequence[object]) -> None:
 
 
 def _text(form: Form, arguments: Sequence[object]) -> tuple[str | int | None, list[int | float]]:
-    """What the command is about (None: not given), and its numbers."""
+    """The command's subject (None: not given), and its numbers."""
     text: str | int | None = ""
     if form.text and arguments:
         text, arguments = _name(form, arguments[0]), arguments[1:]

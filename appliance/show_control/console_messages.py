@@ -1,4 +1,4 @@
-"""What the box's terminal says about commands: why it is dark, that it goes on, which cue is in force."""
+"""The terminal's messages about commands: why it is dark, that it goes on, which cue is in force."""
 
 from __future__ import annotations
 

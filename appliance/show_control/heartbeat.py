@@ -12,7 +12,7 @@ EVERY_S = 1.0
 
 
 class Heartbeat:
-    """Beats on a grid of its own, whatever the stage does; a listener that is away delays no other."""
+    """Beats on its own grid, whatever the stage does; a listener that is away delays no other."""
 
     def __init__(self, listeners: Sequence[Listener], now: float) -> None:
         self._listeners = Listeners(listeners)

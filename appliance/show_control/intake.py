@@ -9,7 +9,7 @@ from appliance.show_control.packet import BUNDLE, URGENT, urgent_address
 from appliance.show_control.port import Address, Port
 
 WAITING, URGENT_WAITING, LIVE_WAITING = 256, 4096, 1024  # datagrams; then the oldest gives way
-WAITING_BYTES = 4 << 20  # of each kind
+WAITING_BYTES = 4 << 20  # for each kind
 _LOOKED_AT = 1024  # datagrams at most before one has its turn: 5 ms
 _IN_BUNDLE = re.compile(b"(?:%s)\0" % "|".join(URGENT).encode())
 _LIVE = re.compile(b"(?:#bundle\0.{12})*/(?:VMC|mocap/0)/", re.DOTALL)  # 12: a time tag, the first one's size
@@ -49,7 +49,7 @@ class Intake:
         return self._live.dropped + self._live_at_port
 
     def take(self) -> Datagram | None:
-        """What is carried out next; None: no command waits. Never blocks, never raises."""
+        """The next command to carry out; None: no command waits. Never blocks, never raises."""
         for _ in range(_LOOKED_AT):
             if (found := self._port.take()) is None:
                 break

@@ -31,7 +31,7 @@ class KeyFile:
         return found
 
     def _stamp(self) -> object:
-        """What changes with the file; None when nothing is there."""
+        """A value that changes with the file; None when nothing is there."""
         try:
             status = self.path.stat() if self.path is not None else None
         except OSError:

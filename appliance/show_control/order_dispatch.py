@@ -50,7 +50,7 @@ class _Way:
     fills_at: float = 0.0  # monotonic seconds
 
     def remove_late(self, now: float) -> list[_Dispatched]:
-        """What has waited for longer than its sender does."""
+        """Orders that have waited for longer than their sender does."""
         late = []
         while self.waiting and self.waiting[0].order.until < now:
             late.append(self.waiting.popleft())
@@ -58,7 +58,7 @@ class _Way:
 
 
 class OrderDispatch:
-    """Sends orders at a bounded pace, and reports the result of each once; of quiet ones, refusals alone.
+    """Sends orders at a bounded pace, and reports the result of each once; for quiet ones, only refusals.
 
     A receiver that was held up in the middle of an order answers too late: if it was done, a second report
     corrects the first.

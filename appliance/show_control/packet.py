@@ -1,4 +1,4 @@
-"""OSC packets as plain messages, both ways; what is none raises ValueError, nothing else."""
+"""OSC packets as plain messages, both ways; anything else raises ValueError, and nothing else."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pythonosc.osc_message_builder import BuildError, OscMessageBuilder
 from pythonosc.parsing import osc_types
 
 Message = tuple[str | int | float, ...]  # an OSC address and its arguments
-MOST_MESSAGES = 1024  # of a bundle; programs of motion capture send all bones and faces in one
+MOST_MESSAGES = 1024  # parts of a bundle; programs of motion capture send all bones and faces in one
 DEEPEST_BUNDLE = 8
 BUNDLE = b"#bundle\0"  # how a bundle begins
 URGENT = ("/panic", "/blackout", "/stop", "/go")
 
-_HEAD_BYTES = 16  # of a bundle: BUNDLE, then the time tag
+_HEAD_BYTES = 16  # head of a bundle: BUNDLE, then the time tag
 _NUMBERS = {tag: struct.Struct(f">{packed}") for tag, packed in zip("ifhd", "ifqd", strict=True)}
 _CONSTANTS = {"T": True, "F": False}
 _TRIGGERS = "IN"  # OSC's impulse and nil: a trigger, and no value

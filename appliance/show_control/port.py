@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from appliance.sensor.transports.udp import bind_early
 from appliance.show_control.packet import Message, datagram
 
-LARGEST_DATAGRAM = 65_507  # of UDP: programs of motion capture send a whole figure at once
+LARGEST_DATAGRAM = 65_507  # the largest of UDP: programs of motion capture send a whole figure at once
 _SAY_EVERY_S = 60.0
 _WAITING_BYTES = 4 << 20  # or as much as net.core.rmem_max allows: what comes while this process does not run
 _SO_MEMINFO, _DROPS = 55, 8  # Linux, asm-generic/socket.h and linux/sock_diag.h: nine numbers, the last one

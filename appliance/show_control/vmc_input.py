@@ -13,7 +13,7 @@ from appliance.pose.t_pose import humanoid_rest
 PREFIX = "/VMC/Ext/"
 BONE, ROOT = f"{PREFIX}Bone/Pos", f"{PREFIX}Root/Pos"
 _HIPS = "Hips"
-_UNIT = 0.1  # a rotation this far from unit length is none
+_UNIT = 0.1  # a rotation this far from unit length is invalid
 _OF_BODY = frozenset(  # without these a figure is not whole; fingers, eyes and toes few programs send
     ("Hips", "Spine", "Head", *(f"{side}{part}" for side in ("Left", "Right") for part in (
         "UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot"
@@ -72,7 +72,8 @@ class VmcInput:
 
     def hear(self, address: str, arguments: Sequence[object]) -> tuple[Vector, list[float]] | None:
         """One message; the hips' place in metres and all joints' w, x, y, z in the skeleton's order once a
-        frame is whole, else None. What is unknown is not a number. Raises ValueError with one clear sentence.
+        frame is whole, else None. An unknown value is not a number. Raises ValueError with one clear
+        sentence.
         """
         if address not in (BONE, ROOT):
             return None

@@ -23,13 +23,13 @@ _REPEATS = 3
 _RUNS = 60
 _FEWEST_RUNS = 8
 _PATIENCE_S = 0.15  # a start may take 1.5 s in all
-_AGREE = 0.2  # of the budget: the slowest run lies no further above the usual one
+_AGREE = 0.2  # fraction of the budget: the slowest run is no further above the usual one
 _SECOND_LOOK_S = 10
 
 
 @dataclass(frozen=True)
 class Admission:
-    """What the box will dance with, and why.
+    """The iterations that the box will dance with, and why.
 
     Times are milliseconds of one run of all puppets as paced on stage; `one_ms` is the p99 of a single
     iteration.

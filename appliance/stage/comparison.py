@@ -98,7 +98,7 @@ def _size(found: Difference) -> float:
 
 
 def _other(recorded: Any, tick: Tick) -> str:
-    """What beside the pose is another than recorded, in words."""
+    """Differences from the recording other than the pose, in words."""
     frame, times = tick.frame, tick.iterations
     was_late, had_failed = (bool(recorded["flags"] & flag) for flag in (RESENT, NOT_FINITE))
     iterations = int(recorded["coding_iterations"]), int(recorded["interaction_iterations"])

@@ -1,4 +1,4 @@
-"""What the box knows about itself: counters, the last second's tick times, and the line that says so."""
+"""The box's knowledge about itself: counters, the last second's tick times, and the line that says so."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Health:
     over_budget: int = 0
     not_finite: int = 0
     worst_ms: float = 0.0
-    rate_hz: float = 0.0  # of the last second, as are the next three
+    rate_hz: float = 0.0  # in the last second, as are the next three
     p50_ms: float = 0.0
     p99_ms: float = 0.0
     slowest_ms: float = 0.0

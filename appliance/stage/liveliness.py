@@ -74,7 +74,7 @@ class Liveliness:
             self.level = self._before + share * (self.asked - self._before)
 
     def state(self) -> dict[str, Any]:
-        """What the ticks to come depend on, for `restore`: plain values."""
+        """The state that later ticks depend on, for `restore`: plain values."""
         return {
             "levels": [self.level, self.asked, self._before],
             "ticks": [self._tick, self._ticks],

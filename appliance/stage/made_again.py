@@ -1,4 +1,4 @@
-"""What was made ahead, made again from its recipe: a replay has no generator."""
+"""Motion made ahead, made again from its recipe: a replay has no generator."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ class MadeMotions:
         return material.loop
 
     def danced_before(self, number: int) -> Material | None:
-        """What the stage danced before it was restarted, if it is still there."""
+        """The motion that the stage danced before it was restarted, if it is still there."""
         try:
             material = self._material(number)
         except (OSError, ValueError):
@@ -99,7 +99,7 @@ class MadeMotions:
         return material
 
     def _material(self, number: int) -> Material:
-        """What the generator made under this number. Raises OSError, ValueError."""
+        """The generator's motion with this number. Raises OSError, ValueError."""
         return read_material(self._folder / f"{number}{SUFFIX}", self._joints)
 
     def close(self) -> None:
@@ -108,8 +108,8 @@ class MadeMotions:
 
 
 def open_made_motions(folder: Path, show: Show, parts: StageParts) -> tuple[MadeMotions, ...]:
-    """What the generator makes for each puppet, if the show has sources of it; the parts take their loops
-    from there.
+    """The generator's output for each puppet, if the show has such sources; the parts take their loops from
+    there.
     """
     config, phrases = show.config, show.phrases
     if not config.motion.made_sources:

@@ -114,8 +114,8 @@ class Reconciler:
         return bool(self._made) and name != LIVE and name not in self.parts.motion.phrases
 
     def danced_before(self, *numbers: int) -> list[Material | None]:
-        """What the puppets danced before a restart, by the numbers of what was made; None: a phrase, or it is
-        not there any more.
+        """The motions that the puppets danced before a restart, by number; None: a phrase, or it is not there
+        any more.
         """
         if not self._made:
             return [None] * len(numbers)

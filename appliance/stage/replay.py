@@ -96,7 +96,7 @@ class Replay:
         return {int(number): row for row, number in enumerate(self._run.tick_numbers)}
 
     def _first(self, from_s: float) -> int:
-        """How many entries of the log lie before the keyframe to start from."""
+        """Number of log entries before the keyframe to start from."""
         run = self._run
         begun = run.ticks["frame_time"][0] + from_s
         positions = [position for position, _ in run.keyframes]

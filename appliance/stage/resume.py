@@ -166,8 +166,8 @@ class Resumption:
 def _found(
     runtime: Path, state: Path | None, wanted: Resume, boot: str
 ) -> tuple[Checkpoint | None, bool, bool]:
-    """The checkpoint to go on from, if any; whether the machine was restarted since; whether one was dropped
-    because no stage stands there.
+    """The checkpoint to continue from, if any; whether the machine was restarted since; whether one was
+    dropped because no stage could be there.
     """
     if wanted == "never":
         return None, False, False

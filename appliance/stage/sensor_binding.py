@@ -61,7 +61,7 @@ class SensorBinding:
 
 
 def upright(name: str, hand: WornHand, axis: tuple[float, float, float]) -> str:
-    """What to say where the axis that should face the front stood upright instead."""
+    """The sentence if the axis that should face the front was upright instead."""
     told_by = "arrow" if axis[0] else "lid"
     return (
         f"Sensor {name}: the axis that should face the front stood upright, so the front was told by its "

@@ -20,7 +20,7 @@ from appliance.stage.sensor_binding import SensorBinding, WornHand, upright
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts
 
-ASKED_STILL_S = 0.5  # of stillness are enough for a neutral pose that was asked for
+ASKED_STILL_S = 0.5  # seconds of stillness are enough for a neutral pose that was asked for
 ASKED_WITHIN_S = 3.0
 CARRIED_WITHIN_S = 60.0  # a sensor that comes back later may have changed hands
 FRESH_S = 0.5  # an older reading does not tell how the dancer stands
@@ -141,7 +141,7 @@ class SensorFit:
         self._news[:] = state[""]
 
     def _meet(self, wearer: SensorBinding, reading: SensorReading) -> None:
-        """The first reading of this run: after a restart of the box alone, its pose holds still."""
+        """The first reading of this run: after a restart of only the box, its pose holds still."""
         if wearer.has_pose_of(reading.boot_nonce):
             self._news.append(f"Sensor {wearer.name}: the neutral pose taken before is used on. Dance.")
         else:

@@ -9,7 +9,7 @@ from appliance.sensor.link import SensorState
 
 
 def roster_lines(states: Sequence[SensorState], neutral_of: Callable[[str], str]) -> list[RosterLine]:
-    """A line for each; `neutral_of` tells how a sensor's neutral pose stands, in one word."""
+    """A line for each; `neutral_of` gives the state of a sensor's neutral pose, in one word."""
     return [_line(state, neutral_of(state.name)) for state in states]
 
 

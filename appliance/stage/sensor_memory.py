@@ -1,4 +1,4 @@
-"""What the box remembers of its sensors from night to night: neutral poses and calibrations."""
+"""The box's memory of its sensors from night to night: neutral poses and calibrations."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class SensorMemory:
             return
         try:
             self._writer.write(memory_text(self._neutral, self._profiles).encode())
-        except ValueError as error:  # of thousands of sensors
+        except ValueError as error:  # in case of thousands of sensors
             self.close()
             self._writer = None
             self._complain(str(error))

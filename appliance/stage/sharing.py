@@ -1,4 +1,4 @@
-"""What the stage shares with the box's other processes: facts once, every frame, its health once a second."""
+"""Shares the stage's data with the box's other processes: facts once, every frame, health every second."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from appliance.stage.thermometer import Thermometer
 def facts_of(
     show: Show, box_file: Path | None, iterations: Iterations, now: float, rehearsal: bool = False
 ) -> Facts:
-    """What readers need to know about this stage; `now`: it is about to dance."""
+    """Facts about this stage for readers; `now`: it is about to dance."""
     config, names, joints = show.config, show.config.names, show.skeleton.names
     return Facts(
         show_directory=show.directory.resolve(),

@@ -85,7 +85,7 @@ class StageParts:
 
     @property
     def motion(self) -> Playback:
-        """What the first puppet starts from."""
+        """The first puppet's motion source."""
         return self.first.motion
 
     @property
@@ -100,7 +100,7 @@ class StageParts:
 
     @property
     def springs(self) -> list[Springs]:
-        """Of all puppets that have some among their hands."""
+        """The springs of all puppets that have some among their hands."""
         return [one.springs for one in self.puppets if one.springs is not None]
 
     def run_with(self, measured: Admission) -> None:
@@ -139,7 +139,7 @@ class StageParts:
             one.motion.make_by(make)
 
     def state(self) -> dict[str, Any]:
-        """What the first puppet's dance to come depends on, for `restore`: plain values, copies of arrays."""
+        """The state of the first puppet's dance, for `restore`: plain values, copies of arrays."""
         first = self.first.parts_state() | {"liveliness": self.liveliness.state()}
         return {**first, "newest_primary": self.newest_primary}
 
@@ -240,7 +240,7 @@ def _dance(parts: StageParts, show: Show) -> Callable[[int, int], object]:
                 times = (coding, interaction) if len(held) == 1 else lowered(*most, coding)
                 puppet.hold(*joints, *times)
             parts.network.dance()
-        except Exception as error:  # onnxruntime has a class of its own for every way to fail
+        except Exception as error:  # onnxruntime has a separate class for every kind of failure
             raise StageError(
                 f"{show.network}: the network fails at {coding} coding iterations ({str(error)[:200]}). "
                 "Nothing is danced. Export the show again."

@@ -62,8 +62,8 @@ class StagePuppet:
 
     hand_places: where the hands' joints stand among the moving ones; place None: where its phrase has it;
     network_failed: the last good pose stays, because the network gave none. figures_refused: ticks whose
-    figure no stage has: the last good frame stays, and what led there is forgotten. What the network takes
-    besides: liveliness, how much of the phrase's own stays while a hand holds (1: all of it), and noise (Z,),
+    figure no stage has: the last good frame stays, and what led there is forgotten. Further inputs of the
+    network: liveliness, how much of the phrase's own stays while a hand holds (1: all of it), and noise (Z,),
     added to the latent.
     """
 
@@ -216,7 +216,7 @@ class StagePuppet:
             puppeteer.enabled = puppeteer.joint not in noted.let_go
 
     def parts_state(self) -> dict[str, Any]:
-        """What the dance to come depends on, for `restore_parts`: plain values and copies of arrays."""
+        """The state that the dance depends on, for `restore_parts`: plain values and copies of arrays."""
         return {
             "motion": self.motion.state(),
             "blending": self.blending.state(),
@@ -235,7 +235,9 @@ class StagePuppet:
             self.live.restore(state["live"])
 
     def frame_state(self) -> dict[str, Any]:
-        """What the next frame repeats where it has nothing newer, and the iterations: for `restore_frame`."""
+        """The state that the next frame repeats if it has nothing newer, and the iterations: for
+        `restore_frame`.
+        """
         frame = self.frame
         return {
             "iterations": self.iterations.state(),

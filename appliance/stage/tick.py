@@ -103,8 +103,8 @@ class Tick:
             self.parts.network.warm_up()
 
     def after(self, slot: Slot) -> float:
-        """What can wait until the frame has left: the motion moves on, sensors are answered and looked at,
-        times are noted. The cost of what came before, in ms.
+        """Work that can wait until the frame has left: the motion moves on, sensors are answered and looked
+        at, times are noted. The cost of what came before, in ms.
         """
         if not self.frame.late:
             for puppet in self.parts.puppets:

@@ -152,7 +152,7 @@ class Watch:
         return bool(missing) and (missing != self._missing or " ".join(self._parts.complaints) or True)
 
     def _name_them(self, now: float, gone: set[str]) -> None:
-        """What each fallback is about: the sensors, cables, addresses and receivers by name."""
+        """The subjects of each fallback: the sensors, cables, addresses and receivers by name."""
         every, link = self.fallbacks, self._parts.link
         silences = zip(self._parts.worn, self._silent, self._fell_silent, strict=True)
         every.concern(rows.SENSOR_SILENT.name, [name for name, is_so, fell in silences if is_so or fell])
@@ -181,7 +181,7 @@ class Watch:
         return True
 
     def _sensor_news(self, sensor: SensorState) -> Iterator[str]:
-        """What a person should know of one sensor's link, battery and firmware."""
+        """A person's view of one sensor's link, battery and firmware."""
         name, way_before = sensor.name, self._ways.get(sensor.name)
         if sensor.state == "linked" and sensor.way and sensor.way != way_before:
             self._ways[name] = sensor.way
@@ -213,7 +213,7 @@ class Watch:
                 )
 
     def _source_news(self, now: float) -> Iterator[str]:
-        """What a person should know of the live dancer."""
+        """A person's view of the live dancer."""
         chosen = [one.live for one in self._parts.puppets if one.live is not None and one.live.is_chosen]
         if not chosen:
             return
@@ -236,7 +236,7 @@ class Watch:
                 )
 
     def _output_news(self, gone: set[str]) -> Iterator[str]:
-        """What a person should know of the receivers, and of the network."""
+        """A person's view of the receivers, and of the network."""
         for receiver in self._parts.outputs.receivers:
             is_gone = receiver.name in gone
             if self._changes("gone", receiver.name, is_gone):

@@ -50,13 +50,13 @@ def stage(host: HostView) -> Iterator[Finding]:
     for complaint in health.get("complaints") or []:
         yield better("stage", *_halves(str(complaint), "stage"))
     for process, fallback in host.stage.fallbacks:
-        if fallback.active and process != "preflight":  # its refusals stand beside the show
+        if fallback.active and process != "preflight":  # its refusals are shown with the show
             judged = wrong if fallback.name in _SEEN or fallback.name.endswith("-died") else better
             yield judged(f"{process}: {fallback.name}", *_halves(fallback.words, process))
 
 
 def _halves(sentences: str, process: str) -> tuple[str, str]:
-    """What happened, and what to do: that is the last sentence."""
+    """What happened and what to do: the last sentence."""
     happened, _, cure = sentences.rpartition(". ")
     if not happened:
         return sentences, f"`journalctl -b -u bunraku-{process}` says more."
@@ -64,7 +64,7 @@ def _halves(sentences: str, process: str) -> tuple[str, str]:
 
 
 def units(host: HostView) -> Iterator[Finding]:
-    """What systemd says about the box's units."""
+    """systemd's report on the box's units."""
     if not host.is_here or not host.at("/run/systemd/system").is_dir():
         return
     for unit in _systemd_properties("bunraku*.service", "bunraku.target"):

@@ -68,7 +68,7 @@ def doctor(box: ThisBoxFile = None, chosen: ChosenFile = None, as_json: AsJson =
 
 
 def findings(host: HostView) -> Iterator[Finding]:
-    """What all checks find; some of them measure for a second."""
+    """The findings of all checks; some of them measure for a second."""
     for check in CHECKS:
         yield from check(host)
     if host.is_here:

@@ -1,4 +1,4 @@
-"""What the doctor found: a verdict, what it means for the audience, and what to do."""
+"""A finding of the doctor: a verdict, its effect for the audience, and what to do."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class RunningStage:
 
     pid: int
     health: dict[str, Any]
-    fallbacks: tuple[tuple[str, Fallen], ...] = ()  # of all processes of the box: the process, the fallback
+    fallbacks: tuple[tuple[str, Fallen], ...] = ()  # all processes of the box: the process, the fallback
     members: tuple[Member, ...] = ()  # the processes beside it
     show: Path | None = None  # the folder of what it dances
 
@@ -86,7 +86,7 @@ class HostView:
         return Path("".join(words[:1])).name == "bunraku"
 
     def mounts(self) -> list[Mount]:
-        """What is mounted where, in the order in which it was."""
+        """The mounted file systems, in the order of mounting."""
         return mounts(self.text("/proc/self/mountinfo") or self.text("/proc/mounts") or "")
 
 

@@ -89,7 +89,7 @@ def wake_ups(seen: Sample) -> Iterator[Finding]:
 
 
 def others(seen: Sample) -> Iterator[Finding]:
-    """What else uses the cores."""
+    """Other programs that use the cores."""
     what = "other programs"
     busy = [(name, pid, share) for name, pid, share in seen.shares if share > BUSY_SHARE]
     total = sum(share for _, _, share in seen.shares)
@@ -108,7 +108,7 @@ def others(seen: Sample) -> Iterator[Finding]:
 
 
 def interrupts(seen: Sample) -> Iterator[Finding]:
-    """What takes precedence over the dance: interrupts, and the host of a virtual machine."""
+    """Load that takes precedence over the dance: interrupts, and the host of a virtual machine."""
     if seen.interrupts > BUSY_SHARE:
         yield better(
             "interrupts",

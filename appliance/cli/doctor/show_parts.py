@@ -16,7 +16,7 @@ from appliance.show.show import load_show
 from appliance.show_control.sensor_roster import RosterLine
 
 _SPARE = "Or put a spare in its place: `bunraku sensors replace {name} SPARE`."
-_STATES = {  # of a sensor that does not send: what happened, what to do
+_STATES = {  # a sensor that does not send: what happened, what to do
     "greeted": ("It greets the box, and sends nothing yet", "Wait for a breath, then switch it off and on."),
     "lost": ("It is lost{ago}", "Check its battery, switch it on, and look at its network."),
     "absent": ("It was not heard since the box was switched on", "Charge it, and switch it on."),

@@ -17,8 +17,8 @@ from appliance.show.yaml_file import read_yaml
 
 LEAST_FREE_BYTES, LEAST_FREE_SHARE = 256 << 20, 0.10
 LEAST_MEMORY_KB = 200 << 10
-RELEASES = Path("/data/bunraku-releases")  # of a box made from the image
-WORN = 8  # of ten steps of an eMMC's life
+RELEASES = Path("/data/bunraku-releases")  # folder of a box made from the image
+WORN = 8  # used, of ten steps of an eMMC's life
 _LOST = "sensors' keys, neutral poses, shows from sticks and the journal"
 _KEPT = "the journal, the place of the dance, what the box knows about sensors"
 

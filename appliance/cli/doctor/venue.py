@@ -1,4 +1,4 @@
-"""What is plugged in and reachable: ports, network, radios, cables, lights' adapters, display."""
+"""Checks everything plugged in and reachable: ports, network, radios, cables, lights' adapters, display."""
 
 from __future__ import annotations
 

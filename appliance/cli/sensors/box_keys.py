@@ -43,7 +43,7 @@ class BoxKeys:
 
 
 def box_keys_of(box_file: Path | None, keys: Path | None) -> BoxKeys:
-    """From the box file, the key file alone, or the files in this folder. Raises StageError, ConfigError."""
+    """From the box file, only the key file, or the files in this folder. Raises StageError, ConfigError."""
     if box_file is not None and keys is not None:
         raise StageError("Give --box or --keys, not both: a box file names its key file.")
     box = load_box(box_file if keys is not None else box_here(box_file))
@@ -129,7 +129,7 @@ def reload_keys(box_keys: BoxKeys) -> tuple[bool, str]:
 
 
 def _ask_to_reload(box_keys: BoxKeys) -> tuple[bool, str]:
-    """What `reload_keys` gives when a box answers; raises NoBoxError when none does."""
+    """The answer of a box to `reload_keys`; raises NoBoxError when none answers."""
     roll = box_keys.running.roll()
     if roll.key_file is not None and roll.key_file.resolve() != box_keys.keys.resolve():
         return False, f"{other_file(roll.key_file)} and knows nothing of this change. {THAT_BOX}"

@@ -30,7 +30,7 @@ class NoBoxError(Exception):
 
 @dataclass(frozen=True)
 class Answer:
-    """What the box replied: whether it was done, and a sentence."""
+    """The box's reply: whether it was done, and a sentence."""
 
     done: bool
     words: str
@@ -46,7 +46,7 @@ class Roll:
 
 
 class ControlClient:
-    """The box behind a control port; each question opens a socket of its own."""
+    """The box behind a control port; each question opens its own socket."""
 
     def __init__(self, control: Address | None, patience_s: float = PATIENCE_S) -> None:
         self._control = control

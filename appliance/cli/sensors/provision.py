@@ -141,7 +141,7 @@ def _axes(text: str | None) -> tuple[int, int] | None:
 def _hints(
     box_keys: BoxKeys, done: Provisioned, settings: Settings, device: str, was_worn: bool
 ) -> list[str]:
-    """What to do next, and what in the box file would keep the wearable out."""
+    """The next steps, and box file settings that would keep the wearable out."""
     name, sensors = done.sensor.name, box_keys.box.sensors
     hints = [*filter(None, [forgotten(box_keys.keys)]), ""]
     if settings.network:

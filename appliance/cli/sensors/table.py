@@ -66,7 +66,7 @@ class SensorTable:
 
 
 def known_table(lines: Sequence[RosterLine]) -> Table:
-    """Names and ids alone, without a running box."""
+    """Only names and ids, without a running box."""
     table = _bare_table()
     table.add_column("name")
     table.add_column("id")
@@ -99,7 +99,7 @@ def plain_values(line: RosterLine) -> dict[str, object]:
 
 
 def _told_by_newer(line: RosterLine) -> dict[str, object]:
-    """What older wearables do not tell."""
+    """Fields that older wearables do not report."""
     dbm = signal_dbm(line.flags)
     return {} if dbm is None else {"signal_dbm": dbm, "has_crystal": bool(line.flags & HAS_CRYSTAL)}
 
@@ -155,7 +155,7 @@ def _battery(line: RosterLine) -> Text:
 
 
 def _signal(line: RosterLine) -> Text:
-    """Of its Wi-Fi, when it was joined."""
+    """Strength of its Wi-Fi, when it was joined."""
     dbm = signal_dbm(line.flags)
     return _NONE if dbm is None else Text(f"{dbm} dBm", style="yellow" if dbm < WEAK_DBM else "")
 

@@ -15,7 +15,7 @@ from appliance.show.look import CameraConfig
 
 UPRIGHT = 1.35  # a figure may stand taller than an upright picture is wide: it is slender
 AIM = 0.5  # height that the camera looks at, in figure heights
-ROOM = 0.82  # of the half picture that joints may use; the rest is for the flesh around them
+ROOM = 0.82  # fraction of the half picture that joints may use; the rest is for the flesh around them
 KNEE = 8  # how suddenly the camera draws back when a joint comes near the edge: higher is later
 NEAR, FAR = 0.2, 30.0  # figure heights
 
@@ -58,7 +58,7 @@ class View:
 
 
 class _Stand(NamedTuple):
-    """What a CameraConfig says at one time."""
+    """A CameraConfig's values at one time."""
 
     azimuth: float
     elevation: float
@@ -68,7 +68,7 @@ class _Stand(NamedTuple):
 
 
 class CuedCamera(NamedTuple):
-    """What cues change of the look's camera, by its keys: before, now, and 0..1 how far it is on its way."""
+    """A cue's changes to the look's camera, by its keys: before, now, and 0..1 how far it is on its way."""
 
     before: Changes
     now: Changes

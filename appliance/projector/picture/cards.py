@@ -16,7 +16,7 @@ from appliance.projector.picture.lettering import lettered, letters_without_font
 from appliance.projector.picture.wall import Wall
 from appliance.show.card import CardConfig
 
-MARGIN = 0.03  # of the picture's width that stays free on both sides
+MARGIN = 0.03  # fraction of the picture's width that stays free on both sides
 _GAP = 0.4  # between image and words, in heights of a line
 _WHITE = "#ffffff"
 

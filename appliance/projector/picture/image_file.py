@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image as Files
 
 Image = NDArray[np.uint8]
-MOST_PIXELS = 64_000_000  # of a file: more would hold up the projector's start
+MOST_PIXELS = 64_000_000  # in a file: more would hold up the projector's start
 LINES = 1080  # of the texture at most
 
 

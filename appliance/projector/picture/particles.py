@@ -1,4 +1,4 @@
-"""Particles: points on the body's surface, each with chances of its own, as parts of vertices."""
+"""Particles: points on the body's surface, each with its own random numbers, as parts of vertices."""
 
 from __future__ import annotations
 

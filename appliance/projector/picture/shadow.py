@@ -40,7 +40,7 @@ class Shadow:
         return lamps | self.on_floor(scene, lamp)
 
     def on_floor(self, scene: Scene, lamp: Array) -> dict[str, Any]:
-        """Draw the floor's shadow alone."""
+        """Draw only the floor's shadow."""
         ctx, easel = self._easel.ctx, self._easel
         root, side = scene.poses.roots[0].astype(float), round(scene.spread * CAST_SIDE)
         middle = root[[0, 2]] - 0.5 * lamp[[0, 2]] / lamp[1]

@@ -19,7 +19,7 @@ FORMATS = {  # moderngl's word for it, and numpy's
 
 
 def layout(parts: tuple[str, ...]) -> tuple[str, ...]:
-    """What a vertex array wants to know of vertices of these parts: the format, then names in shaders."""
+    """The layout of a vertex array with vertices of these parts: the format, then names in shaders."""
     return " ".join(FORMATS[part][0] for part in parts), *(f"in_{part}" for part in parts)
 
 

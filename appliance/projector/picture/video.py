@@ -1,4 +1,4 @@
-"""A looped video as a texture: ffmpeg decodes it in a process of its own, which cannot hold up a picture."""
+"""A looped video as a texture: ffmpeg decodes it in a separate process, which cannot hold up a picture."""
 
 from __future__ import annotations
 

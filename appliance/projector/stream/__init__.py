@@ -1,1 +1,1 @@
-"""The picture for other programs, as MJPEG over HTTP, from a process of its own."""
+"""The picture for other programs, as MJPEG over HTTP, from a separate process."""

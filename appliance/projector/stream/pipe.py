@@ -1,4 +1,4 @@
-"""What goes between the projector and its stream's process: pictures, and what asks for one."""
+"""Messages between the projector and its stream's process: pictures, and requests for one."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Picture = tuple[int, int, bytes]
 
 
 def head(size: tuple[int, int]) -> bytes:
-    """What stands before a picture of that size."""
+    """The header of a picture of that size."""
     return HEAD.pack(*size)
 
 
 def read_picture(pipe: BinaryIO) -> Picture | None:
-    """The next picture; None at the end. Raises ValueError for what is none."""
+    """The next picture; None at the end. Raises ValueError for an invalid one."""
     first = pipe.read(HEAD.size)
     if len(first) < HEAD.size:
         return None

@@ -102,7 +102,7 @@ async def serve(config: StreamConfig, pictures: BinaryIO, asks: BinaryIO) -> Non
     assert serve_client is not None
 
     def take_pictures() -> None:
-        """In a thread of its own: as long as encoding takes, clients are served."""
+        """In a separate thread: clients are served while a picture is encoded."""
         try:
             while (picture := read_picture(pictures)) is not None:
                 if ndi is not None and ndi.receivers:

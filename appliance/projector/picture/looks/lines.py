@@ -20,7 +20,7 @@ ECHOES = 5
 TRACES = 56  # points of the body that leave a trail
 WIDTH = 1 / 420  # half of a strand's, of the picture's height
 THINNEST = 1.4  # pixels: half of the thinnest strand that has no gaps
-MIRROR = 0.35  # of the light comes back from the floor
+MIRROR = 0.35  # fraction of the light that comes back from the floor
 
 
 class Lines:
