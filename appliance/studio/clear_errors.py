@@ -46,6 +46,6 @@ def _is_for_people(error: Exception) -> bool:
 
 
 def _refuse(message: str) -> None:
-    if os.environ.get("RANK", "0") == "0":  # of the processes that torchrun started, one speaks
+    if os.environ.get("RANK", "0") == "0":  # only one of the processes that torchrun started speaks
         print(f"bunraku: {message}", file=sys.stderr)
     raise typer.Exit(REFUSED)

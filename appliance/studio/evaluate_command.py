@@ -125,7 +125,7 @@ def _known(folder: Path, reading: ReadingOptions, given: Sequence[Take]) -> Sequ
 
 
 def _recorded(options: EvaluateOptions, coder: Coder, known: Sequence[Take]) -> Recorded:
-    """What the held dance is compared with."""
+    """The dances to which the held dance is compared."""
     other = () if options.other_dancer is None else load_folder(options.other_dancer, options.reading).takes
     return Recorded(known, coder.joints, other)
 
@@ -137,7 +137,7 @@ def _answer(
     iterations: Sequence[Iterations],
     recorded: Recorded | None,
 ) -> dict[str, Any]:
-    """What the body does where a hand holds a joint, as JSON."""
+    """The body's answer when a hand holds a joint, as JSON."""
     count = puppetry.dances(len(measurements), len(joints), iterations, compared=recorded is not None)
     with told(console, count) as advance:
         return puppetry.measure(measurements, joints, iterations, advance=advance, recorded=recorded)

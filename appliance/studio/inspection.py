@@ -1,4 +1,4 @@
-"""What kind of file a recording is: joints, what they are taken for, lengths, axes, rate, capture errors."""
+"""Describes a recording's file: joints and their roles, lengths, axes, rate, capture errors."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Inspection:
         return self.facts
 
     def lines(self, joints: bool = True) -> list[str]:
-        """What was found, a fact a line, each guess with the option that overrules it."""
+        """The findings, a fact a line, each guess with the option that overrides it."""
         f = self.facts
         rate = f"{f['fps']:g} poses a second"
         if abs(f["fps"] - f["header_fps"]) > 0.01:
@@ -139,7 +139,7 @@ def zero_pose(skeleton: Skeleton) -> str:
 
 
 def doubts(skeleton: Skeleton, height: float) -> list[str]:
-    """What has to be asked: a body of no dancer's size, parts without a known name."""
+    """The question to ask: a body of no dancer's size, parts without a known name."""
     asked = []
     if not SMALLEST_M <= height <= TALLEST_M:
         times = USUAL_HEIGHT_M / max(height, 1e-6)

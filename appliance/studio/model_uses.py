@@ -1,4 +1,4 @@
-"""What the models of `bunraku train --model` are good for, by name: a command of bunraku."""
+"""The use of each model of `bunraku train --model`: a command of bunraku."""
 
 from __future__ import annotations
 

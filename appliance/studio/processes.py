@@ -20,7 +20,7 @@ SILENCE = timedelta(minutes=10)  # the slowest step, with the report after it, t
 
 @dataclass(frozen=True)
 class Processes:
-    """rank: of this process, 0 to count - 1; the first one leads: it alone writes, prints, tells the time."""
+    """rank: of this process, 0 to count - 1; the first one leads: only it writes, prints, tells the time."""
 
     rank: int = 0
     count: int = 1

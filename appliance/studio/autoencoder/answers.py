@@ -27,11 +27,11 @@ class AnswerSettings:
     """How answering is taught. Shares are of dances."""
 
     reserve: int = 4096  # dances with answers that are searched for together
-    uses: int = 4  # of each dance
+    uses: int = 4  # poses of each dance
     light: float = 0.2  # weights between 0 and 1
     frozen: float = 0.3  # hands that stand still
     wild: float = 0.1  # hands at orientations that no dancer had
-    with_hands: float = 0.4  # of a batch; the others are without hands
+    with_hands: float = 0.4  # fraction of a batch; the others are without hands
     nearness: Nearness = field(default_factory=Nearness)
 
 

@@ -3,13 +3,13 @@
 A plain autoencoder sees a held joint only as an unusual input among others, and learns to copy it with them.
 Here a second network, the hand encoder, gives the mean latent of this dancer near a window while joints are
 at given orientations. A hand moves the latent by a difference vector: that mean with the joints where the
-hand wants them, less that mean with the joints where the phrase has them. What the phrase has of its own,
-the residual, stays. So the answer keeps the dance's spread and energy whatever the hand asks for, and a hand
+hand wants them, less that mean with the joints where the phrase has them. The phrase's own part, the
+residual, stays. So the answer keeps the dance's spread and energy whatever the hand asks for, and a hand
 that holds a joint where the phrase has it changes nothing. A network that learns the answer itself by
 distance gives the mean of all good ones instead, and the mean stands still (docs/results.md).
 
-The hand encoder learns two thirds of what a hand changes, so its differences are too short. What putting the
-held joint into the window does to the latent is known exactly; the rest, the body's share, counts more.
+The hand encoder learns two thirds of what a hand changes, so its differences are too short. The effect on the
+latent of putting the held joint into the window is known exactly; the rest, the body's share, counts more.
 
 A hand may also want a joint at a place. The place encoder gives the mean latent while joints are at given
 places, and each interaction adds a difference again: where the joint comes to lie depends on the whole chain
@@ -33,7 +33,7 @@ SMALLEST_SPREAD = 0.02  # metres; of the places of a joint that hardly moves
 CALM = 0.6  # share of the residual that liveliness 0 keeps: as calm as the answers of release 0.1
 BODY = 1.2  # of the body's share of a difference vector, added to it: what the hand encoder leaves out
 LEARNED_BODY = 0.6  # the same in training: the critic works against the whole of it (docs/results.md)
-NOISE = 0.25  # of a latent's standard deviation, at liveliness 1
+NOISE = 0.25  # standard deviations of a latent, at liveliness 1
 
 # A rotation matrix, row by row, from the products of a quaternion's components (w, x, y, z) x (w, x, y, z).
 _PRODUCTS = (

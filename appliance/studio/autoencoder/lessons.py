@@ -42,7 +42,7 @@ class Lessons(Protocol):
         """The next lessons of this process, `batch` windows in all."""
 
     def state(self) -> dict[str, Any]:
-        """What later lessons depend on besides the random numbers, for `restore`."""
+        """The state that later batches depend on besides the random numbers, for `restore`."""
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a state."""

@@ -11,7 +11,7 @@ from torch.nn import functional
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import PriorCritic
 
-POSITION_POSES = 2  # of a window's 8, redrawn each step: as good a gradient at a quarter of the cost
+POSITION_POSES = 2  # poses of a window's 8, redrawn each step: as good a gradient at a quarter of the cost
 
 
 @dataclass(frozen=True)
@@ -22,14 +22,14 @@ class LossWeights:
     pace: float = 1.0
     unit_norm: float = 0.1
     position: float = 1.0
-    squared: float = 0.0  # of quaternions' components: the published loss of 'Beyond Imitation'
-    prior: float = 0.003  # of the adversarial prior; 0: none
+    squared: float = 0.0  # squared error of quaternions' components: the published loss of 'Beyond Imitation'
+    prior: float = 0.003  # weight of the adversarial prior; 0: none
     speed: float = 0.0  # how much each joint moves within windows, as a mean over the batch
-    divergence: float = 0.001  # of a variational network's latents from the prior
-    pull: float = 1.0  # of a hand's pull on the latent, mean square
-    place: float = 1.0  # of the place encoder's guess at the latent, mean square
-    alive: float = 0.05  # of what the motion critic says
-    off_hand: float = 0.06  # of how far held joints are from their hands
+    divergence: float = 0.001  # divergence of a variational network's latents from the prior
+    pull: float = 1.0  # a hand's pull on the latent, mean square
+    place: float = 1.0  # the place encoder's guess at the latent, mean square
+    alive: float = 0.05  # the motion critic's loss
+    off_hand: float = 0.06  # distance of held joints from their hands
 
 
 def reconstruction_losses(

@@ -1,4 +1,4 @@
-"""What `bunraku train` trains: each model in a compact form, the default, and as the papers published it."""
+"""Models for `bunraku train`: each in a compact form, the default, and as the papers published it."""
 
 from __future__ import annotations
 

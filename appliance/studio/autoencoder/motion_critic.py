@@ -1,4 +1,5 @@
-"""The motion critic: tells what an audience sees of a held dance from the dancer, over a third of a second.
+"""The motion critic: distinguishes a held dance, as an audience sees it, from the dancer, over a third of a
+second.
 
 A loss by distance between windows cannot say whether a dance lives: it is met by the mean. The critic sees
 blended motion, as it leaves the box: poses, speeds and accelerations of all joints, which joints are held,
@@ -111,7 +112,7 @@ class Sequences:
         return Wandering(self._pool[rows], self._pool, self._age, rows)
 
     def state(self) -> dict[str, Tensor]:
-        """What later sequences depend on besides the random numbers, for `restore`."""
+        """The state that later sequences depend on besides the random numbers, for `restore`."""
         return {name: getattr(self, f"_{name}") for name in _WANDERING}
 
     def restore(self, state: dict[str, Tensor]) -> None:

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 @dataclass(frozen=True)
 class Shape:
-    """What a network is built for: window poses, moving joints, latent size, width and depth of its layers.
+    """The dimensions of a network: window poses, moving joints, latent size, width and depth of its layers.
 
     variational: whether the encoder gives a Gaussian, means and log variances, instead of a point.
     """
@@ -158,7 +158,7 @@ class Mlp(Network):
         size = len(mean)
         last.weight[:size] /= deviation[:, None]
         last.bias[:size] = (last.bias[:size] - mean) / deviation
-        last.bias[size:] -= 2 * deviation.log()[: len(last.bias) - size]  # of a variational network
+        last.bias[size:] -= 2 * deviation.log()[: len(last.bias) - size]  # only in a variational network
         first.bias.add_(first.weight @ mean)
         first.weight *= deviation
 

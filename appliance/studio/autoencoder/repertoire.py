@@ -1,7 +1,7 @@
 """The repertoire: the recorded windows, searched for what the dancer does while joints are held.
 
-What the dancer usually does near a window is the mean of all recorded windows, each weighted by how near it
-is (a kernel regression, Nadaraya and Watson 1964); with a hand, nearness includes how the joint is held. A
+The dancer's usual movement near a window is the mean of all recorded windows, each weighted by its nearness
+(a kernel regression, Nadaraya and Watson 1964); with a hand, nearness includes how the joint is held. A
 single nearest window would jump between takes from tick to tick.
 
 The answer to a hand is a difference: what is usual with the hand, less what is usual with the joints as the
@@ -27,7 +27,7 @@ _FAR = 1e9
 
 @dataclass(frozen=True)
 class Nearness:
-    """What makes a recorded window near.
+    """Defines nearness of a recorded window.
 
     The distance is the sum of: squared chords (half the angle) of the free joints, and of their change over
     the window times `change`, over `bandwidth`; for each held joint its squared angle to the hand in units of
@@ -54,7 +54,7 @@ class Repertoire:
         self._features = _features(self._middle, self._change, nearness.change)
 
     def answers(self, windows: Tensor, hands: Tensor, held: Tensor, takes: Tensor) -> Tensor:
-        """What becomes of windows when hands, both (L, T, M, 4), hold the joints where held (L, M) is not 0.
+        """The windows when hands, both (L, T, M, 4), hold the joints where held (L, M) is not 0.
 
         takes (L,): the windows' own takes, which are not searched: on stage the dancer's phrase is new.
         """
@@ -127,5 +127,5 @@ def _features(middles: Tensor, changes: Tensor, weight: float) -> Tensor:
 
 
 def _same_side(q: Tensor, other: Tensor) -> Tensor:
-    """q or -q, whichever lies on the side of the other."""
+    """q or -q, whichever is in the other's hemisphere."""
     return torch.where((q * other).sum(-1, keepdim=True) < 0, -q, q)

@@ -108,7 +108,7 @@ def moving_bones(skeleton: Skeleton, moving: tuple[int, ...], still_pose: Tensor
 
 
 class MovingSkeleton(torch.nn.Module):
-    """Forward kinematics of the moving joints alone; the still joints between them are folded into the bones.
+    """Forward kinematics of only the moving joints; the still joints between them are folded into the bones.
 
     The root joint stays at the origin: the figure is compared, not its path through the room.
     """

@@ -27,10 +27,10 @@ from appliance.studio.processes import Processes
 from appliance.studio.training_loop import ALONE, TrainingLoop
 
 FEW_TAKES = 4
-ADVERSARIAL_BETAS = (0.5, 0.99)  # of Adam, where two networks learn against each other
+ADVERSARIAL_BETAS = (0.5, 0.99)  # momentum of Adam, where two networks learn against each other
 SAMPLED_PLACES = 4096  # windows, to measure where the dancer's joints are
 PLACED = 64  # windows of a step from which the place encoder learns
-HAND_PACE = 2.0  # of the hand encoder's learning rate: it follows answers, not the critic alone
+HAND_PACE = 2.0  # factor on the hand encoder's learning rate: it follows answers, not only the critic
 SAMPLED_SEQUENCES = 500  # to measure how the dancer moves
 _NO_LONGER_SETTINGS = ("betas",)  # in older checkpoints; nothing read it
 SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
@@ -53,7 +53,7 @@ class Settings:
     batch: int = 256
     learning_rate: float = 1e-3
     critic_learning_rate: float = 5e-4
-    smoothing: float = 0.999  # of the averaged weights
+    smoothing: float = 0.999  # decay of the averaged weights
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
     input_noise_degrees: float = 0.0
     mixed: bool = True  # precision, on a GPU

@@ -14,7 +14,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.jumps import Runs, bend_limits, bends, jumps, runs, visible
 
-SNAP = 0.5  # of a jump's limit: no error by itself, but it can put a joint into a wrong place
+SNAP = 0.5  # fraction of a jump's limit: no error by itself, but it can put a joint into a wrong place
 FAR_DEGREES = 110.0  # head, hand or foot from its usual orientation: no neck, wrist or ankle turns that far
 AWAY_DEGREES = 60.0  # any other joint that jumps there and away again
 GAP_DEGREES = 30.0  # to where the joint is at all other times: it never passes through here

@@ -30,8 +30,8 @@ Spans = tuple[tuple[float, float], ...]  # seconds from and to
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What is known of recordings beyond their files: true frame rates, takes, what is held out, and what
-    is or is not a capture error against all appearance.
+    """Facts about recordings that their files lack: true frame rates, takes, held-out ones, and
+    corrections to the detected capture errors.
     """
 
     true_fps: dict[str, float] = field(default_factory=dict)
@@ -83,7 +83,9 @@ def recordings_in(folder: Path) -> list[Path]:
 
 
 def left_out_of(folder: Path) -> str:
-    """What else in a folder looks like recordings, by name ('': nothing): other formats, folders of BVH."""
+    """Other things in a folder that look like recordings, by name ('': nothing): other formats, folders of
+    BVH.
+    """
     inside = [f"{one.name}/" for one in sorted(folder.glob("*")) if one.is_dir() and recordings_in(one)]
     names = [file.name for file in _files_in(folder) if _ending(file) in OTHER_ENDINGS] + inside
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""

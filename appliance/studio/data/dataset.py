@@ -51,7 +51,7 @@ __all__ = [
 ]
 
 WINDOW = 8
-# Of a single take: the share of its end that is held out, the gap before it, and the shortest such take.
+# Fractions of a single take: the end that is held out, the gap before it, and the shortest such take.
 END_SHARE, END_LEAST_S, END_GAP_S, ALONE_LEAST_S = 0.15, 3.0, 1.0, 10.0
 
 

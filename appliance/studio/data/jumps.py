@@ -18,7 +18,7 @@ SPAN_S = 1 / 30  # motions are compared over this time at any rate: a one-frame 
 LEAST_DEGREES, MOST_DEGREES, CALM_DEGREES, TIMES_SHARP = 30.0, 80.0, 20.0, 3.2
 FASTEST, FASTEST_S = 2200.0, 1 / 60  # degrees a second over this time: a fighter's wrist reaches 2020
 SEEN_DEGREES, SEEN_OF_HEIGHT = 12.0, 0.05  # bends; a twist that the arm hands to the wrist shows 8 and 0.04
-FAST = 0.3  # of a jump's fastest step: the steps beside it that belong to it
+FAST = 0.3  # fraction of a jump's fastest step: the steps next to it that belong to it
 
 
 Runs = list[tuple[int, int]]

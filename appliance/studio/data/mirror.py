@@ -1,8 +1,8 @@
 """The mirror image of a dance: which joints are counterparts, and whether the body is symmetric.
 
 A joint's turns are mirrored in its own axes. Where the zero pose is a figure, these are the room's for all
-joints. Where it is none, as in rigs whose bones lie along an axis of their joint, each joint's mirror is
-found from its bones: it must bring them onto those of the counterpart. A turn about a single bone, which that
+joints. If it is not, as in rigs whose bones follow an axis of their joint, each joint's mirror is found from
+its bones: it must bring them onto those of the counterpart. A turn about a single bone, which that
 leaves open, is found from the usual pose, which is as good as symmetric.
 """
 
@@ -22,7 +22,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
-UNEQUAL = 0.03  # of the body's span: tolerance between the two sides (a dancer's head sits 5 mm off)
+UNEQUAL = 0.03  # fraction of the body's span: tolerance between the two sides (a dancer's head sits 5 mm off)
 OPPOSITE_DEGREES = 120.0  # a joint usually this far from its counterpart's image has other axes
 NEAR_AXES_DEGREES = 25.0  # of the mean pose of a dance from a symmetric one
 _PRIOR = 1e-4  # how much the usual pose weighs against the bones
@@ -34,7 +34,7 @@ _ALONG_AXES = [
     for signs in product((1.0, -1.0), repeat=3)
     if np.linalg.det(np.eye(3)[list(order)] * signs) < 0
 ]
-SIDEWAYS = (0, 2)  # left and right lie along x or along z; a mirror on the floor would be none
+SIDEWAYS = (0, 2)  # left and right are along x or along z; a mirror on the floor would be invalid
 
 _WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R", "左": "右"}
 _OTHER = {**_WORDS, **{right: left for left, right in _WORDS.items()}}
@@ -108,7 +108,7 @@ class _Mirrors(NamedTuple):
 
 
 def _reflected(skeleton: Skeleton, poses: Array, pairs: NDArray[np.intp], mirrors: _Mirrors) -> Array:
-    """Orientations (..., J, 4) of the mirror image: the counterpart's, into and out of its own axes."""
+    """Orientations (..., J, 4) of the mirror image: the counterpart's, into and out of its axes."""
     above = np.stack([mirrors.joints[parent] if parent >= 0 else mirrors.room for parent in skeleton.parents])
     back, turn = (each.astype(poses.dtype) for each in (quaternion.inverse(above), mirrors.joints))
     shape = poses.shape
@@ -179,7 +179,7 @@ def _half_turn(axis: int) -> Array:
 
 
 def _unequal_m(skeleton: Skeleton, pairs: NDArray[np.intp], mirrors: _Mirrors, joint: int) -> float:
-    """Metres between the offset of a joint's counterpart and the image of its own; not of the root."""
+    """Metres between the offset of a joint's counterpart and its mirrored offset; not for the root."""
     image = -quaternion.rotate(mirrors.joints[skeleton.parents[joint]], skeleton.offsets[joint])
     return float(np.linalg.norm(image - skeleton.offsets[pairs[joint]]))
 

@@ -16,7 +16,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.catalogue import READ_FROM_FILES, Catalogue
 from appliance.studio.data.takes import FPS
 
-KEY = "recordings_read"  # of report.json
+KEY = "recordings_read"  # key of report.json
 SAME_BONE_M = 1e-4
 
 
@@ -28,7 +28,7 @@ class Remembered:
     skeleton: Skeleton | None = None
 
     def options_for(self, file: Path, asked: ReadingOptions) -> ReadingOptions:
-        """What was asked for, then what training was told.
+        """The options that were asked for, then those of the training.
 
         That does not hold for what Bunraku made (a phrase, a variation): it is in the stage's frame already.
         Raises OSError.
@@ -56,13 +56,13 @@ NOTHING = Remembered()
 
 
 def reading_facts(catalogue: Catalogue) -> dict[str, Any]:
-    """What a show keeps of how its recordings were read: only what was said, by pattern."""
+    """A show's record of how its recordings were read: only what was said, by pattern."""
     names = (*READ_FROM_FILES, "all_frames")
     return {name: value for name in names if (value := getattr(catalogue.reading, name))}
 
 
 def remembered_reading(network: Path) -> Remembered:
-    """Of a show folder, a network in one, or a checkpoint; nothing where none of them tells."""
+    """Read from a show folder, a network in one, or a checkpoint; nothing if none of them has it."""
     folder = network if network.is_dir() else network.parent
     if network.suffix.casefold() == ".pt":
         from appliance.studio.evaluation.coders import load_state

@@ -61,7 +61,7 @@ class Take:
         return runs(self.sound)
 
     def part(self, first: int, end: int) -> Take:
-        """Frames first to end - 1 as a take of its own."""
+        """Frames first to end - 1 as a separate take."""
         start_s, end_s = first / FPS, end / FPS
         errors = tuple(
             replace(one, start_s=max(one.start_s, start_s) - start_s, end_s=min(one.end_s, end_s) - start_s)

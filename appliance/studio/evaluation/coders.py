@@ -25,7 +25,7 @@ Poses = NDArray[np.float32]
 
 
 class MovedJoints(Protocol):
-    """What a network moves: joint names, and their rest pose (M, 4)."""
+    """The joints that a network moves: their names, and their rest pose (M, 4)."""
 
     @property
     def joints(self) -> tuple[str, ...]: ...

@@ -63,7 +63,7 @@ def comparison_table(found: dict[str, Any], joints: Sequence[str]) -> Table | No
 
 
 def comparison_sentences(found: dict[str, Any]) -> list[str]:
-    """What the distances between sets of dances are to be compared with, and the dance without a hand."""
+    """Reference values for the distances between sets of dances, and the dance without a hand."""
     lines = []
     ends = found.get("reference", {})
     for kind in ("kinetic", "geometric"):

@@ -161,7 +161,7 @@ def _hidden(
 
 
 def _gradients(layers: Sequence[Floats], rows: Floats, wanted: Floats, kept: Floats) -> list[Floats]:
-    """Of the binary cross-entropy, for weights and biases of each layer."""
+    """Gradient of the binary cross-entropy, for weights and biases of each layer."""
     once, twice, score = _hidden(layers, rows, kept)
     at_score = (1 / (1 + np.exp(-np.clip(score, -30, 30))) - wanted) / len(rows)
     at_twice = (at_score @ layers[4].T) * (twice > 0)

@@ -17,9 +17,9 @@ from appliance.studio.standing import measure_standing
 
 ROUGHNESS_PERCENTILE = DEPTH_PERCENTILE = 99.0
 ALONG_BONE = np.linspace(0.0, 1.0, 9)
-DEEP = 0.3  # of that radius below the surface: 3.5 cm
+DEEP = 0.3  # fraction of that radius below the surface: 3.5 cm
 TOUCHING_M = 0.03  # between the axes of two arms
-ALONG_ARM = (0.5, 0.75, 1.0)  # of the upper arm: its inner half begins in the trunk
+ALONG_ARM = (0.5, 0.75, 1.0)  # fraction of the upper arm: its inner half begins in the trunk
 
 
 def degrees_apart(a: Array, b: Array) -> Array:
@@ -100,7 +100,7 @@ class BodyFigures:
         return measure_standing(self._skeleton, poses, roots, self._floor, lifts).slide_cm_s / 100
 
     def soles(self, poses: Array, roots: Array) -> tuple[list[Array], list[Array]]:
-        """Of each foot its points (T, S, 3), metres, and their heights (T, S) above where they stand.
+        """For each foot its points (T, S, 3), metres, and their heights (T, S) above where they are planted.
 
         None without named feet. poses (T, J, 4) with roots (T, 3).
         """

@@ -1,4 +1,4 @@
-"""What a choreographer would see in a newly trained dancer, and what to do about it: a sentence each.
+"""A choreographer's view of a newly trained dancer, and what to do about it: a sentence each.
 
 The advice follows from the cause. A dancer that was hardly trained needs training whatever else is wrong with
 it; one that learned long enough needs recordings, or another liveliness.
@@ -29,7 +29,7 @@ SINGULAR = ("trunk", "held_limb")
 
 @dataclass(frozen=True)
 class Seen:
-    """What was measured; None or left out: it was not.
+    """The measurements; None or left out: not measured.
 
     error: degrees off the recordings after one pass without a hand. answer: degrees that a hand moves the
     others by. energy, spread: by limb (LIMBS; 'whole' for all that nobody holds), the phrase's own is 1.
@@ -53,7 +53,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Learned:
-    """What a dancer learned from. steps of training, None: unknown; minutes of dance in how many takes."""
+    """The training of a dancer: steps, None: unknown; minutes of dance in how many takes."""
 
     minutes: float
     takes: int
@@ -107,7 +107,7 @@ def _seen(seen: Seen) -> tuple[str, str]:
 
 
 def _reservations(seen: Seen) -> list[tuple[str, str]]:
-    """What is wrong with an answer, as cause and words, the worst first."""
+    """The faults of an answer, as cause and message, the worst first."""
     found = []
     if _above(seen.plausibility, PLAUSIBLE):
         found.append(("foreign", f"its poses are not the dancer's (plausibility {seen.plausibility:.2f})"))
@@ -137,7 +137,7 @@ def _reservations(seen: Seen) -> list[tuple[str, str]]:
 
 
 def _advice(cause: str, seen: Seen, learned: Learned) -> str:
-    """What to do, first about what is missing for learning, then about the cause."""
+    """The remedies, first for what is missing in the recordings, then for the cause."""
     still = cause in ("statue", "unlearned")
     rough = seen.error is None or seen.error > ROUGH or still
     if learned.steps is not None and learned.steps < FEW_STEPS and rough and cause != "good":

@@ -81,7 +81,7 @@ def load_takes(
 ) -> list[Take]:
     """Recordings as training reads them: at their true rate, T-pose dropped, capture errors masked, 50 Hz.
 
-    What reading says comes first, then what training was told, then a catalogue that lists the file.
+    Reading options come first, then those of the training, then a catalogue that lists the file.
     """
     takes = []
     for file in files:

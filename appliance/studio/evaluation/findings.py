@@ -1,4 +1,4 @@
-"""What was found in a folder of recordings, in sentences, before anything is learned from it."""
+"""Findings in a folder of recordings, in sentences, before training."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _kept_apart(dataset: Dataset) -> str:
 
 
 def few_data(dataset: Dataset) -> list[str]:
-    """What to expect of little dance, and how much would do; nothing where there is enough."""
+    """Expectations from little dance, and how much would be enough; nothing if there is enough."""
     seconds = sum(int(np.count_nonzero(take.sound)) for take in dataset.training) / FPS
     if seconds >= FEW_S:
         return []
@@ -96,7 +96,7 @@ def _body(dataset: Dataset) -> list[str]:
 
 
 def _notes(takes: Sequence[Take]) -> list[str]:
-    """What had to be done to files, and to how many."""
+    """Repairs made to files, and to how many."""
     files: dict[str, list[str]] = {}
     for take in takes:
         for note in take.notes:
@@ -118,7 +118,7 @@ def _rates(takes: Sequence[Take]) -> list[str]:
 
 
 def _masked(takes: Sequence[Take]) -> list[str]:
-    """How much, where and at which joints; how people see it and say that it is none."""
+    """How much, where and at which joints; how to recognise it and how to overrule it."""
     counts = {take.name: int(np.count_nonzero(~take.sound)) for take in takes}
     total, frames = sum(counts.values()), sum(len(take.sound) for take in takes)
     if not total:

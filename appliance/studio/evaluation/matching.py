@@ -96,7 +96,7 @@ class MotionMatching:
 
 
 class _Fade:
-    """What is left of a cut: the difference of each joint, which fades."""
+    """The remainder of a cut: the difference of each joint, which fades."""
 
     def __init__(self, joints: int) -> None:
         self._none = np.tile(quaternion.IDENTITY, (joints, 1))

@@ -1,4 +1,4 @@
-"""What a stretch of dance is like in few numbers, and how far two sets of stretches are apart.
+"""A stretch of dance in few numbers, and the distance between two sets of stretches.
 
 Kinetic features after Onuma et al. 2008 and geometric ones after Mueller et al. 2005, as AIST++ uses them
 (Li et al. 2021, features/kinetic.py and manual.py, from fairmotion), written anew: at the true rate (AIST++

@@ -72,7 +72,7 @@ def own_answer(
 
 
 def learned(dataset: Dataset, steps: int | None) -> Learned:
-    """What the verdict has to know of a training."""
+    """The training's facts for the verdict."""
     minutes = sum(take.recording.seconds for take in dataset.training) / 60
     return Learned(minutes, len({take.take for take in dataset.training}), steps)
 

@@ -69,7 +69,7 @@ class OwnTakes:
 
 
 def own_takes(dataset: Dataset) -> OwnTakes:
-    """What a training measures its own dancer on: held-out takes, else parts of one take.
+    """The dances on which a training measures its own dancer: held-out takes, else parts of one take.
 
     Raises StudioError if the recordings are too few or too short.
     """
@@ -109,7 +109,7 @@ def _on_thirds(take: Take) -> OwnTakes:
 
 
 def _longest_of_each(takes: Sequence[Take]) -> list[Take]:
-    """Of several recordings of a take the one with the most sound poses; the longest take first."""
+    """Among several recordings of a take the one with the most sound poses; the longest take first."""
     best: dict[str, Take] = {}
     for take in sorted(takes, key=lambda take: int(take.sound.sum()), reverse=True):
         best.setdefault(take.take, take)
@@ -117,7 +117,7 @@ def _longest_of_each(takes: Sequence[Take]) -> list[Take]:
 
 
 def _part(take: Take, number: int, parts: int) -> Take:
-    """Part `number` of `parts` equal parts of a take, as a take of its own."""
+    """Part `number` of `parts` equal parts of a take, as a separate take."""
     first, last = (len(take.recording) * k // parts for k in (number, number + 1))
     return replace(
         take,

@@ -17,7 +17,7 @@ from appliance.studio.evaluation.coders import Coder
 BACKDROP, PANEL, INK, FAINT = "#0f1015", "#191a21", "#efe6d8", "#9a948c"
 VERMILION, SLATE, IVORY = "#f54521", "#9eb3cc", "#edddc7"
 STRIP_S = 4.0
-COLUMNS = 9  # of a strip
+COLUMNS = 9  # in a strip
 CURVES = {
     "rotation": ("rotation (radians)", VERMILION),
     "pace": ("pace (radians a step)", "#e8a33d"),

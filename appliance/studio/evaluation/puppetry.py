@@ -26,7 +26,7 @@ IN_PLAY: Iterations = (10, 9)  # at which the onset and turning hands are measur
 FREE = (1, 10, 30, 100)
 TURNING_TICKS = 500  # two turns of the slow hand
 TURNING = tuple((axis, seconds) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1)) for seconds in (1.0, 5.0))
-LARGEST = ("largest_step", "snap")  # of several dances the maximum counts, not the mean
+LARGEST = ("largest_step", "snap")  # for several dances the maximum counts, not the mean
 
 
 def measure(

@@ -36,7 +36,7 @@ def judged(found: dict[str, Any], learned: Learned, error: float | None = None) 
 
 
 def seen(found: dict[str, Any], error: float | None = None) -> Seen:
-    """What puppetry.measure found, as the verdict reads it: means over the joints held."""
+    """The result of puppetry.measure for the verdict: means over the joints held."""
     named = [name for part, name in held_joints(joints_of(found)).items() if part in UPPER_ARMS]
     rows = [strongest(found[joint])[1] for joint in named or joints_of(found)]
     free: dict[str, dict[str, float | None]] = found.get("free", {})
@@ -101,7 +101,7 @@ def table(found: dict[str, Any]) -> Table:
 
 
 def sentences(found: dict[str, Any]) -> list[str]:
-    """What the figures mean, one sentence for each joint.
+    """The meaning of the figures, one sentence for each joint.
 
     Noise moves the others as an answer does, and a lifeless pose fits everything a little: therefore fit,
     plausibility and energy count too.
@@ -178,7 +178,7 @@ def degree(row: dict[str, Any]) -> int:
 
 
 def reservations(row: dict[str, Any]) -> list[str]:
-    """What is wrong with an answer: its poses are not the dancer's, or it has another energy.
+    """The fault of an answer: its poses are not the dancer's, or it has another energy.
 
     A network trained for one minute moved the others by 8.7 degrees at an energy of 1.05, with a fit below
     that of the bare phrase: only its plausibility (1.22) distinguished it from a dancer.

@@ -72,7 +72,9 @@ def write_up(
 
 
 def bounds(figures: Mapping[str, Any], random: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-    """What a dancer should have, with what this one has: for those who train, and no reason to refuse it."""
+    """Properties that a dancer should have, with those of this one: for the person who trains, and no reason
+    to refuse it.
+    """
     latent = figures["latent"]
     rows = {
         "degrees after one iteration": (figures["degrees"]["1"]["mean"], 0.0, 2.0),

@@ -19,7 +19,7 @@ from appliance.studio.evaluation.coders import Poses
 from appliance.studio.evaluation.nearest import Reference, without_heading
 from appliance.studio.experiments.families import NUDGE_DEGREES, TURNS_S, Trial
 
-PAUSE_SHARE = 0.3  # of the dance's own mean speed: below it a body nearly stands still
+PAUSE_SHARE = 0.3  # fraction of the dance's own mean speed: below it a body nearly stands still
 STANDS_STILL = 1e-3  # degrees in all
 OWN_POSE = 8.0  # degrees from a pose of the excerpt: nearly that pose
 NO_ANSWER = 0.02  # degrees for each degree of the hand: below it nothing answers
@@ -65,13 +65,14 @@ def intermittency(trial: Trial) -> dict[str, float]:
 
 
 def pauses(poses: Array) -> tuple[float, float]:
-    """Of poses (T, M, 4): share of ticks nearly still, and median length in ticks from one pause to the next.
+    """From poses (T, M, 4): share of ticks nearly still, and median length in ticks from one pause to the
+    next.
 
     The length is not a number where there are no two pauses.
     """
     is_pause = _pausing(poses)
     edges = np.flatnonzero(np.diff(is_pause.astype(np.int8)))
-    begins = edges[~is_pause[edges + 1]] + 1  # of jumps that follow a pause
+    begins = edges[~is_pause[edges + 1]] + 1  # starts of jumps that follow a pause
     ends = edges[is_pause[edges + 1]] + 1
     lengths = [int(ends[ends > begin][0] - begin) for begin in begins if (ends > begin).any()]
     return float(is_pause.mean()), float(np.median(lengths)) if lengths else float("nan")

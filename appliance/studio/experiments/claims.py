@@ -1,4 +1,4 @@
-"""What the paper found, (a) to (g): each with a measure, figures by excerpt, bounds, and whether it holds.
+"""The paper's findings, (a) to (g): each with a measure, figures by excerpt, bounds, and whether it holds.
 
 The paper's words give no numbers: the bounds say when a figure is taken to agree with them, and a margin by
 how much it does. Where a null network passes too, a verdict says nothing of what a network has learned.
@@ -23,7 +23,7 @@ RIGHTLY = (Copy.name, Paste.name)
 
 @dataclass(frozen=True)
 class Bound:
-    """What a figure has to be: at most or at least `limit`; words: 'degrees from the excerpt'."""
+    """The bound of a figure: at most or at least `limit`; words: 'degrees from the excerpt'."""
 
     figure: str
     words: str
@@ -240,7 +240,7 @@ def passed_by(claim: Claim, nulls: Mapping[str, Sequence[Claim]]) -> list[str]:
 
 
 def worth(claim: Claim, nulls: Mapping[str, Sequence[Claim]]) -> str:
-    """What a verdict on a claim says, in words, by the null networks that pass it."""
+    """The meaning of a verdict on a claim, in words, by the null networks that pass it."""
     passed = passed_by(claim, nulls)
     idle = [name for name in passed if name not in claim.rightly]
     if idle:

@@ -33,7 +33,7 @@ LEAD = WINDOW - 1  # frames around an excerpt: the first and last windows reach 
 
 @dataclass(frozen=True)
 class Measures:
-    """What an excerpt is chosen by: speeds in degrees a second, coordination -1 to 1."""
+    """The criteria for an excerpt: speeds in degrees a second, coordination -1 to 1."""
 
     whole: float
     torso: float
@@ -78,7 +78,7 @@ WHY = {
 
 
 def measured(poses: Array, regions: Regions) -> Measures:
-    """Of poses (T, M, 4) of the moving joints at 50 Hz, heading removed."""
+    """From poses (T, M, 4) of the moving joints at 50 Hz, heading removed."""
     speeds = np.degrees(quaternion.angle_between(poses[1:], poses[:-1])) * FPS
     arms, legs = (_smoothed(speeds[:, places].mean(axis=1)) for places in (regions.arms, regions.legs))
     return Measures(
@@ -162,7 +162,7 @@ _EXAMPLE = "Write a take and its start in seconds: still: {take: salsa_09, start
 
 
 class _Named(BaseModel):
-    """Of an excerpts file."""
+    """Entries of an excerpts file."""
 
     take: str
     start: float = Field(ge=0, allow_inf_nan=False)
@@ -180,7 +180,7 @@ def _candidates(take: Take, places: list[int], regions: Regions) -> list[_Candid
 
 
 def _criteria(known: Sequence[Measures]) -> dict[str, Callable[[Measures], float]]:
-    """Of each kind, in the order of choosing: what is least for the excerpt that shows it best."""
+    """For each kind, in the order of choosing: the least value for the excerpt that shows it best."""
     if not known:
         return {name: lambda one: one.whole for name in WHY}
     limbs = np.percentile([min(one.arms, one.legs) for one in known], 50)

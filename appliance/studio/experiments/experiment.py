@@ -41,7 +41,7 @@ TITLE = "Experiments with a puppet"
 
 @dataclass(frozen=True)
 class ExperimentOptions:
-    """What was asked for; None: what is usual."""
+    """The options that were given; None: the usual ones."""
 
     show: Path
     out: Path
@@ -198,7 +198,7 @@ def _null_claims(
     trace: Array,
     advance: Callable[[str], None],
 ) -> dict[str, list[Claim]]:
-    """What networks that know nothing make of the claims, by name; coder: whose joints and mean pose."""
+    """The claims on networks that know nothing, by name; coder: whose joints and mean pose."""
     found = {}
     for name, null in null_networks(coder.joints, coder.rest).items():
         advance(f"a network that knows nothing: {name}")

@@ -1,4 +1,4 @@
-"""The families of experiments: coding iterations alone, a joint kept, turned, led by a sensor, held still."""
+"""The families of experiments: only coding iterations, a joint kept, turned, led by a sensor, held still."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class Dance:
-    """What was danced, (T, M, 4) of the moving joints, beside the excerpt; the hand's orientations (T, 4)."""
+    """The dance, (T, M, 4) of the moving joints, next to the excerpt; the hand's orientations (T, 4)."""
 
     condition: Condition
     poses: Poses
@@ -109,7 +109,7 @@ class Trial:
         return {"coding": (), "kept": self.joints}.get(condition.family, (self.joint,))
 
     def rehearsal(self, condition: Condition) -> Rehearsal:
-        """What a condition was danced on."""
+        """The source that a condition was danced on."""
         return self.once if condition.family in ("coding", "kept") else self.looped
 
     def whole(self, dance: Dance) -> Recording:

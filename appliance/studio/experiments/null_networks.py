@@ -20,7 +20,7 @@ from appliance.show.network import WINDOW
 from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.evaluation.coders import Poses
 
-PULL = 0.3  # of the way to the mean pose in each pass
+PULL = 0.3  # fraction of the way to the mean pose in each pass
 LATENT = 32  # of the untrained network
 SPREAD_DEGREES = 20.0  # of its output about the mean pose: as far as a dancer's joints go
 

@@ -101,7 +101,7 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def _colour(cell: str) -> str:
-    """Of a verdict."""
+    """Symbol of a verdict."""
     return " class=yes" if cell.startswith("holds") else " class=no" if cell.startswith("does not") else ""
 
 

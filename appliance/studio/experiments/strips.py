@@ -44,7 +44,7 @@ FIGURES = (
 
 
 def strip_of_excerpts(path: Path, excerpts: Sequence[Excerpt]) -> tuple[Any, ...]:
-    """What draw_strips needs for the paper's Figure 2."""
+    """The input of draw_strips for the paper's Figure 2."""
     strips = [
         Strip(part.poses, part.roots, f"{one.name}: {one.take} from {one.first / FPS:.1f} s; {one.why}")
         for one in excerpts
@@ -54,7 +54,7 @@ def strip_of_excerpts(path: Path, excerpts: Sequence[Excerpt]) -> tuple[Any, ...
 
 
 def strips_of_trial(trial: Trial, folder: Path, network: str) -> list[tuple[Any, ...]]:
-    """What draw_strips needs for each of the FIGURES: the recording, and the conditions under it."""
+    """The input of draw_strips for each of the FIGURES: the recording, and the conditions under it."""
     skeleton = trial.excerpt.recording.skeleton
     wanted: list[tuple[Any, ...]] = []
     for number, (words, base, conditions) in enumerate(FIGURES, 1):

@@ -13,7 +13,7 @@ from appliance.studio.improviser.phrase import SEAM_S, STAGE_M, closed_loop, fau
 from appliance.studio.improviser.stretches import best_stretches
 
 LONGEST_S, SHORTEST_S = 60.0, 10.0
-CHOICE = 0.6  # of the longest stretch: the rest is room to choose in
+CHOICE = 0.6  # fraction of the longest stretch: the rest is room to choose in
 FINALISTS = 4
 COMPARED_S = 1200.0  # of recordings; comparing all poses with each other grows with the square
 _SPARE_S = 0.5

@@ -24,7 +24,7 @@ def export(
 
     Inputs: show.network.network_inputs, P of each; coding_iterations are at least 1. Liveliness, noise,
     places and place_weights are a coupled network's. Outputs: poses (P, T, M, 4) unit quaternions, latent
-    (P, Z) of the last pass. What it computes is Autoencoder.iterate, node for node.
+    (P, Z) of the last pass. It computes Autoencoder.iterate, node for node.
     Precision: float32, or dynamic
     int8 with u8 weights per channel. Joint names and sizes travel in the file's metadata.
 
@@ -185,7 +185,7 @@ def _bones(network: Coupled) -> str:
 
 
 def _last(graph: Graph, every: str, out: str | None = None) -> str:
-    """What each row's own last pass gave: (K, P, ..) -> (P, ..)."""
+    """The result of each row's own last pass: (K, P, ..) -> (P, ..)."""
     turned = graph.op("ReverseSequence", every, "coding_iterations", time_axis=0, batch_axis=1)
     return graph.op("Gather", turned, graph.constant("first", 0, np.int64), out=out, axis=0)
 

@@ -33,7 +33,7 @@ class Verdict:
 
     @property
     def precision(self) -> str:
-        """What ships."""
+        """The exported result."""
         return "int8" if self.passed else "fp32"
 
     def sentence(self) -> str:

@@ -109,7 +109,7 @@ class _Emitter:
         self._graph.op("MatMul", middled, self._constant("inward", scale.inward), out=f"{features}.inside")
 
     def encode(self) -> None:
-        """Moves.encode: the mean alone."""
+        """Moves.encode: only the mean."""
         graph, shape = self._graph, self._parts.shape
         relative = graph.op("Sub", "move_heard.inside", self._last("steps_heard.inside"))
         flat = graph.op("Reshape", relative, sizes_of(graph, -1, MOVE * shape.inside))

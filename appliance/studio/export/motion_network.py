@@ -97,7 +97,7 @@ def coder_nodes(graph: Graph, layers: Layers, autoencoder: Autoencoder) -> tuple
 
 
 def motion_facts(autoencoder: Autoencoder, joints: Sequence[str]) -> dict[str, str]:
-    """What the box must know of an autoencoder."""
+    """The box's facts about an autoencoder."""
     return {
         "kind": "motion",
         "joints": ",".join(joints),

@@ -15,7 +15,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import write_checksums
 
-PHRASE_DIGITS = 4  # of degrees and centimetres: below what any eye or projector resolves
+PHRASE_DIGITS = 4  # in degrees and centimetres: finer than any eye or projector resolves
 
 
 def write_skeleton(folder: Path, skeleton: Skeleton, still_pose: NDArray[np.floating]) -> Path:

@@ -47,7 +47,7 @@ FIRST_HANDS = ("left upper arm", "left forearm", "left hand", "right upper arm",
 
 @dataclass(frozen=True)
 class Request:
-    """What to make a show of. name '': the folder's; phrase None: the bundle's own, or an excerpt; hand: the
+    """The options for a show. name '': the folder's; phrase None: the bundle's own, or an excerpt; hand: the
     joint that the first sensor holds, None: the left upper arm.
     """
 

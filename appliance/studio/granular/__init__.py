@@ -1,1 +1,1 @@
-"""Granular Dance: motion out of the autoencoder's latents alone ('Puppeteering an AI', section 3.1)."""
+"""Granular Dance: motion from only the autoencoder's latents ('Puppeteering an AI', section 3.1)."""

@@ -41,7 +41,7 @@ from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
 
 Say = Callable[[str], None]
-PROMPT_S = 3.0  # of a recording, where the published improviser gets no prompt
+PROMPT_S = 3.0  # seconds of a recording, where the published improviser gets no prompt
 
 
 @dataclass(frozen=True)

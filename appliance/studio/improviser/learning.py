@@ -35,7 +35,7 @@ AnyTraining = ImproviserTraining | PoseMixturesTraining
 def training_for(
     settings: AnySettings, dataset: Dataset, puppet: Path | None, device: str, processes: Processes
 ) -> AnyTraining:
-    """Of `train --model improviser`; ours goes on in the latents of a puppet's checkpoint.
+    """Options of `train --model improviser`; ours continues in the latents of a puppet's checkpoint.
 
     Raises StudioError where that is missing, or moves other joints.
     """
@@ -67,7 +67,7 @@ def moves_training(
     settings: ImproviserSettings,
     processes: Processes = ALONE,
 ) -> ImproviserTraining:
-    """Of our improviser, on the steps of the training takes. Raises StudioError where all are too short."""
+    """The training of our improviser, on the training takes. Raises StudioError where all are too short."""
     rows = BEFORE + MOVE * settings.moves
     if not any(len(stretch) >= rows for stretch in steps):
         raise StudioError(

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from appliance.dancer.material.improvising import BEFORE, MOVE
 
-PLACE_WEIGHT = 3.0  # of the root's displacement in the loss, to a latent direction of the same variance
+PLACE_WEIGHT = 3.0  # weight of the root's displacement in the loss, relative to a latent direction
 
 
 @dataclass(frozen=True)

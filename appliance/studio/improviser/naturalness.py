@@ -37,7 +37,7 @@ class Seam:
     """The step from the last frame to the first, and the largest one in the half second around it."""
 
     closed: bool  # whether the box plays it as a closed loop
-    degrees: float  # of the joint that turns most
+    degrees: float  # speed of the joint that turns most
     around_degrees: float
     root_cm: float
     around_root_cm: float
@@ -45,7 +45,7 @@ class Seam:
 
 @dataclass(frozen=True)
 class Naturalness:
-    """Measures of a phrase, with those of the recordings where they mean little alone."""
+    """Measures of a phrase, with those of the recordings where one figure means little."""
 
     seconds: float
     pace: Pace

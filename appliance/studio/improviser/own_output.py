@@ -1,4 +1,4 @@
-"""What an improviser that draws pose by pose does on its own output: the report at the end of its training.
+"""Behaviour of a pose-by-pose improviser on its own output: the report at the end of its training.
 
 Such networks have two faults: at the training's temperature the dance trembles, with less of it the dance
 freezes. Both are measured as for every generated dance, beside the recordings' own figures.
@@ -27,7 +27,7 @@ from appliance.studio.improviser.pose_steps import pose_stretches
 
 TEMPERATURES = (1.0, 0.5, 0.0)  # as trained; calmer; the likeliest Gaussian's mean, as the published notebook
 DANCES, SECONDS = 4, 20.0
-COLUMNS = 8  # of the picture
+COLUMNS = 8  # in a picture
 
 
 @dataclass(frozen=True)

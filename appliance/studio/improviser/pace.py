@@ -12,14 +12,14 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.jumps import runs
 
-SLOW_SHARE = 0.25  # of the recordings' mean pace: a slower dancer is still
+SLOW_SHARE = 0.25  # fraction of the recordings' mean pace: a slower dancer is still
 TREMBLING_HZ = 8.0  # hardly any of a dancer's motion is faster than this
 SMOOTHING_S = 0.5
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How a motion moves. Speeds are those of all moving joints, degrees a second, their own turns alone."""
+    """How a motion moves. Speeds are those of all moving joints, degrees a second, only their own turns."""
 
     speed: float
     speed_p99: float
@@ -74,7 +74,7 @@ def mean_pace(paces: Sequence[Pace], weights: Sequence[int]) -> Pace:
 
 
 def mean_speed(parts: Sequence[Recording], moving: Sequence[int]) -> float:
-    """Of all moving joints in all recordings, degrees a second."""
+    """Mean speed of all moving joints in all recordings, degrees a second."""
     return float(
         np.concatenate([np.linalg.norm(joint_turning(p, moving), axis=-1).mean(1) for p in parts]).mean()
     )

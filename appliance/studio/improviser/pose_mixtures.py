@@ -86,7 +86,7 @@ class PoseImproviser:
     def dances(
         self, starts: Tensor, dataset: Dataset, seconds: float, temperature: float, seed: int
     ) -> list[Recording]:
-        """What it dances on its own output after each of the starts (B, T, features), from the origin on."""
+        """Its dance on its own output after each of the starts (B, T, features), from the origin on."""
         made = self.network.improvise(starts, round(seconds * FPS) + 1, temperature, seed)
         return [self._recording(one.numpy(), dataset) for one in made]
 

@@ -94,7 +94,7 @@ def continued(
 
 
 def _placed(made: Recording, prompt: Recording, first: int) -> Recording:
-    """Turned and moved to where the prompt stands at that frame."""
+    """Turned and moved to the prompt's place at that frame."""
     old, new = (
         (roots[0], roots[2], float(yaws(quaternion.heading(pose[0]))))
         for roots, pose in ((made.roots[0], made.poses[0]), (prompt.roots[first], prompt.poses[first]))

@@ -27,7 +27,7 @@ def read_line(file: Path) -> Array:
 
 
 def _of_csv(file: Path) -> Array:
-    """Lines 'x, y'; a first line of words is left out, and what stands behind a '#'."""
+    """Lines 'x, y'; a first line of words and anything after a '#' are ignored."""
     points: list[tuple[float, float]] = []
     for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
         cells = line.partition("#")[0].replace(";", ",").split(",")

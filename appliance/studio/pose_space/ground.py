@@ -19,7 +19,7 @@ from appliance.studio.pose_space.pose_model import training_poses
 
 EDGE = 1.0  # percent of the recorded poses that lie outside of the map on each side
 GRID = 9  # figures along the map's wider side
-NOBODY = 0.35  # of the map's spread: farther from all recorded poses nobody has been
+NOBODY = 0.35  # fraction of the map's spread: farther from all recorded poses nobody has been
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from appliance.studio.evaluation.pictures import BACKDROP, INK, new_figure, pane
 from appliance.studio.pose_space.projections import Projection
 
 DIM = "#6b6660"
-WIDTH = 12.0  # of the map, inches
+WIDTH = 12.0  # size of the map, inches
 COLOURS = ("#e2583e", "#4fb3bf", "#e8b04b", "#9b7fd1", "#7fbf6a", "#d97fa8")
 
 

@@ -24,7 +24,7 @@ from appliance.studio.progress import doing, shown
 from appliance.studio.standing_dance import excerpt_of, standing
 from appliance.studio.trained_on import open_model
 
-COLUMNS = 8  # of the strip
+COLUMNS = 8  # in a strip
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What maps a body to few numbers, side by side: PCA, the pose autoencoder, UMAP where it is installed.
+"""Maps from a body to few numbers, side by side: PCA, the pose autoencoder, UMAP if it is installed.
 
 'Beyond Imitation', Figures 2 and 3: each with the heading in the figure and without it. Only PCA and the
 autoencoder are continuous and lead back from the map to a pose.
@@ -41,7 +41,7 @@ class Projection:
 def projections(
     autoencoder: Autoencoder, recordings: Sequence[Recording], moving: Sequence[int], pose_map: PoseMap
 ) -> list[Projection]:
-    """Two numbers a pose by every method, of recordings at 50 Hz; the autoencoder's without heading alone."""
+    """Two numbers a pose by every method, for recordings at 50 Hz; the autoencoder's only without heading."""
     level = [figure_shapes(one, moving) for one in recordings]
     turned = [_shapes_with_heading(one, moving) for one in recordings]
     latents = [latents_of(autoencoder, one.poses[:, list(moving)])[0] for one in recordings]

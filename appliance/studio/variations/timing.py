@@ -33,7 +33,7 @@ class Difference:
 
 
 def difference(phrase: Array, variation: Array) -> Difference:
-    """Of poses (T, M, 4) each; the headings are removed, the longer one is cut."""
+    """From poses (T, M, 4) each; the headings are removed, the longer one is cut."""
     count = min(len(phrase), len(variation))
     reach = min(round(REACH_S * FPS), count - 1)
     costs = _costs(without_heading(phrase[:count]), without_heading(variation[:count]), reach)
@@ -50,7 +50,7 @@ def warping_path(costs: Array) -> list[tuple[int, int]]:
     """The cheapest way from the first tick of both to the last; costs (T, 2 * reach + 1): of tick t of one
     with tick t - reach, ..., t + reach of the other, infinite where there is none.
 
-    A step along one side alone costs as a step along both, so a detour pays only if it fits better.
+    A step along only one side costs as much as a step along both, so a detour pays only if it fits better.
     """
     count, width = costs.shape
     reach = width // 2

@@ -30,12 +30,12 @@ from appliance.studio.trained_on import open_model
 from appliance.studio.variations import variations
 from appliance.studio.variations.timing import difference
 
-COLUMNS = 8  # of the strip
+COLUMNS = 8  # in a strip
 
 
 @dataclass(frozen=True)
 class VaryOptions:
-    """The command line of bunraku vary. phrase: a BVH file; None: samples from the prior alone."""
+    """The command line of bunraku vary. phrase: a BVH file; None: only samples from the prior."""
 
     model: Path
     out: Path
@@ -55,8 +55,8 @@ class VaryOptions:
 
 @dataclass(frozen=True)
 class Figures:
-    """Of a variation: degrees from the phrase, after time warping, the share of timing, from the nearest
-    recorded pose; energy of the phrase's. Of a sample only what needs no phrase.
+    """For a variation: degrees from the phrase, after time warping, the share of timing, from the nearest
+    recorded pose; energy of the phrase's. For a sample only the figures that need no phrase.
     """
 
     nearest: float
