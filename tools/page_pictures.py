@@ -22,6 +22,7 @@ from playwright.sync_api import Browser, Page, TimeoutError, sync_playwright
 CHROMIUM = "/usr/bin/chromium-headless-shell"  # without the windows of a desktop
 PAGES = ("tonight", "dance", "sensors", "rehearsal", "picture", "prove", "happened", "box", "device")
 _FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+_CAPTIONS = {"dance": "#held", "rehearsal": "#figure-said"}  # they say when a frame is drawn
 _COLOURS = 64  # a third of the bytes, and nothing that is seen
 _WELL_WITHIN_MS = 20_000
 _FADED_MS, _PROVEN_WITHIN_MS = 4_000, 300_000
@@ -39,14 +40,14 @@ def take_pictures(
     taken = []
     tab = browser.new_page(viewport={"width": 390, "height": 844}, locale="en-GB")
     tab.goto(address)
-    tab.wait_for_selector("body[data-heard]")
+    tab.wait_for_selector("#figures dt", state="attached")
     _await_well(tab, well_within_ms)
     if pin:
         _prove(tab, pin)
     for page in PAGES:
         tab.click(f'[data-page="{page}"]')
-        if page in ("dance", "rehearsal"):
-            tab.wait_for_selector("body[data-tick]")
+        if page in _CAPTIONS:
+            tab.wait_for_selector(f'{_CAPTIONS[page]}:text-matches("Held|No hand")')  # a frame is drawn
         if page == "happened":
             tab.wait_for_selector("#happened-all:not([hidden])", timeout=_WELL_WITHIN_MS)
         if page == "box":
@@ -72,7 +73,7 @@ def _prove(tab: Page, pin: str) -> None:
     tab.click('[data-page="prove"]')
     tab.select_option("#prove-seconds", "6")
     tab.click("#prove-begin")
-    tab.wait_for_selector("body[data-proof]", timeout=_PROVEN_WITHIN_MS)
+    tab.wait_for_selector("#prove-document", timeout=_PROVEN_WITHIN_MS)
     tab.click('[data-page="tonight"]')
     tab.click("#go")
     _await_well(tab)

@@ -27,6 +27,51 @@ def press(tab: Tab, where: str) -> None:
     (tab.tap if is_phone else tab.click)(where)
 
 
+def await_box(tab: Tab) -> None:
+    """Wait until the page shows a word of the box."""
+    tab.wait_for_selector("#figures dt", state="attached")
+
+
+# Notes in `seen` what the page's own classes hear and draw: the page itself ships nothing for tests.
+_OBSERVED = """async () => {
+  const [{ Box }, { Dance }] = await Promise.all([import("/box.js"), import("/dance.js")]);
+  const seen = window.seen = { frames: 0, tick: 0, heard: 0, rings: null };
+  const { draw, take } = Dance.prototype;
+  Box.prototype.dispatchEvent = function (event) {
+    if (event.type === "value") seen.heard = this.value.time;
+    return EventTarget.prototype.dispatchEvent.call(this, event);
+  };
+  Dance.prototype.take = function (buffer) {
+    const before = this.frame;
+    take.call(this, buffer);
+    if (this.frame !== before) seen.frames++;
+  };
+  Dance.prototype.draw = function () {
+    draw.call(this);
+    const { frame, show } = this;
+    if (!frame || !show || frame.positions.length !== 3 * show.joints.length) return;
+    seen.tick = frame.tick;
+    seen.root = [...frame.positions.subarray(0, 3)];
+    seen.puppets = frame.figures.length;
+    seen.held = this.heldJoints().map((joint) => [show.joints[joint], frame.holds[joint]]);
+    seen.ghost = frame.source && show.offsets ? [...this.ghost(frame).positions] : null;
+    if (this.ring) seen.rings = this.joints.map((joint) => [show.joints[joint], ...this.ring(joint)]);
+  };
+}"""
+
+
+def observe(tab: Tab) -> None:
+    """From now on `seen` of the page has the newest frame that it drew, where its rings are, when it heard
+    from the box, and the number of frames that came. A reload ends it.
+    """
+    tab.evaluate(_OBSERVED)
+
+
+def sensor_card(name: str) -> str:
+    """The selector of a sensor's card."""
+    return f'#cards article:has(h3:text-is("{name}"))'
+
+
 def await_true(tab: Tab, script: str) -> None:
     """Playwright's own waiting compiles texts in the page, which the page's policy forbids."""
     wait_until(lambda: tab.evaluate(script), script)
@@ -46,7 +91,8 @@ def unlocked_tab(context: BrowserContext, page: Page, which: str) -> Tab:
     context.set_default_timeout(PATIENCE_MS)
     tab = context.new_page()
     tab.goto(page.origin)
-    tab.wait_for_selector("body[data-heard]")
+    await_box(tab)
+    observe(tab)
     unlock(tab, page)
     press(tab, f'[data-page="{which}"]')
     return tab

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
 from playwright.sync_api import Page as Tab
 
 from tests.bundles import write_show
-from tests.console.browser import PATIENCE_MS, PHONE
+from tests.console.browser import PATIENCE_MS, PHONE, await_box, observe
 from tests.console.page import CUES, Page, box_with_page, page_alone
 from tests.system.box import Box
 from tools.page_pictures import CHROMIUM
@@ -74,6 +74,7 @@ def tab(context: BrowserContext, venue: tuple[Box, Page]) -> Iterator[Tab]:
     errors: list[str] = []
     opened.on("pageerror", lambda error: errors.append(str(error)))
     opened.goto(venue[1].origin)
-    opened.wait_for_selector("body[data-heard]")
+    await_box(opened)
+    observe(opened)
     yield opened
     assert not errors

@@ -16,8 +16,10 @@ from tests.console.browser import (
     ON_BOTH,
     PATIENCE_MS,
     PHONE,
+    await_box,
     await_true,
     declared,
+    observe,
     press,
     unlock,
 )
@@ -50,7 +52,7 @@ def test_panic_asks_for_the_pin_once_and_is_then_done(tab: Tab, venue: tuple[Box
     expect(tab.locator("#panic")).to_have_attribute("aria-pressed", "false")
     assert not declared(box).panic
     tab.reload()
-    tab.wait_for_selector("body[data-heard]")
+    await_box(tab)
     press(tab, "#panic")
     wait_until(lambda: declared(box).panic, "the device was forgotten")
     press(tab, "#go")
@@ -95,7 +97,7 @@ def test_a_thumb_that_scrolls_over_panic_does_nothing(browser: Browser, venue: t
     context.set_default_timeout(PATIENCE_MS)
     tab = context.new_page()
     tab.goto(page.origin)
-    tab.wait_for_selector("body[data-heard]")
+    await_box(tab)
     unlock(tab, page)
     tab.tap('[data-page="tonight"]')
     place = tab.locator("#panic").bounding_box()
@@ -123,8 +125,8 @@ def test_a_page_s_process_that_hangs_is_killed_and_comes_back(tab: Tab, venue: t
     os.kill(process, signal.SIGSTOP)
     expect(tab.locator("#verdict")).to_contain_text("No word from the box")
     expect(tab.locator("#verdict")).not_to_contain_text("No word from the box")
-    heard = tab.evaluate("document.body.dataset.heard")
-    await_true(tab, f"Number(document.body.dataset.heard) > {heard}")
+    heard = tab.evaluate("seen.heard")
+    await_true(tab, f"seen.heard > {heard}")
 
 
 def test_after_the_phone_slept_the_page_is_back(browser: Browser, venue: tuple[Box, Page]) -> None:
@@ -133,13 +135,14 @@ def test_after_the_phone_slept_the_page_is_back(browser: Browser, venue: tuple[B
     context.set_default_timeout(PATIENCE_MS)
     tab = context.new_page()
     tab.goto(venue[1].origin)
-    tab.wait_for_selector("body[data-heard]")
+    await_box(tab)
+    observe(tab)
     sleep = context.new_cdp_session(tab)
     sleep.send("Page.setWebLifecycleState", {"state": "frozen"})
     time.sleep(6.0)
     sleep.send("Page.setWebLifecycleState", {"state": "active"})
     woken = time.time()
-    await_true(tab, f"Number(document.body.dataset.heard) > {woken}")
+    await_true(tab, f"seen.heard > {woken}")
     expect(tab.locator("#verdict")).not_to_contain_text("No word from the box")
     context.close()
 
@@ -152,7 +155,7 @@ def test_nothing_comes_from_elsewhere_and_little_comes_at_all(
     asked: list[str] = []
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(origin)
-    tab.wait_for_selector("body[data-ready]")
+    await_box(tab)
     assert asked and all(url.startswith(origin) for url in asked)
     transferred = tab.evaluate(
         "performance.getEntriesByType('resource').concat(performance.getEntriesByType('navigation'))"

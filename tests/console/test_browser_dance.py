@@ -31,26 +31,26 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     box, _ = venue
     reader = FrameReader(box.runtime)
     press(tab, '[data-page="dance"]')
-    await_true(tab, "Number(document.body.dataset.tick) > 0")
+    await_true(tab, "seen.tick > 0")
     expect(tab.locator("#held")).to_contain_text("Held:")
-    await_true(tab, "/^lShldr [01][.][0-9]{2}$/.test(document.body.dataset.held)")
-    assert tab.evaluate("document.body.dataset.puppets") == "2"
+    await_true(tab, "seen.held.length === 1 && seen.held[0][0] === 'lShldr' && seen.held[0][1] <= 1")
+    assert tab.evaluate("seen.puppets") == 2
     before = tab.locator("#stage").screenshot()
-    drawn = tab.evaluate("[document.body.dataset.tick, document.body.dataset.root]")
+    tick, root = tab.evaluate("[seen.tick, seen.root]")
     seen = {frame.tick: frame.root for frame in reader.frames(60, time.monotonic())}
-    assert np.allclose([float(part) for part in drawn[1].split()], seen[int(drawn[0])], atol=0.001)
-    await_true(tab, f"Number(document.body.dataset.tick) > {int(drawn[0]) + 20}")
+    assert np.allclose(root, seen[int(tick)], atol=0.001)
+    await_true(tab, f"seen.tick > {tick + 20}")
     assert tab.locator("#stage").screenshot() != before, "the figure moves"
     tab.locator("#show-dance").uncheck()
     expect(tab.locator("#held")).not_to_contain_text("No frame")
     tab.wait_for_timeout(700)  # what was on its way has come
-    count = tab.evaluate("document.body.dataset.frames")
+    count = tab.evaluate("seen.frames")
     tab.evaluate(PICTURES_COUNTED)
     tab.wait_for_timeout(1000)
-    assert tab.evaluate("document.body.dataset.frames") == count, "switched off, it costs nothing"
+    assert tab.evaluate("seen.frames") == count, "switched off, it costs nothing"
     assert tab.evaluate("pictures / (performance.now() - picturesFrom)") < 0.01, "it draws what it has drawn"
     tab.locator("#show-dance").check()
-    await_true(tab, f"Number(document.body.dataset.frames) > {count}")
+    await_true(tab, f"seen.frames > {count}")
     reader.close()
 
 
@@ -70,14 +70,14 @@ def test_the_phrase_stands_beside_the_puppet_as_it_is_without_hands(
 ) -> None:
     """In the phrase the left arm stays with the swaying chest; a hand holds the puppet's elsewhere."""
     press(tab, '[data-page="dance"]')
-    await_true(tab, "Number(document.body.dataset.tick) > 0")
-    assert not tab.evaluate("document.body.dataset.ghost"), "only if wished"
+    await_true(tab, "seen.tick > 0")
+    assert not tab.evaluate("seen.ghost"), "only if wished"
     tab.locator("#show-ghost").check()
-    await_true(tab, "Boolean(document.body.dataset.ghost)")
+    await_true(tab, "Boolean(seen.ghost)")
     swayed = set()
 
     def has_swayed() -> bool:
-        places = np.array(tab.evaluate("document.body.dataset.ghost").split(), float).reshape(-1, 3)
+        places = np.array(tab.evaluate("seen.ghost")).reshape(-1, 3)
         chest, shoulder, elbow = (places[FIGURE.index(name)] for name in ("Chest", "lShldr", "lForeArm"))
         collar, arm = shoulder - chest, elbow - shoulder
         cosine = collar @ arm / np.linalg.norm(collar) / np.linalg.norm(arm)
@@ -87,9 +87,9 @@ def test_the_phrase_stands_beside_the_puppet_as_it_is_without_hands(
         return len(swayed) >= 4
 
     wait_until(has_swayed, "the phrase does not move")
-    assert tab.evaluate("document.body.dataset.puppets") == "2"
+    assert tab.evaluate("seen.puppets") == 2
     tab.locator("#show-ghost").uncheck()
-    await_true(tab, "!document.body.dataset.ghost")
+    await_true(tab, "!seen.ghost")
 
 
 def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> None:
@@ -101,13 +101,10 @@ def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> Non
     tab.locator("#happened-second").fill("0")
     press(tab, "#happened-dance")
     expect(tab.locator("#again")).to_be_visible()
-    await_true(tab, "Boolean(document.body.dataset.tick)")
-    seen = {
-        tab.evaluate("[+document.body.dataset.tick, document.body.dataset.root].join(' ')") for _ in range(20)
-    }
+    await_true(tab, "seen.tick > 0")
+    seen = {tuple(tab.evaluate("[seen.tick, ...seen.root]")) for _ in range(20)}
     ticks = recorded(venue[0]).ticks
-    for one in seen:
-        tick, *root = map(float, one.split())
+    for tick, *root in seen:
         (row,) = ticks[ticks["tick"] == tick]
         positions, _ = recorded(venue[0]).skeleton.forward_kinematics(row["pose"], row["root"])
         np.testing.assert_allclose(root, positions[0], atol=2e-3)

@@ -51,13 +51,13 @@ def held(studio: Studio, joint: str = HELD) -> float:
 def opened(context: BrowserContext, studio: Studio) -> Tab:
     """The rehearsal on a device that gave the PIN, with its ring drawn."""
     tab = unlocked_tab(context, studio[1], "rehearsal")
-    tab.wait_for_selector("#figure[data-rings]")
+    await_true(tab, "Boolean(seen.rings)")
     return tab
 
 
 def ring(tab: Tab, joint: str = HELD) -> tuple[float, float]:
     """Where a joint's ring is, in pixels of the window."""
-    rings = {name: at for name, *at in json.loads(tab.get_attribute("#figure", "data-rings") or "[]")}
+    rings = {name: at for name, *at in tab.evaluate("seen.rings")}
     assert rings.keys() == {HELD, PLACED}, "the worn sensor's joint has no ring"
     x, y = rings[joint]
     box = tab.locator("#figure").bounding_box()

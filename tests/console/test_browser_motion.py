@@ -64,8 +64,9 @@ def test_variations_and_places_on_the_map(browser: Browser, studio: tuple[Box, P
         return any(one["name"] == "anna" for one in page.status()["phrases"])
 
     wait_until(is_kept, lambda: tab.inner_text("#said"))
-    press(tab, "#phrases >> text=Map")
-    tab.wait_for_selector('#map[data-figures="25"]')
+    with tab.expect_response("**/api/map") as ground_plan:
+        press(tab, "#phrases >> text=Map")
+    assert len(ground_plan.value.json()["figures"]) == 25
     ground = tab.locator("#map")
     ground.scroll_into_view_if_needed()
     size = ground.evaluate("one => one.clientWidth")

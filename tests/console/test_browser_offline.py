@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from tests.bundles import write_show
-from tests.console.browser import PATIENCE_MS, PHONE, await_true, press
+from tests.console.browser import PATIENCE_MS, PHONE, await_box, await_true, observe, press
 from tests.console.page import box_with_page
 from tests.system.namespace import Cable, Namespace, why_not
 from tools.page_pictures import CHROMIUM
@@ -37,15 +37,16 @@ def test_without_any_other_network_every_page_opens_and_the_figure_dances(tmp_pa
                 tab.on("request", lambda request: asked.append(request.url))
                 tab.on("websocket", lambda one: asked.append(one.url))
                 tab.goto(f"http:{own}")
-                tab.wait_for_selector("body[data-heard]")
+                await_box(tab)
+                observe(tab)
                 pages = tab.locator("[data-page]:visible")
                 names = [str(one.get_attribute("data-page")) for one in pages.all()]
                 assert len(names) >= 8
                 for name in (*names, "dance"):
                     press(tab, f'[data-page="{name}"]')
-                await_true(tab, "Number(document.body.dataset.tick) > 0")
-                tick = int(tab.evaluate("document.body.dataset.tick"))
-                await_true(tab, f"Number(document.body.dataset.tick) > {tick + 20}")
+                await_true(tab, "seen.tick > 0")
+                tick = int(tab.evaluate("seen.tick"))
+                await_true(tab, f"seen.tick > {tick + 20}")
                 chromium.close()
             assert {own in url for url in asked} == {True}, asked
             assert without_route() == before, "the box sent something that had no way out"

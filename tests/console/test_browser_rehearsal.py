@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Page as Tab
 from playwright.sync_api import expect
 
-from tests.console.browser import ON_A_LAPTOP, press, unlock
+from tests.console.browser import ON_A_LAPTOP, press, sensor_card, unlock
 from tests.console.page import Page
 from tests.system.box import Box
 from tests.system.processes import wait_until
@@ -17,10 +17,10 @@ pytestmark = pytest.mark.realtime
 def test_sensors_have_cards_and_take_their_neutral_pose(tab: Tab, venue: tuple[Box, Page]) -> None:
     unlock(tab, venue[1])
     press(tab, '[data-page="sensors"]')
-    card = tab.locator('article[data-sensor="left-wrist"]')
+    card = tab.locator(sensor_card("left-wrist"))
     expect(card).to_have_attribute("data-state", "linked")
     expect(card).to_contain_text("Battery")
-    press(tab, 'article[data-sensor="left-wrist"] >> text=Find')
+    press(tab, sensor_card("left-wrist") + " >> text=Find")
     expect(tab.locator("#said")).not_to_be_empty()
     expect(tab.locator("#said")).not_to_have_class("refused")
     press(tab, "#neutral-all")

@@ -11,7 +11,7 @@ from playwright.sync_api import Page as Tab
 
 from hw_sim.peers import free_ports
 from tests.bundles import write_show
-from tests.console.browser import PHONE, press, unlocked_tab
+from tests.console.browser import PHONE, press, sensor_card, unlocked_tab
 from tests.console.page import Page, page_alone
 from tests.system.bench import NETWORK, PASSWORD, Bench
 from tests.system.box import playing
@@ -35,7 +35,7 @@ def begin(tab: Tab, done: bool = True) -> str:
 
 
 def state(tab: Tab, name: str, wanted: str) -> None:
-    expect(tab.locator(f'article[data-sensor="{name}"]')).to_have_attribute("data-state", wanted)
+    expect(tab.locator(sensor_card(name))).to_have_attribute("data-state", wanted)
 
 
 def test_a_sensor_from_its_cable_to_its_end(browser: Browser, tmp_path: Path) -> None:
@@ -61,23 +61,23 @@ def test_a_sensor_from_its_cable_to_its_end(browser: Browser, tmp_path: Path) ->
         said = begin(tab)
         assert "The running box took it" in said and PASSWORD not in said
         state(tab, "right-wrist", "linked")
-        press(tab, 'article[data-sensor="right-wrist"] >> text=Rename')
+        press(tab, sensor_card("right-wrist") + " >> text=Rename")
         tab.fill("#change-name", "spare")
         assert "right-wrist is now spare" in begin(tab)
         state(tab, "spare", "linked")
-        press(tab, 'article[data-sensor="spare"] >> text=Replace')  # by the sensor that the show wears
+        press(tab, sensor_card("spare") + " >> text=Replace")  # by the sensor that the show wears
         expect(tab.locator("#change-spare option")).to_have_text("left-wrist (worn in this show)")
         expect(tab.locator("#change-anyway-words")).to_contain_text("left-wrist is a sensor of this show")
         expect(tab.locator("#change-send")).to_be_disabled()
         press(tab, "#change-cancel")
-        press(tab, 'article[data-sensor="left-wrist"] >> text=Replace')
+        press(tab, sensor_card("left-wrist") + " >> text=Replace")
         expect(tab.locator("#change-anyway-part")).to_be_hidden()
         assert "left-wrist is now the sensor that was spare" in begin(tab)
         state(tab, "left-wrist", "linked")
-        press(tab, 'article[data-sensor="spare"] >> text=Revoke')
+        press(tab, sensor_card("spare") + " >> text=Revoke")
         assert "spare is revoked" in begin(tab)
-        expect(tab.locator('article[data-sensor="spare"]')).to_have_count(0)
-        press(tab, 'article[data-sensor="left-wrist"] >> text=Revoke')
+        expect(tab.locator(sensor_card("spare"))).to_have_count(0)
+        press(tab, sensor_card("left-wrist") + " >> text=Revoke")
         expect(tab.locator("#change-send")).to_be_disabled()
         press(tab, "#change-anyway")
         assert "left-wrist is revoked" in begin(tab)

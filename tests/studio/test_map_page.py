@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, expect, sync_playwright
 
 from tests.studio.conftest import bunraku
 from tools.page_pictures import CHROMIUM
@@ -42,7 +42,7 @@ def page(pose_checkpoint: Path, recordings: Path, tmp_path_factory: pytest.TempP
             "request", lambda request: None if request.url.startswith("file:") else errors.append(request.url)
         )
         tab.goto((out / "map.html").as_uri())
-        tab.wait_for_selector("body[data-step]")
+        expect(tab.locator("#clock")).not_to_be_empty()
         tab.click("#play")  # pauses
         yield tab
         chromium.close()
@@ -78,13 +78,13 @@ def test_it_turns_with_the_mouse_and_comes_nearer_with_the_wheel(page: Page, can
 
 def test_the_moment_is_chosen_and_the_distance_there_is_told(page: Page) -> None:
     page.fill("#time", "25")
-    page.wait_for_selector("body[data-step='25']")
+    expect(page.locator("#clock")).to_contain_text("1.0 s")
     text = page.locator("#clock").inner_text()
     source = page.evaluate("JSON.stringify(data.dances.map((dance) => dance.path[25]))")
     one, other = np.array(json.loads(source))
     assert text == f"1.0 s, {np.linalg.norm(one - other):.2f} apart"
     page.select_option("#which", "1")
-    page.wait_for_selector("body[data-step='0']")
+    expect(page.locator("#clock")).to_contain_text("0.0 s")
     assert page.evaluate(COUNT, ["figure", SECOND]) > 50
 
 

@@ -62,7 +62,6 @@ export class Dance {
     });
     this.frame = { tick: head.getFloat64(0, true), figures, source, ...figures[0] }; // fingers and words are the first one's
     this.takenAt = performance.now();
-    document.body.dataset.frames = String(Number(document.body.dataset.frames ?? 0) + 1);
     this.redraw();
   }
 
@@ -122,7 +121,7 @@ export class Dance {
       this.tell(this.words(this.box.framesWanted ? "no_dance" : "dance_off"));
       return;
     }
-    const root = pointOf(frame, 0), roots = frame.figures.map((figure) => pointOf(figure, 0));
+    const roots = frame.figures.map((figure) => pointOf(figure, 0));
     const ghost = frame.source && show.offsets ? this.ghost(frame) : null;
     if (ghost) roots.push(pointOf(ghost, 0));
     const middle = [0, 2].map((axis) => roots.reduce((sum, one) => sum + one[axis], 0) / roots.length);
@@ -148,11 +147,6 @@ export class Dance {
     for (const figure of frame.figures) {
       for (const joint of this.heldJoints(figure)) this.drawRing(ink, eye(pointOf(figure, joint)), ratio, figure.holds[joint]);
     }
-    document.body.dataset.ghost = ghost ? Array.from(ghost.positions, (value) => value.toFixed(3)).join(" ") : "";
-    document.body.dataset.puppets = String(frame.figures.length);
-    document.body.dataset.held = this.heldJoints().map((joint) => `${show.joints[joint]} ${frame.holds[joint].toFixed(2)}`).join(", ");
-    document.body.dataset.tick = String(frame.tick);
-    document.body.dataset.root = Array.from(root, (value) => value.toFixed(3)).join(" ");
     const isOld = performance.now() - this.takenAt > 1500;
     const names = this.heldJoints().map((joint) => show.joints[joint]);
     this.tell(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.join(", ") }) : this.words("free"));

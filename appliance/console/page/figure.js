@@ -204,6 +204,5 @@ export class Figure extends Dance {
       ink.stroke();
     }
     for (const { joint, at } of this.taken.values()) this.drawString(ink, this.ring(joint), at, ratio);
-    this.canvas.dataset.rings = JSON.stringify(this.joints.map((joint) => [this.show.joints[joint], ...this.ring(joint).map(Math.round)]));
   }
 }

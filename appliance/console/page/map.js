@@ -103,8 +103,6 @@ function draw() {
     ink.arc(...line.at(-1), 9 * ratio, 0, 7);
     ink.fill();
   }
-  canvas.dataset.points = String(points.length);
-  canvas.dataset.figures = ground?.figures.length ?? 0;
 }
 
 function stroke(ink, line, colour, width) {

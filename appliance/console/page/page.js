@@ -168,10 +168,8 @@ box.addEventListener("value", () => {
   showClock(box.value);
   showRehearsal(box.value, dance.show);
   dance.follow(box.value);
-  document.body.dataset.heard = box.value.time;
 });
 box.addEventListener("value", verdict);
 box.addEventListener("beat", verdict);
 show(location.hash.slice(1) || "tonight");
 verdict();
-document.body.dataset.ready = "yes";

@@ -93,7 +93,6 @@ function drawLive() {
   context.fillRect(0, 0, canvas.width, canvas.height);
   const room = 12 * scale;
   drawPlots(context, { x: room, y: room, width: canvas.width - 2 * room, height: canvas.height - room }, measured, DARK, 13 * scale);
-  document.body.dataset.readings = measured.at.length;
 }
 
 async function over() {
@@ -105,7 +104,6 @@ async function over() {
 }
 
 function running(wanted) {
-  document.body.dataset.proving = wanted ? wanted.kind : "";
   byId("prove-live").hidden = wanted?.kind !== "latency";
   for (const id of ["prove-begin", "prove-doctor", "prove-seconds"]) byId(id).disabled = wanted !== null;
   byId("prove-end").hidden = wanted === null;
@@ -137,7 +135,6 @@ async function open(id) {
   byId("prove-json").href = `/api/prove/${id}`;
   byId("prove-json").download = `bunraku-${proof.kind}-${id}.json`;
   byId("prove-verdict").scrollIntoView({ block: "center" });
-  document.body.dataset.proof = id;
   return undefined;
 }
 

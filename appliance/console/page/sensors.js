@@ -20,7 +20,6 @@ export function showSensors(parent, value, words) {
     }
     fill(cards.get(sensor.name), sensor, words);
   }
-  parent.dataset.empty = names.length === 0;
   parent.title = names.length ? "" : words("no_sensors");
 }
 
@@ -47,7 +46,6 @@ function made(name, words) {
 
 function fill(card, sensor, words) {
   card.root.dataset.state = sensor.state;
-  card.root.dataset.sensor = sensor.name;
   const ago = !sensor.heard && sensor.age_s >= 0 ? ` ${words("heard_before", { time: duration(sensor.age_s) })}` : "";
   card.state.textContent = words(`sensor_${sensor.state}`) + ago;
   card.complaint.textContent = sensor.complaint;
