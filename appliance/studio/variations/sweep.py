@@ -1,5 +1,4 @@
-"""The effect of noise of each strength on recorded dance: the report at the end of a sequence model's
-training.
+"""The effect of noise of each strength on recorded dance: reported after training a sequence model.
 
 'Beyond Imitation' reads it so: below 0.5 sigma subtle, 1 to 2 inventive with an element kept, 3 to 4 anything
 from stillness to a body torn apart.
