@@ -1,4 +1,4 @@
-"""The motion critic: distinguishes a third of a second of held dance, as an audience sees it, from the dancer.
+"""The motion critic: distinguishes a third of a second of held dance, as seen by an audience, from the real.
 
 A loss by distance between windows cannot say whether a dance lives: it is met by the mean. The critic sees
 blended motion, as it leaves the box: poses, speeds and accelerations of all joints, which joints are held,
