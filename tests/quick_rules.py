@@ -18,6 +18,7 @@ import pytest
 
 LONGEST_SLEEP_S = 0.1
 PROGRAMS = {"bash", "sh", "git", "make", "true", "false", "cat", "sleep", "sha256sum"}  # besides .venv/bin
+PROGRAMS |= {"ldconfig", "ld", "gcc", "cc"}  # ctypes.util.find_library asks them, and does without
 _broken: list[str] = []
 
 
