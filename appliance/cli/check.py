@@ -15,6 +15,7 @@ from appliance.dancer.material.maker import open_network
 from appliance.dancer.material.map_reach import MapReach
 from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
 from appliance.dancer.phrase_cache import PhraseCache
+from appliance.levers.sources import MAIN, PATH
 from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
@@ -31,7 +32,6 @@ from appliance.show.check import not_as_packed, verify_bundle
 from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
 from appliance.show.show import Show, load_show
-from appliance.show.sources import MAIN, PATH
 from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.admission import Admission
 from appliance.stage.open_sensors import reach

@@ -17,8 +17,8 @@ from appliance.dancer.reading_head import Reader, ReadingHead
 from appliance.dancer.repertoire import Made, Repertoire
 from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.dancer.stream import Stream
+from appliance.levers.sources import MAIN
 from appliance.pose.recording import Recording
-from appliance.show.sources import MAIN
 
 MAX_RATE = 4.0
 RATE_CHANGE_PER_TICK = 0.08  # from standing to full speed in a quarter of a second

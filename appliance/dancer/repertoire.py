@@ -13,9 +13,9 @@ from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
 from appliance.dancer.phrase import FPS, NUMBER, SHARED, Phrase, PhraseError
 from appliance.dancer.reading_head import ReadingHead
+from appliance.levers.sources import GRANULAR, IMPROVISE, MAIN, PATH
 from appliance.pose.recording import Recording
 from appliance.show.config_error import did_you_mean
-from appliance.show.sources import GRANULAR, IMPROVISE, MAIN, PATH
 
 FIRST_MADE = 1000  # numbers of loops that were made ahead; phrases have lower ones
 _MADE_KEPT = 6  # the newest ones: a crossfade and the window know four at most

@@ -14,7 +14,8 @@ from typing import Any
 from appliance.box.fallback import Fallbacks
 from appliance.box.made_motion import FOLDER, KeptNamesWriter, MadeMotion, MadeMotionWriter
 from appliance.box.mounts import disk_of
-from appliance.box.show_state import ShowState, ShowStateReader
+from appliance.box.orders import Order
+from appliance.box.show_state import ShowStateReader
 from appliance.dancer.grounding import GroundingError
 from appliance.dancer.loop import Loop
 from appliance.dancer.material.maker import Maker
@@ -34,12 +35,12 @@ from appliance.generator.fallback import NOT_KEPT, NOT_MADE
 from appliance.generator.kept_motions import KeptMotions
 from appliance.generator.pointing import Pointing
 from appliance.generator.request import AGAIN, Request, Requests
+from appliance.levers.show_state import ShowState
+from appliance.levers.sources import IMPROVISE, KEPT, MAIN
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.bvh import BvhError
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
-from appliance.show.sources import IMPROVISE, KEPT, MAIN
-from appliance.show_control.orders import Order
 
 _TAKEN_S = 5.0  # what is to be danced at once and is not taken over until then is made again
 _REST_S = 0.2  # from one motion to the next, at least

@@ -8,10 +8,10 @@ import numpy as np
 
 from appliance.dancer.material.motion_network import MotionNetwork
 from appliance.dancer.phrase_cache import PhraseCache
+from appliance.levers.sources import MAIN, PATH
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.show.show import Show
-from appliance.show.sources import MAIN, PATH
 
 ACROSS = 5  # figures
 EVERY_S = 0.2  # between two places of the path

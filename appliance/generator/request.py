@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from appliance.box.show_state import MOTION, Part, ShowState
+from appliance.levers.show_state import Part, ShowState, parts_of
+from appliance.levers.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, PATH, POINTS
+from appliance.levers.table import MOTION
 from appliance.show.show import ShowConfig
-from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, PATH, POINTS
 
 STEP_S = 1.5  # seconds of a fade: each step is a separate motion, blended into the one before
 AGAIN = 1000  # seed step per `again`; each return adds one
@@ -52,7 +53,7 @@ class Requests:
         kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the first puppet waits for
         while nothing is declared, after a power cut. pointed: x, y of the map at which a hand points.
         """
-        dance: Mapping[str, Part] = state.dance if state.show == self._config.name else {}
+        dance: Mapping[str, Part] = parts_of(state) if state.show == self._config.name else {}
         if puppet:
             name = self._config.puppets[puppet].phrase or ""
         else:
@@ -65,20 +66,20 @@ class Requests:
         for parameter, about in PARAMETERS[name].items():
             value = self._value(dance, name, parameter, now)
             recipe[parameter] = int(value) if about.is_whole else round(value, _DIGITS)
-        recipe["seed"] += AGAIN * int(dance.get(f"{MOTION}again", (0, "", (0.0,)))[2][0]) + APART * puppet
+        recipe["seed"] += AGAIN * int(dance.get(f"{MOTION} again", (0, "", (0.0,)))[2][0]) + APART * puppet
         if name == GRANULAR:
             section = self._sections[name]
             recipe |= {"from": getattr(section, "from_", None), "to": getattr(section, "to", None)}
         elif name != IMPROVISE:
             recipe["phrase"] = base
-        points = pointed or dance.get(f"{MOTION}{PATH} {POINTS}", (0, "", ()))[2]
+        points = pointed or dance.get(f"{MOTION} {PATH} {POINTS}", (0, "", ()))[2]
         if name == PATH and points:
             recipe["points"] = [round(value, 3) for value in points]
         return Request(name, recipe)
 
     def _value(self, dance: Mapping[str, Part], source: str, parameter: str, now: float) -> float:
         """A parameter at this moment; a fade goes in steps."""
-        key = f"{MOTION}{source} {parameter}"
+        key = f"{MOTION} {source} {parameter}"
         own = float(getattr(self._sections[source], parameter))
         number, _, values = dance.get(key, (0, "", ()))
         if not values:

@@ -12,6 +12,7 @@ from pathlib import Path
 from appliance.box.fallback import Fallbacks
 from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
+from appliance.box.orders import OrderInbox
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.realtime import give_way
 from appliance.box.runtime_folder import Claim, runtime_folder
@@ -24,7 +25,6 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
-from appliance.show_control.orders import OrderInbox
 
 _LOOK_S = 0.05
 _NICE = 10

@@ -6,12 +6,12 @@ import contextlib
 from pathlib import Path
 
 from appliance.box.live_rig import LiveRigWriter
-from appliance.box.show_state import ShowState
+from appliance.box.orders import Order, OrderInbox
+from appliance.levers.show_state import ShowState
 from appliance.lights.beams import Beam, beams_of
 from appliance.lights.patch import Patch, Values
 from appliance.lights.walk import Walking, introduction, steps
 from appliance.show.config_error import did_you_mean
-from appliance.show_control.orders import Order, OrderInbox
 
 EVERY_S = 0.2
 STEP_S = 3.0

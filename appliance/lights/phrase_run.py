@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import LIGHTS
 from appliance.lights.patch import Patch, Values
 from appliance.lights.rig import Rig
 from appliance.outputs.frame_reader import SeenFrame
@@ -37,11 +38,12 @@ def passes(
     step_s = step / phrase.fps
     rig = Rig(config, patch, phrase.skeleton, 1.0 / step_s)
     rig.safety = 0.0
+    in_force = ShowState().to(LIGHTS, mapping).to(LIGHTS, mapping)
     settling = round(_SETTLING_S / step_s)
     places = np.concatenate([np.full(settling, start), np.arange(start, end, step)])
     for tick, place in enumerate(places):
         frame = _frame(phrase, int(place), tick, step_s)
-        rig.render(frame, 1, ShowState(lights=mapping, lights_before=mapping), frame.frame_time)
+        rig.render(frame, 1, in_force, frame.frame_time)
         if tick >= settling:
             yield Pass(float(place / phrase.fps), frame.positions.astype(float), rig.values)
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from appliance.box.pace import Pace
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import LIGHTS
 from appliance.lights.colour import mixed
 from appliance.lights.dance import Dance
 from appliance.lights.head import LONGEST_STEP_S
@@ -129,17 +130,18 @@ class Rig:
 
     def _call(self, show_state: ShowState) -> None:
         """Lay the mapping that show control called over those that still fade."""
-        called = (show_state.lights, show_state.lights_since)
+        lights = show_state[LIGHTS]
+        called = (lights.value, lights.since)
         if called == self._called:
             return
         before, self._called = self._called, called
         if before is None:
-            self._layers = [_Layer(self._mapping(show_state.lights_before), -np.inf, 0.0)]
-        mapping = self._mapping(show_state.lights)
+            self._layers = [_Layer(self._mapping(lights.before), -np.inf, 0.0)]
+        mapping = self._mapping(lights.value)
         if mapping is self._layers[-1].mapping:
             return
         mapping.restart()
-        self._layers.append(_Layer(mapping, show_state.lights_since, show_state.lights_fade_s))
+        self._layers.append(_Layer(mapping, lights.since, lights.seconds))
         self._layers = self._layers[-MOST_LAYERS:]
 
     def _mapping(self, name: str) -> Mapping:

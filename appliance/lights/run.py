@@ -12,6 +12,7 @@ from pathlib import Path
 from appliance.box.fallback import Fallbacks
 from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
+from appliance.box.orders import OrderInbox
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
@@ -31,7 +32,6 @@ from appliance.show.config_error import ConfigError, Problem
 from appliance.show.lights import LightsConfig
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import at_venue, misplaced, unwired
-from appliance.show_control.orders import OrderInbox
 
 _REPORT_S = 1.0
 _POLL_S = 0.1  # how often the stage is looked for

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from appliance.box.orders import Order
 from appliance.projector.alignment import MOST_BRIGHT, Alignment
 from appliance.projector.corners import WHOLE, Corners, Point, complaint
-from appliance.show_control.orders import Order
 
 _CORNER_NAMES = ("top left", "top right", "bottom right", "bottom left")
 

@@ -13,6 +13,7 @@ import moderngl
 import numpy as np
 
 from appliance.box.show_state import ShowStateReader
+from appliance.levers.table import CAMERA, LOOK
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
 from appliance.pose.skeleton import Skeleton
@@ -118,12 +119,13 @@ class Projector:
         detail = self._detail if share == 1.0 else DETAILS[0]
         wall = self._final.wall(screen, display, self._controls, level, size, lines, detail)
         if self._painter is not None and moment is not None and is_drawn:
-            mix = show_state.look_mix(now)
-            cued = CuedCamera(show_state.camera_before, show_state.camera, show_state.camera_mix(now))
-            self._painter.draw(moment, show_state.look, show_state.look_before, mix, wall, cued)
+            look, camera = show_state[LOOK], show_state[CAMERA]
+            mix = look.share(now)
+            cued = CuedCamera(camera.before, camera.value, camera.share(now))
+            self._painter.draw(moment, look.value, look.before, mix, wall, cued)
             if self._cards is not None:
                 self._cards.draw(wall, show_state, now)
-            self.shown = show_state.look if mix in (0.0, 1.0) else None
+            self.shown = look.value if mix in (0.0, 1.0) else None
         show_state = self._show_state.read()  # again: this picture already shows a panic that came meanwhile
         if show_state.panic or show_state.blackout:
             self._final.black(screen, display)

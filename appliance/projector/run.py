@@ -13,10 +13,12 @@ import moderngl
 
 from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
+from appliance.box.orders import OrderInbox
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import AlreadyHereError, Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
 from appliance.box.watchdog import Patience, guarded
+from appliance.levers.table import LOOK
 from appliance.outputs.frame_reader import FrameReader
 from appliance.projector.alignment import AlignmentFile, alignment_folder
 from appliance.projector.context import GlContext
@@ -41,7 +43,6 @@ from appliance.projector.stream.keying import keyed
 from appliance.projector.watchdog import PATIENCE_S, give_up
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
-from appliance.show_control.orders import OrderInbox
 
 _ORDERS_A_PICTURE = 8
 _REPORT_S = 1.0
@@ -246,7 +247,7 @@ class Run:
             f"{figures.rate:.1f} pictures/s",
             f"frame age {age}",
             f"stage {state}",
-            f"look {self._show_state.read().look or 'of the show'}",
+            f"look {self._show_state.read()[LOOK].value or 'of the show'}",
             f"{width}x{height}{drawn_at} {'software' if self.context.is_software else self._window.driver}",
             *(self._options.card() if self._controls.shows_info else ()),
         )

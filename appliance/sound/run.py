@@ -16,8 +16,11 @@ from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.realtime import share_the_interpreter
 from appliance.box.runtime_folder import Claim, runtime_folder
-from appliance.box.show_state import ShowState, ShowStateReader, part_of_fade
+from appliance.box.show_state import ShowStateReader
 from appliance.box.stop_signals import stop_signals
+from appliance.levers.fade import part_of_fade
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import STRINGS
 from appliance.outputs.frame_reader import FrameReader
 from appliance.show.asked_for import no_sound
 from appliance.show.box import BoxConfig, load_box
@@ -102,7 +105,7 @@ class Sound:
         self._fallbacks.set(STAGE_UNSEEN.name, age_s >= LOST_S)
         state = self._show_state.read()
         entered = self._entrance.share(state.cue, self._strings.cues, self._fades, now)
-        loud = state.level(now) * state.strings_level(now) * entered
+        loud = state.level(now) * state[STRINGS].level(now) * entered
         self.instrument.level = loud * min(max(1.0 - (age_s - LOST_S) / FADE_S, 0.0), 1.0)
 
     def render(self, frames: int, show_state: ShowState) -> NDArray[np.float32]:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import LIGHTS
 from appliance.lights.patch import Patch
 from appliance.lights.rig import Rig
 from appliance.outputs.frame_reader import SeenFrame
@@ -52,7 +53,7 @@ def test_pass(measured: Callable[..., Any], fading: bool, request: pytest.Fixtur
     config = LightsConfig.model_validate(values)
     rig = Rig(config, Patch(config.fixtures, None), skeleton)
     rig.safety = 0.0
-    show_state = ShowState(lights="other", lights_before="one", lights_fade_s=1e9) if fading else ShowState()
+    show_state = ShowState().to(LIGHTS, "one").to(LIGHTS, "other", 0.0, 1e9) if fading else ShowState()
     frames = itertools.cycle(range(200))
     dance = [_frame(skeleton, number) for number in range(200)]
     clock = itertools.count()

@@ -6,13 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.show_state import (
-    FILE,
-    ShowState,
-    ShowStateReader,
-    ShowStateWriter,
-    forget_show_state,
-)
+from appliance.box.show_state import FILE, ShowStateReader, ShowStateWriter, forget_show_state
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import CUE, LIGHTS, LOOK
 
 
 def test_readers_see_what_was_written_and_the_defaults_before(tmp_path: Path) -> None:
@@ -20,8 +16,8 @@ def test_readers_see_what_was_written_and_the_defaults_before(tmp_path: Path) ->
     assert reader.read() == ShowState()
     writer = ShowStateWriter(tmp_path)
     assert reader.read() == ShowState()
-    writer.write(ShowState(panic=True, look="Bütö ink"))
-    assert reader.read() == ShowState(panic=True, look="Bütö ink")
+    writer.write(ShowState(panic=True).to(LOOK, "Bütö ink"))
+    assert reader.read() == ShowState(panic=True).to(LOOK, "Bütö ink")
     assert reader.read() is reader.read()
     writer.close()
     reader.close()
@@ -84,6 +80,8 @@ def test_a_new_file_lifts_no_panic_before_anything_is_written_in_it(tmp_path: Pa
 
 def test_the_longest_names_of_a_show_fit(tmp_path: Path) -> None:
     name = "\N{PERFORMING ARTS}" * 64
-    show_state = ShowState(True, look=name, look_before=name, lights=name, lights_before=name, cue=name)
+    show_state = ShowState(True)
+    for lever in (LOOK, LIGHTS, CUE, LOOK, LIGHTS):
+        show_state = show_state.to(lever, name)
     ShowStateWriter(tmp_path).write(show_state)
     assert ShowStateReader(tmp_path).read() == show_state

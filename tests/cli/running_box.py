@@ -8,9 +8,9 @@ from pathlib import Path
 
 import yaml
 
+from appliance.box.orders import Order
 from appliance.sensor.link import SensorState
 from appliance.sensor.wire import HAS_PROFILE
-from appliance.show_control.orders import Order
 from appliance.stage.sensor_lines import roster_lines
 from tests.show_control.doubles import ControlInThread, StageDouble, until
 

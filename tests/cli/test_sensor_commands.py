@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 import yaml
 
+from appliance.box.orders import Order
 from appliance.cli.sensors import box_keys
 from appliance.cli.sensors.control_client import Answer, ControlClient, NoBoxError, Roll
 from appliance.release import choice
 from appliance.release.choice import Choice, Pair
 from appliance.sensor.keys import create_keys, load_keys
-from appliance.show_control.orders import Order
 from tests.bundles import write_show
 from tests.cli.running_box import LEFT, LOST, SPARE, RunningBox
 from tests.command import Command

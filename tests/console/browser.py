@@ -8,7 +8,8 @@ import pytest
 from playwright.sync_api import BrowserContext, expect
 from playwright.sync_api import Page as Tab
 
-from appliance.box.show_state import ShowState, ShowStateReader
+from appliance.box.show_state import ShowStateReader
+from appliance.levers.show_state import ShowState
 from tests.console.page import Page
 from tests.system.box import Box
 from tests.system.processes import PATIENCE_S, wait_until

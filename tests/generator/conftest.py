@@ -12,9 +12,11 @@ import pytest
 
 from appliance.box.fallback import Fallbacks
 from appliance.box.made_motion import MadeMotionReader
-from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
+from appliance.box.show_state import ShowStateReader, ShowStateWriter
 from appliance.generator.fallback import OF_THE_GENERATOR
 from appliance.generator.generator import Generator
+from appliance.levers.show_state import Change, ShowState
+from appliance.levers.table import find_lever
 from appliance.outputs.frame_reader import FrameReader
 from appliance.show.box import BoxConfig
 from appliance.show.show import load_show
@@ -39,7 +41,12 @@ class Bench:
     def declare(self, **parts: tuple[str, tuple[float, ...]]) -> None:
         """Parts of the dance, '_' for a blank in their names."""
         named = {name.replace("_", " "): part for name, part in parts.items()}
-        self.declared = self.declared.with_dance(time.monotonic(), named)
+        changes = [
+            Change(lever, *lever.given(*part))
+            for name, part in named.items()
+            if (lever := find_lever(name)) is not None
+        ]
+        self.declared = self.declared.changed(time.monotonic(), changes)
         self._writer.write(self.declared)
 
     def recipe(self) -> dict[str, Any]:

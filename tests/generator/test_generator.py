@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 
 from appliance.box.made_motion import MadeMotion, MadeMotionReader
-from appliance.box.show_state import ShowState
+from appliance.box.orders import Order
 from appliance.generator import request as requests
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
 from appliance.generator.pointing import Pointing
+from appliance.levers.show_state import ShowState
 from appliance.outputs.frame_reader import SeenFrame
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.show.show import load_show
-from appliance.show_control.orders import Order
 from tests.bundles import FIGURE
 from tests.command import Command
 from tests.generator.conftest import Bench

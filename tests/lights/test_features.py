@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
 from tests.lights.rigs import PERIOD_S, frame, lights, rig
 from tests.lights.test_mapping import DIMMER, PAR, levels, still
 

@@ -12,17 +12,18 @@ import numpy as np
 import pytest
 
 from appliance.box.live_rig import LARGEST, MOST_BEAMS, NOTHING, LiveRigReader
-from appliance.box.show_state import ShowState
+from appliance.box.orders import Order, OrderInbox, OrderSender
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import GOING
 from appliance.lights.live import EVERY_S, STEP_S, LiveRig, OrderedWalk
 from appliance.lights.patch import Patch
-from appliance.show_control.orders import Order, OrderInbox, OrderSender
 from tests.lights.rigs import lights
 
 RIG = [
     {"name": "par", "profile": "led-par", "mode": "RGBW", "address": 1, "place": [-1, 3, 0]},
     {"name": "head", "profile": "moving-wash", "address": 21, "place": [2, 4, 0]},
 ]
-STANDS = ShowState(going=False)
+STANDS = ShowState().to(GOING, 0.0)
 
 
 @pytest.fixture

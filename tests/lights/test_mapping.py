@@ -11,7 +11,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import LIGHTS
 from appliance.lights.curve import bent, eased, share
 from appliance.lights.dance import lean, turn
 from appliance.lights.patch import Patch
@@ -212,7 +213,7 @@ def test_heads_that_no_rule_moves_stay_where_they_are() -> None:
     made = rig(config)
     levels(made, *[(2.0, 1.0, 0.0)] * 200)
     before = made.patch.heads.angles.copy()
-    levels(made, *[(-2.0, 1.0, 0.0)] * 100, show_state=ShowState(lights="second"), first=201)
+    levels(made, *[(-2.0, 1.0, 0.0)] * 100, show_state=ShowState().to(LIGHTS, "second"), first=201)
     np.testing.assert_allclose(made.patch.heads.angles, before)
 
 
@@ -230,7 +231,7 @@ def dark_then_bright() -> Rig:
 
 def test_one_mapping_fades_into_the_next() -> None:
     made = dark_then_bright()
-    show_state = ShowState(lights="second", lights_before="first", lights_since=0.02, lights_fade_s=1.0)
+    show_state = ShowState().to(LIGHTS, "first").to(LIGHTS, "second", 0.02, 1.0)
     shown = [level[DIMMER] / 255 for level in levels(made, *[(0, 1, 0)] * 60, show_state=show_state, first=2)]
     assert shown[24] == pytest.approx(0.5, abs=0.02)
     assert shown[-1] == 1.0
@@ -239,9 +240,9 @@ def test_one_mapping_fades_into_the_next() -> None:
 
 def test_a_mapping_called_in_the_middle_of_a_fade_starts_from_what_is_seen() -> None:
     made = dark_then_bright()
-    to_second = ShowState().with_lights("second", 0.02, 1.0)
+    to_second = ShowState().to(LIGHTS, "second", 0.02, 1.0)
     shown = levels(made, *[(0, 1, 0)] * 20, show_state=to_second, first=2)
-    back = to_second.with_lights("first", 0.42, 1.0)
+    back = to_second.to(LIGHTS, "first", 0.42, 1.0)
     shown += levels(made, *[(0, 1, 0)] * 60, show_state=back, first=22)
     dimmer = [level[DIMMER] / 255 for level in shown]
     assert np.abs(np.diff(dimmer)).max() < 0.03
@@ -256,7 +257,7 @@ def test_points_to_aim_at_slide_across_the_stage() -> None:
     )
     made = rig(config)
     levels(made, *[(0, 1, 0)] * 200)
-    show_state = ShowState(lights="second", lights_before="first", lights_since=4.0, lights_fade_s=2.0)
+    show_state = ShowState().to(LIGHTS, "first").to(LIGHTS, "second", 4.0, 2.0)
     levels(made, *[(0, 1, 0)] * 50, show_state=show_state, first=201)  # half of it
     beam = made.patch.heads.beams()[0]
     on_floor = np.array([0, 4, 0]) + beam * (-4 / beam[1])
@@ -280,7 +281,7 @@ def test_gobos_jump_in_the_middle_of_a_fade(tmp_path: Any) -> None:
     made = Rig(config, Patch(config.fixtures, tmp_path), SKELETON)
     made.safety = 0.0
     still(made)
-    show_state = ShowState(lights="second", lights_before="first", lights_since=0.02, lights_fade_s=1.0)
+    show_state = ShowState().to(LIGHTS, "first").to(LIGHTS, "second", 0.02, 1.0)
     shown = {level[0] for level in levels(made, *[(0, 1, 0)] * 60, show_state=show_state, first=2)}
     assert shown == {51, 204}
 

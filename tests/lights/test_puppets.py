@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
 from appliance.lights.patch import Patch
 from appliance.lights.rig import Rig
 from tests.lights.rigs import SKELETON, frame, lights

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import GOING, LIGHTS, MASTER
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LEAVING_FADE_S, LOST_S, SAFE_FADE_S, Rig
 from tests.lights.rigs import SKELETON, frame, lights, rig
@@ -97,7 +98,7 @@ def test_after_panic_the_dance_fades_in() -> None:
 def test_stop_fades_as_show_control_says_and_then_comes_the_safe_look() -> None:
     night = evening(safe={"dimmer": 0.2})
     night.dance(1.0)
-    night.show_state = ShowState().with_going(False, night.now, 2.0)
+    night.show_state = ShowState().to(GOING, 0.0, night.now, 2.0)
     shown = [dimmers(levels)[0] / 255 for levels in night.dance(4.0)]
     assert shown[39] == pytest.approx(0.5, abs=0.03)
     assert shown[79] < 0.05
@@ -106,7 +107,7 @@ def test_stop_fades_as_show_control_says_and_then_comes_the_safe_look() -> None:
 
 def test_master_and_blackout_reach_dimmers_alone() -> None:
     night = evening(FULL, RED)
-    night.show_state = ShowState().with_master(0.5, night.now, 0.0)
+    night.show_state = ShowState().to(MASTER, 0.5, night.now, 0.0)
     assert night.dance(1.0)[-1][:3] == bytes([128, 255, 0])
     night.show_state = ShowState(blackout=True)
     assert night.dance()[0][:3] == bytes([0, 255, 0])
@@ -122,7 +123,7 @@ def test_blackout_also_darkens_the_safe_look_of_a_lost_stage(show_state: ShowSta
 
 def test_but_on_panic_the_safe_look_is_seen_whatever_else_is_in_force() -> None:
     night = evening(safe={"dimmer": 0.2})
-    night.show_state = ShowState(panic=True, blackout=True, master=0.0)
+    night.show_state = ShowState(panic=True, blackout=True).to(MASTER, 0.0)
     assert dimmers(night.dance()[0])[0] == 51
 
 
@@ -278,5 +279,5 @@ def test_passes_that_do_not_keep_up_see_a_lost_stage_and_fade_in_the_same_time()
 
 def test_unknown_mappings_leave_the_first_in_force() -> None:
     night = evening()
-    night.show_state = ShowState(lights="of another show", lights_before="nor this")
+    night.show_state = ShowState().to(LIGHTS, "nor this").to(LIGHTS, "of another show")
     assert dimmers(night.dance(0.5)[-1])[0] == 255

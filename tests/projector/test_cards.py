@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import CARD, MASTER
 from appliance.projector.context import offscreen
 from appliance.projector.corners import homography
 from appliance.projector.picture.cards import Cards
@@ -55,24 +56,24 @@ def show(gl: moderngl.Context, tmp_path: Path) -> Show:
 
 def test_without_a_card_the_picture_is_as_it_was(show: Show) -> None:
     assert np.array_equal(show([], ShowState()), np.full((90, 160, 3), 102))
-    assert np.array_equal(show([], ShowState(card="no such card")), np.full((90, 160, 3), 102))
+    assert np.array_equal(show([], ShowState().to(CARD, "no such card")), np.full((90, 160, 3), 102))
 
 
 def test_blank_is_black_and_fades_in_and_out(show: Show) -> None:
-    fading = ShowState().with_card(BLANK, 10.0, 4.0)
+    fading = ShowState().to(CARD, BLANK, 10.0, 4.0)
     assert [show([], fading, now).mean() for now in (10.0, 11.0, 12.0, 14.0)] == pytest.approx(
         [102, 76.5, 51, 0], abs=1
     )
-    off = fading.with_card("", 20.0, 2.0)
+    off = fading.to(CARD, "", 20.0, 2.0)
     assert show([], off, 21.0).mean() == pytest.approx(51, abs=1)
 
 
 def test_a_logo_keeps_its_shape_at_its_place_and_follows_the_level(show: Show) -> None:
     logo = CardConfig(name="logo", image="logo.png", image_size=0.4, place=(0.25, 0.75))
-    rows, columns = np.nonzero((np.abs(show([logo], ShowState(card="logo")) - RED) < 3).all(axis=2))
+    rows, columns = np.nonzero((np.abs(show([logo], ShowState().to(CARD, "logo")) - RED) < 3).all(axis=2))
     assert abs(np.ptp(rows) + 1 - 36) <= 2 and abs(np.ptp(columns) + 1 - 54) <= 2
     assert (rows.mean(), columns.mean()) == pytest.approx((0.75 * 90, 0.25 * 160), abs=1)
-    dim = show([logo], ShowState(card="logo"), level=0.5)
+    dim = show([logo], ShowState().to(CARD, "logo"), level=0.5)
     assert np.abs(dim[67, 40] - np.array(RED) / 2).max() <= 1
     assert np.abs(dim[5, 5] - 51).max() <= 1
 
@@ -82,14 +83,14 @@ def test_two_cards_of_one_ground_fade_without_the_dance_shining_through(show: Sh
         CardConfig(name="one", background="#ffffff", text="one", colour="#000000"),
         CardConfig(name="two", background="#ffffff"),
     ]
-    fading = ShowState(card="one").with_card("two", 10.0, 2.0)
+    fading = ShowState().to(CARD, "one").to(CARD, "two", 10.0, 2.0)
     assert (show(cards, fading, 11.0)[:10] == 255).all()
-    assert show(cards, fading, 11.0).min() > show(cards, ShowState(card="one")).min()
+    assert show(cards, fading, 11.0).min() > show(cards, ShowState().to(CARD, "one")).min()
 
 
 def test_words_too_wide_are_shrunk_into_the_picture(show: Show) -> None:
     long = CardConfig(name="long", text="W" * 60, size=0.3, background="#000000")
-    light = show([long], ShowState(card="long")).max(axis=(0, 2))
+    light = show([long], ShowState().to(CARD, "long")).max(axis=(0, 2))
     assert light.max() > 100 and not light[:3].any() and not light[-3:].any()
 
 
@@ -114,7 +115,7 @@ def test_a_card_follows_the_corners(gl: moderngl.Context, tmp_path: Path) -> Non
     y_up = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
     clip = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.0]]) @ homography(corners) @ y_up
     gl.screen.clear()
-    made.draw(Wall(gl.screen, SIZE, SIZE, clip), ShowState(card="w"), 1.0)
+    made.draw(Wall(gl.screen, SIZE, SIZE, clip), ShowState().to(CARD, "w"), 1.0)
     made.release()
     lit = pixels(gl.screen, SIZE)[..., 0] > 127
     assert lit[18:72, 40:120].all() and lit.sum() == 54 * 80
@@ -160,7 +161,7 @@ def test_cards_lie_over_the_look_and_under_masters_and_masks(gl: moderngl.Contex
     evening.begin()
     for _ in range(90):
         evening.picture(SIZE)
-    evening.declare(ShowState(card="white").with_master(0.5, evening.now, 0.0))
+    evening.declare(ShowState().to(CARD, "white").to(MASTER, 0.5, evening.now, 0.0))
     for direct in (True, False):  # onto the display, and through a texture
         seen = evening.picture(SIZE, lines=() if direct else ("x",))[SIZE[1] // 2 :]
         assert not seen[:, : SIZE[0] // 2].any()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from appliance.box.orders import Order
 from appliance.projector.alignment import MOST_BRIGHT, Alignment
 from appliance.projector.controls import Controls
 from appliance.projector.corners import FARTHEST, WHOLE
 from appliance.projector.keyboards import Key
 from appliance.projector.keys import HELP, press
 from appliance.show_control.command import FORMS
-from appliance.show_control.orders import Order
 
 SIZE = (1000, 500)
 

@@ -10,7 +10,9 @@ import moderngl
 import numpy as np
 import pytest
 
-from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
+from appliance.box.show_state import ShowStateReader, ShowStateWriter
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import GOING, LOOK, MASTER
 from appliance.outputs.frame_reader import FrameReader
 from appliance.projector.alignment import Alignment
 from appliance.projector.context import offscreen
@@ -218,10 +220,10 @@ def test_blackout_and_master_and_stop(evening: Evening) -> None:
     evening.colour(1.0)
     evening.declare(replace(evening.show_state, blackout=True))
     assert evening.colour() == (0, 0, 0)
-    evening.declare(ShowState().with_master(0.5, evening.now, 1.0))
+    evening.declare(ShowState().to(MASTER, 0.5, evening.now, 1.0))
     assert 180 < evening.colour(0.5)[0] < 200
     assert abs(evening.colour(0.7)[0] - 128) <= 1
-    evening.declare(ShowState().with_going(False, evening.now, 2.0))
+    evening.declare(ShowState().to(GOING, 0.0, evening.now, 2.0))
     assert 120 < evening.colour(1.0)[0] < 135
     assert evening.colour(1.1) == (0, 0, 0)
 
@@ -229,7 +231,7 @@ def test_blackout_and_master_and_stop(evening: Evening) -> None:
 def test_looks_fade_as_the_declared_says(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    evening.declare(ShowState().with_look("lines", evening.now, 1.0))
+    evening.declare(ShowState().to(LOOK, "lines", evening.now, 1.0))
     assert 120 < evening.colour(0.5)[2] < 135
     assert evening.colour(0.6)[2] == 255
 

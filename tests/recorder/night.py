@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from appliance.box.clock import TICK_S, Slot
-from appliance.box.show_state import ShowState
+from appliance.box.orders import Order
 from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.mirror import Mirror
+from appliance.levers.show_state import ShowState
 from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.show_control.command import Command
-from appliance.show_control.orders import Order
 from appliance.show_control.show_state_commands import declare
 from appliance.stage.carry_out import carry_out
 from appliance.stage.iterations import Iterations

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from appliance.box.show_state import ShowState, ShowStateReader
+from appliance.box.show_state import ShowStateReader
 from appliance.levers.lever import Lever
+from appliance.levers.show_state import ShowState
 
 
 def show_state(folder: Path) -> ShowState:

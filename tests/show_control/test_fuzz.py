@@ -8,7 +8,8 @@ import time
 from pathlib import Path
 
 from appliance.box.orders import OrderSender
-from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
+from appliance.box.show_state import ShowStateReader, ShowStateWriter
+from appliance.levers.show_state import ShowState
 from appliance.levers.table import LOOK, MASTER
 from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.key_file import KeyFile

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.show_state import ShowState, ShowStateReader
+from appliance.box.show_state import ShowStateReader
+from appliance.levers.show_state import ShowState
 from tests.show_control.doubles import PATIENCE_S, Asker, control_process
 
 HEAVY = ("onnxruntime", "pydantic", "typer", "rich", "yaml", "moderngl", "sdl2")

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from appliance.box.fallback import Fallbacks
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
 from appliance.show.sound import SoundConfig
 from appliance.sound.card import Card
 from appliance.sound.fallback import OF_THE_SOUND

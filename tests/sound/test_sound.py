@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from appliance.box.fallback import Fallbacks
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import CUE, MASTER, STRINGS
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import NotAskedForError
 from appliance.show.sound import SoundConfig, StringsConfig
@@ -36,12 +37,12 @@ def test_strings_come_in_and_go_over_the_fade_of_the_cue() -> None:
 @pytest.mark.parametrize(
     ("state", "loud"),
     [
-        (ShowState(cue="strings", master=0.5, master_before=0.5), 0.5),
-        (ShowState(cue="strings").with_strings(0.4, 1.0, 0.0), 0.4),
-        (ShowState(cue="strings").with_strings(0.0, 9.0, 2.0), 0.5),
-        (ShowState(cue="opening"), 0.0),
-        (ShowState(cue="strings", panic=True), 0.0),
-        (ShowState(cue="strings", blackout=True), 0.0),
+        (ShowState().to(CUE, "strings").to(MASTER, 0.5), 0.5),
+        (ShowState().to(CUE, "strings").to(STRINGS, 0.4, 1.0, 0.0), 0.4),
+        (ShowState().to(CUE, "strings").to(STRINGS, 0.0, 9.0, 2.0), 0.5),
+        (ShowState().to(CUE, "opening"), 0.0),
+        (ShowState(panic=True).to(CUE, "strings"), 0.0),
+        (ShowState(blackout=True).to(CUE, "strings"), 0.0),
     ],
 )
 def test_how_loud_the_strings_are(tmp_path: Path, state: ShowState, loud: float) -> None:

@@ -6,7 +6,8 @@ from contextlib import closing
 from pathlib import Path
 
 from appliance.box.checkpoint import Checkpoint, CheckpointWriter
-from appliance.box.show_state import ShowState, ShowStateWriter
+from appliance.box.show_state import ShowStateWriter
+from appliance.levers.show_state import ShowState
 
 PLACE = Checkpoint("A test", "walk", 2.0, (0.0, 5.0), coding=3, interaction=2, boot="another")
 

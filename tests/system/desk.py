@@ -6,7 +6,8 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
-from appliance.box.show_state import ShowState, ShowStateReader
+from appliance.box.show_state import ShowStateReader
+from appliance.levers.show_state import ShowState
 from tests.show_control.doubles import Asker
 from tests.system.box import Box
 from tests.system.processes import BUNRAKU, children_running, wait_until

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.orders import Order, OrderInbox, OrderSender
 from appliance.box.runtime_folder import AlreadyHereError, Claim, kept_file, renew_lost
 from appliance.recorder.reading import read_journal
-from appliance.show_control.orders import Order, OrderInbox, OrderSender
 from tests.bundles import write_show
 from tests.console.page import box_with_page
 from tests.system.processes import children_running, wait_until

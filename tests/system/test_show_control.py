@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
 from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.reading import read_journal
 from hw_sim.peers import HOST, free_ports

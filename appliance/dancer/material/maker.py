@@ -25,12 +25,12 @@ from appliance.dancer.material.pose_paths import even_path, wobbled
 from appliance.dancer.material.prompt import CLOSING, closing_frame, homed, unpacked_steps
 from appliance.dancer.material.steps import HOP, Steps, danced_again, motion_of
 from appliance.dancer.phrase import FPS, X, Z
+from appliance.levers.sources import GRANULAR, IMPROVISE, KEPT, MAIN, PATH, VARY
 from appliance.pose import quaternion
 from appliance.pose.possible import possible_roots
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MAIN, PATH, VARY
 
 GRANULAR_S, POINT_S = 20.0, 12.0  # seconds of a walk; of a point or a stroke of the map, there and back
 _FEWEST, _FADE = 50, 25  # frames of an excerpt, and of the fade from its end to its start

@@ -9,7 +9,8 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
-from appliance.box.show_state import ShowState
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import CARD
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import LINES, Image, read_image, texture_of
 from appliance.projector.picture.lettering import lettered, letters_without_font
@@ -69,10 +70,9 @@ class Cards:
 
     def draw(self, wall: Wall, show_state: ShowState, now: float) -> None:
         """Lay the cards that are declared over what is on the wall."""
-        share = show_state.card_mix(now)
-        shown, before = (
-            self._cards.get(name, self._none) for name in (show_state.card, show_state.card_before)
-        )
+        card = show_state[CARD]
+        share = card.share(now)
+        shown, before = (self._cards.get(name, self._none) for name in (card.value, card.before))
         if shown is self._none and (before is self._none or share == 1.0):
             return
         wall.framebuffer.use()
