@@ -76,7 +76,7 @@ def test_changes_of_the_key_file_reach_the_box(box: RunningBox, tmp_path: Path, 
         "spare-2": before["left-wrist"].key,
     }
     assert [order.name for order in box.orders] == ["reload"] * 3
-    assert box.orders[-1].keys == after
+    assert box.orders[-1].keys == {name: (key.device_id, key.key) for name, key in after.items()}
 
 
 def test_a_change_that_the_box_refuses_sets_the_exit_status(box: RunningBox, bunraku: Command) -> None:

@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, expect
 from playwright.sync_api import Page as Tab
 
+from appliance.levers.table import CARD, MASTER
 from tests.console.browser import (
     ON_A_LAPTOP,
     ON_BOTH,
@@ -78,17 +79,17 @@ def test_an_evening_by_its_buttons(tab: Tab, venue: tuple[Box, Page]) -> None:
     expect(tab.locator("#cues >> text=storm")).to_have_attribute("aria-pressed", "true")
     tab.locator("#master").focus()
     tab.keyboard.press("Home")
-    wait_until(lambda: declared(box).master == 0.0)
+    wait_until(lambda: declared(box)[MASTER].value == 0.0)
     expect(tab.locator("#verdict")).to_contain_text("0 %")
     tab.locator("#master").focus()
     tab.keyboard.press("End")
-    wait_until(lambda: declared(box).master == 1.0)
+    wait_until(lambda: declared(box)[MASTER].value == 1.0)
     press(tab, '[data-page="picture"]')
     press(tab, "#overlays >> text=blank")
-    wait_until(lambda: declared(box).card == "blank")
+    wait_until(lambda: declared(box)[CARD].value == "blank")
     expect(tab.locator("#overlays >> text=blank")).to_have_attribute("aria-pressed", "true")
     press(tab, "#overlays >> text=none")
-    wait_until(lambda: declared(box).card == "")
+    wait_until(lambda: declared(box)[CARD].value == "")
 
 
 def test_a_thumb_that_scrolls_over_panic_does_nothing(browser: Browser, venue: tuple[Box, Page]) -> None:

@@ -12,6 +12,8 @@ import pytest
 import yaml
 from playwright.sync_api import Browser, expect
 
+from appliance.levers.show_state import parts_of
+from appliance.levers.table import STRINGS
 from appliance.show.bundle import default_show_path
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
@@ -34,7 +36,7 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Box, Page
 
 def value(box: Box, part: str) -> tuple[float, ...]:
     """What was declared last of a source."""
-    return declared(box).dance.get(f"motion {part}", (0, "", ()))[2]
+    return parts_of(declared(box)).get(f"motion {part}", (0, "", ()))[2]
 
 
 def test_variations_and_places_on_the_map(browser: Browser, studio: tuple[Box, Page]) -> None:
@@ -151,10 +153,12 @@ def test_knobs_of_springs_and_strings(browser: Browser, studio: tuple[Box, Page]
     for knob, key, least in (("stiffness", "End", 10.0), ("storm", "End", 1.0), ("feedback", "Home", 0.0)):
         tab.locator(f"#springs-{knob}").focus()
         tab.keyboard.press(key)
-        wait_until(lambda part=knob, told=least: declared(box).dance.get(part, (0, "", ()))[2] == (told, 1.0))
+        wait_until(
+            lambda part=knob, told=least: parts_of(declared(box)).get(part, (0, "", ()))[2] == (told, 1.0)
+        )
     tab.locator("#springs-strings").focus()
     tab.keyboard.press("Home")
-    wait_until(lambda: declared(box).strings == 0.0)
+    wait_until(lambda: declared(box)[STRINGS].value == 0.0)
     with tab.expect_response("**/api/command") as kicked:
         press(tab, "#springs-kick")
     assert kicked.value.json()["done"]

@@ -10,6 +10,7 @@ import pytest
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
+from appliance.levers.table import MASTER
 from appliance.show_control import order_dispatch
 from appliance.show_control.packet import MOST_MESSAGES
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble
@@ -41,7 +42,7 @@ def test_a_desk_may_send_all_its_levers_at_once(folder: Path, stage: StageDouble
     asker.socket.send(builder.build().dgram)
     heard = [asker.hear() for _ in range(70)]
     assert all(message is not None and message[:3] == ["/reply", "/master", 1] for message in heard)
-    assert show_state(folder).master == pytest.approx(69 / 70)
+    assert show_state(folder)[MASTER].value == pytest.approx(69 / 70)
 
 
 def test_a_bundle_that_is_too_long_is_refused_as_one(folder: Path, stage: StageDouble, asker: Asker) -> None:

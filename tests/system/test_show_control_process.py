@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from appliance.levers.table import MASTER
 from tests.show_control.doubles import Asker
 from tests.system.box import is_free, playing
 from tests.system.desk import CONTROL, asking, await_status, control_of, show_state
@@ -29,7 +30,7 @@ def test_show_control_that_is_killed_comes_back_and_misses_nothing(show: Path, t
         asker.tell("/master", 0.5)  # the port stays open
         assert asker.hear()[:3] == ["/reply", "/master", 1]  # type: ignore[index]
         assert show_state(box).panic
-        assert show_state(box).master == 0.5
+        assert show_state(box)[MASTER].value == 0.5
         assert control_of(box.process.pid) != control
         assert box.end() == 0
     assert "Show control was killed (signal 9)." in box.words
