@@ -10,7 +10,7 @@ import pytest
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from appliance.levers.table import MASTER
+from appliance.levers.table import ITERATIONS, MASTER
 from appliance.show_control import order_dispatch
 from appliance.show_control.packet import MOST_MESSAGES
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble
@@ -79,7 +79,7 @@ def test_a_flood_of_declarations_leaves_the_newest_in_force(
     stage.obeys = True
     assert other.ask("/iterations", 7, 6)[2] == 1
     other.close()
-    assert declared(folder, "iterations") == ("", 7.0, 6.0)
+    assert declared(folder, ITERATIONS) == ((7, 6), 0.0)
     assert "this one gets no answer" in control.process.handler.reason
 
 
