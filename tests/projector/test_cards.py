@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import moderngl
@@ -166,6 +165,6 @@ def test_cards_lie_over_the_look_and_under_masters_and_masks(gl: moderngl.Contex
         seen = evening.picture(SIZE, lines=() if direct else ("x",))[SIZE[1] // 2 :]
         assert not seen[:, : SIZE[0] // 2].any()
         assert np.abs(seen[:, SIZE[0] // 2 :].astype(int) - 128).max() <= 2
-    evening.declare(replace(evening.show_state, card=""))
+    evening.declare(evening.show_state.to(CARD, ""))
     assert evening.picture(SIZE)[-1, -1, 1] < 60
     evening.close()
