@@ -19,7 +19,6 @@ from typing import Any, Literal
 from appliance.box.runtime_folder import hold, is_lost
 from appliance.levers.addresses import Receiver
 
-Place = Receiver
 Key = tuple[int, bytes]  # a sensor's device id and its secret
 Delivery = Literal["sent", "full", "absent"]  # full: the receiver's socket is; absent: there is no receiver
 ANSWERS = "control"
@@ -67,7 +66,9 @@ class Answer:
 class OrderInbox:
     """The receiver's end: orders wait in its socket. Raises OSError where the folder takes no socket."""
 
-    def __init__(self, folder: Path, place: Place, monotonic: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, folder: Path, place: Receiver, monotonic: Callable[[], float] = time.monotonic
+    ) -> None:
         self._socket = _Mailbox(folder, place)
         self._monotonic = monotonic
 
@@ -108,7 +109,7 @@ class OrderSender:
         """To poll for answers."""
         return self._socket.fileno()
 
-    def send(self, to: Place, order: Order) -> Delivery:
+    def send(self, to: Receiver, order: Order) -> Delivery:
         """Send an order; never blocks, never raises."""
         return self._socket.send(to, _payload(order))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-UNKNOWN_S = -1.0  # a round trip or an age that there is none of; the look of a box that is still starting
+UNKNOWN_S = -1.0  # no round trip or age is known yet
 
 
 class RosterLine(NamedTuple):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import socket
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from appliance.box.child import BUNRAKU
 from appliance.box.leftovers import forget_run
 from appliance.box.log_writer import SAID, LogWriter
 from appliance.box.runtime_folder import kept_file
@@ -205,32 +205,31 @@ def _companions(
             watchdog_s=WATCHDOG_S["control"],
         )
     named = () if box.path is None else ("--box", str(box.path))
-    bunraku = (sys.executable, "-m", "appliance.cli")
     if show.config.motion.made_sources:
         yield Companion(
             "The generator",
-            (*bunraku, "generate", *named),
+            (*BUNRAKU, "generate", *named),
             "The last phrase plays on.",
             watchdog_s=WATCHDOG_S["generator"],
         )
     if box.outputs.dmx and show.config.lights.fixtures:
         yield Companion(
             "The process for the lights",
-            (*bunraku, "lights", *named),
+            (*BUNRAKU, "lights", *named),
             "The lights stay as they are for a moment.",
             watchdog_s=WATCHDOG_S["lights"],
         )
     if window and show.config.strings and (box.path is None or box.sound):
         yield Companion(
             "The process for the sound",
-            (*bunraku, "sound", *named),
+            (*BUNRAKU, "sound", *named),
             "The strings are silent for a moment.",
             watchdog_s=WATCHDOG_S["sound"],
         )
     if window:
         yield Companion(
             "The projector",
-            (*bunraku, "project", *named, "--window"),
+            (*BUNRAKU, "project", *named, "--window"),
             "The picture is black for a moment.",
             may_close=True,
             watchdog_s=WATCHDOG_S["projector"],
@@ -253,7 +252,7 @@ def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Comp
     kept = () if journal is None else ("--journal", str(journal), "--minutes", str(minutes))
     return Companion(
         "The keeper",
-        (sys.executable, "-m", "appliance.cli", "keep", *named, *kept),
+        (*BUNRAKU, "keep", *named, *kept),
         "What is danced meanwhile waits in memory.",
         watchdog_s=WATCHDOG_S["keeper"],
     )

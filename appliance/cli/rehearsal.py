@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from appliance.box.child import BUNRAKU
 from appliance.show.look import looks_by_name
 from appliance.show.show import Show
 
@@ -59,7 +59,7 @@ def pictured_from(dance: RecordedDance) -> float:
 def _render(journal: Path, out: Path, show: Path, look: str, start_s: float) -> str | None:
     """The error, or None. Runs in its own process, which a broken graphics driver may crash."""
     command = [
-        *(sys.executable, "-m", "appliance.cli", "filmstrip", str(journal), "--out", str(out)),
+        *(*BUNRAKU, "filmstrip", str(journal), "--out", str(out)),
         *("--start", str(start_s), "--seconds", str(PICTURED_S), "--look", look, "--show", str(show)),
     ]
     try:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import sys
 from collections.abc import Mapping
 
 from aiohttp import web
+
+from appliance.box.child import BUNRAKU
 
 LARGEST = 8 << 20  # bytes of an answer
 
@@ -18,7 +19,7 @@ async def answer_of(*arguments: str, patience_s: float, said: bytes | None = Non
 
     Raises 404 with its own sentence where it refuses, 503 where it takes too long or says too much.
     """
-    command = sys.executable, "-m", "appliance.cli", *arguments
+    command = *BUNRAKU, *arguments
     env = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     try:
         status, answer, troubles = await output_of(*command, patience_s=patience_s, said=said, env=env)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 from aiohttp import web
 
+from appliance.box.child import BUNRAKU
 from appliance.console.body import said
 from appliance.console.guard import Guard
 from appliance.console.stage_view import StageView
@@ -63,7 +63,7 @@ class SensorChanges:
     async def _run(self, command: Sequence[str], secret: str, telling: asyncio.Queue[dict[str, Any]]) -> None:
         async with self._changing:
             child = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-m", "appliance.cli", *command),
+                *(*BUNRAKU, *command),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,

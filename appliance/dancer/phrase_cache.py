@@ -118,7 +118,7 @@ def _keep(path: Path, phrase: Recording, floor: Floor | None) -> None:
 
 
 def _kept(path: Path, skeleton: Skeleton) -> tuple[Recording, Floor | None] | None:
-    """The cached phrase, not copied; None if there is none, or none that is valid for this skeleton."""
+    """The cached phrase, not copied; None without one that is valid for this skeleton."""
     try:
         with opened(path) as stream:
             if os.fstat(stream.fileno()).st_size > LARGEST:

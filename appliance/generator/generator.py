@@ -34,7 +34,7 @@ from appliance.dancer.phrase_cache import MEMORY, PhraseCache
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
 from appliance.generator.kept_motions import KeptMotions
 from appliance.generator.pointing import Pointing
-from appliance.generator.request import AGAIN, Request, Requests
+from appliance.generator.request import AGAIN_SEEDS, Request, Requests
 from appliance.levers.show_state import ShowState
 from appliance.levers.sources import IMPROVISE, KEPT, MAIN
 from appliance.outputs.frame_reader import FrameReader
@@ -173,7 +173,7 @@ class Generator:
             return
         recipe, own = parsed_recipe(danced), request.recipe
         returns = recipe.get("seed", 0) - own.get("seed", 0)
-        if _character(recipe) == _character(own) and 0 <= returns < AGAIN:
+        if _character(recipe) == _character(own) and 0 <= returns < AGAIN_SEEDS:
             ahead.request, ahead.recipe, ahead.returns = request, danced, returns
 
     def _make(self, ahead: _Ahead, request: Request, at_once: bool) -> None:

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from appliance.levers.show_state import Part, ShowState, parts_of
-from appliance.levers.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, PATH, POINTS
-from appliance.levers.table import MOTION
+from appliance.levers.show_state import ShowState
+from appliance.levers.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, PATH
+from appliance.levers.table import AGAIN, MADE_NUMBERS, PATH_POINTS, PHRASE
 from appliance.show.show import ShowConfig
 
 STEP_S = 1.5  # seconds of a fade: each step is a separate motion, blended into the one before
-AGAIN = 1000  # seed step per `again`; each return adds one
+AGAIN_SEEDS = 1000  # seed step per `again`; each return adds one
 APART = 10_000_000  # seeds of one puppet and the next: no two dance the same variation
 _DIGITS = 4
 
@@ -53,42 +53,43 @@ class Requests:
         kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the first puppet waits for
         while nothing is declared, after a power cut. pointed: x, y of the map at which a hand points.
         """
-        dance: Mapping[str, Part] = parts_of(state) if state.show == self._config.name else {}
+        if state.show != self._config.name:
+            state = ShowState()
         if puppet:
             name = self._config.puppets[puppet].phrase or ""
         else:
-            name = dance["phrase"][1] if "phrase" in dance else wanted or self._config.motion.source
+            name = state[PHRASE].value if PHRASE in state else wanted or self._config.motion.source
         if name in kept:
             return Request(name, {"source": KEPT, "name": name, "of": kept[name]})
         if name not in MADE or name not in self._sections:
             return None
         recipe: dict[str, Any] = {"source": name}
         for parameter, about in PARAMETERS[name].items():
-            value = self._value(dance, name, parameter, now)
+            value = self._value(state, name, parameter, now)
             recipe[parameter] = int(value) if about.is_whole else round(value, _DIGITS)
-        recipe["seed"] += AGAIN * int(dance.get(f"{MOTION} again", (0, "", (0.0,)))[2][0]) + APART * puppet
+        recipe["seed"] += AGAIN_SEEDS * state[AGAIN].value + APART * puppet
         if name == GRANULAR:
             section = self._sections[name]
             recipe |= {"from": getattr(section, "from_", None), "to": getattr(section, "to", None)}
         elif name != IMPROVISE:
             recipe["phrase"] = base
-        points = pointed or dance.get(f"{MOTION} {PATH} {POINTS}", (0, "", ()))[2]
+        points = pointed or state[PATH_POINTS].value
         if name == PATH and points:
             recipe["points"] = [round(value, 3) for value in points]
         return Request(name, recipe)
 
-    def _value(self, dance: Mapping[str, Part], source: str, parameter: str, now: float) -> float:
+    def _value(self, state: ShowState, source: str, parameter: str, now: float) -> float:
         """A parameter at this moment; a fade goes in steps."""
-        key = f"{MOTION} {source} {parameter}"
+        lever = MADE_NUMBERS[source][parameter]
         own = float(getattr(self._sections[source], parameter))
-        number, _, values = dance.get(key, (0, "", ()))
-        if not values:
+        if lever not in state:
             return own
+        fade, key = state[lever], lever.name
+        number = fade.generation
         if self._fading.get(key, (0, 0.0))[0] != number:
             self._fading[key] = number, self._newest.get(key, own)
-        target, fade_s = values[0], values[1] if len(values) > 1 else 0.0
         before, since = self._fading[key][1], number / 1e9  # declared at that monotonic second
         gone = math.floor(max(now - since, 0.0) / STEP_S + 1.0) * STEP_S
-        share = 1.0 if gone >= fade_s or PARAMETERS[source][parameter].is_whole else gone / fade_s
-        value = self._newest[key] = before + share * (target - before)
+        share = 1.0 if gone >= fade.seconds or PARAMETERS[source][parameter].is_whole else gone / fade.seconds
+        value = self._newest[key] = before + share * (fade.value - before)
         return value

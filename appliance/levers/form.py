@@ -37,8 +37,8 @@ FADE = Number("fade in seconds", 0, MOST_FADE_S)
 class Form:
     """The arguments of an address: a text, then numbers.
 
-    text: what the first argument names; empty: there is none. may_be_nameless: the text may be left out.
-    optional: how many of the last numbers may be left out.
+    text: what the first argument names; empty: the address takes no text. may_be_nameless: the text may be
+    left out. optional: how many of the last numbers may be left out.
     """
 
     text: str = ""

@@ -19,8 +19,8 @@ AT_ONCE: float | None = None
 class Need(NamedTuple):
     """A condition on the show: without it the lever moves nothing. among: an attribute of Facts.
 
-    what: a name that has to be among them, and what it is called; empty: one of any name. cure: the sentence
-    where there is none.
+    what: a name that has to be among them, and what it is called; empty: one of any name. cure: the error
+    for a show without one.
     """
 
     among: str

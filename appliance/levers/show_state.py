@@ -15,9 +15,6 @@ from appliance.pose.foreign_file import plain_json
 T = TypeVar("T")
 
 
-Part = tuple[int, str, tuple[float, ...]]  # generation, text, numbers
-
-
 class Change(NamedTuple, Generic[T]):
     """A lever goes to a value in so many seconds."""
 
@@ -101,16 +98,6 @@ class ShowState:
         """With fades that began in the future done: the machine's clock has restarted since."""
         settings = {name: at_once(fade) if fade.since > now else fade for name, fade in self.settings.items()}
         return replace(self, settings=settings)
-
-
-def parts_of(state: ShowState) -> Mapping[str, Part]:
-    """The levers that have a follower, as orders; without a fade of 0 s."""
-    parts = {}
-    for name, fade in state.settings.items():
-        if (one := find_lever(name)) is not None and one.follower:
-            text, numbers = one.told(fade) if fade.seconds else one.kind.told(fade.value)
-            parts[name] = fade.generation, text, numbers
-    return parts
 
 
 def packed(state: ShowState) -> bytes:

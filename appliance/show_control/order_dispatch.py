@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import get_args
 
-from appliance.box.orders import Answer, Order, OrderSender, Place
+from appliance.box.orders import Answer, Order, OrderSender
+from appliance.levers.addresses import Receiver
 
 PATIENCE_S = 0.5  # after which an order is not carried out any more
 ANSWER_S = 0.1  # within which an order carried out at the last moment is answered
@@ -36,7 +37,7 @@ _TOO_MANY = "Too many commands came at once: this one gave way, and nothing is c
 
 @dataclass(slots=True)
 class _Dispatched:
-    place: Place
+    place: Receiver
     order: Order
     then: Then
 
@@ -66,12 +67,12 @@ class OrderDispatch:
 
     def __init__(self, sender: OrderSender) -> None:
         self._sender = sender
-        self._ways: dict[Place, _Way] = {place: _Way() for place in get_args(Place)}
+        self._ways: dict[Receiver, _Way] = {place: _Way() for place in get_args(Receiver)}
         self._sent: dict[int, _Dispatched] = {}
         self._given_up: dict[int, _Dispatched] = {}
         self._asks = int.from_bytes(os.urandom(6), "little")  # answers to an earlier process are none of ours
 
-    def dispatch_order(self, place: Place, order: Order, now: float, then: Then) -> None:
+    def dispatch_order(self, place: Receiver, order: Order, now: float, then: Then) -> None:
         """Have an order carried out within PATIENCE_S; `then` gets the result, at once or later."""
         self._asks += 1
         waiting = self._ways[place].waiting
@@ -101,7 +102,7 @@ class OrderDispatch:
         elif (late := self._given_up.pop(answer.ask, None)) is not None and answer.done:
             late.then(True, answer.words)
 
-    def _send(self, place: Place, now: float) -> None:
+    def _send(self, place: Receiver, now: float) -> None:
         way = self._ways[place]
         if now >= way.fills_at:
             way.left, way.fills_at = AT_ONCE, now + EVERY_S

@@ -12,8 +12,7 @@ import pytest
 import yaml
 from playwright.sync_api import Browser, expect
 
-from appliance.levers.show_state import parts_of
-from appliance.levers.table import STRINGS
+from appliance.levers.table import STRINGS, find_lever
 from appliance.show.bundle import default_show_path
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
@@ -34,9 +33,18 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Box, Page
         yield box, page
 
 
+def numbers(box: Box, name: str) -> tuple[float, ...]:
+    """The numbers of a lever, and of its fade if it has one; empty: it was never set."""
+    state, lever = declared(box), find_lever(name)
+    if lever is None or lever not in state:
+        return ()
+    fade = state[lever]
+    return (lever.told(fade) if fade.seconds else lever.kind.told(fade.value))[1]
+
+
 def value(box: Box, part: str) -> tuple[float, ...]:
     """What was declared last of a source."""
-    return parts_of(declared(box)).get(f"motion {part}", (0, "", ()))[2]
+    return numbers(box, f"motion {part}")
 
 
 def test_variations_and_places_on_the_map(browser: Browser, studio: tuple[Box, Page]) -> None:
@@ -153,9 +161,7 @@ def test_knobs_of_springs_and_strings(browser: Browser, studio: tuple[Box, Page]
     for knob, key, least in (("stiffness", "End", 10.0), ("storm", "End", 1.0), ("feedback", "Home", 0.0)):
         tab.locator(f"#springs-{knob}").focus()
         tab.keyboard.press(key)
-        wait_until(
-            lambda part=knob, told=least: parts_of(declared(box)).get(part, (0, "", ()))[2] == (told, 1.0)
-        )
+        wait_until(lambda part=knob, told=least: numbers(box, part) == (told, 1.0))
     tab.locator("#springs-strings").focus()
     tab.keyboard.press("Home")
     wait_until(lambda: declared(box)[STRINGS].value == 0.0)

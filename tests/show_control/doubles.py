@@ -18,8 +18,9 @@ from typing import Any
 from pythonosc.osc_message import OscMessage
 
 from appliance.box.notify import Notifier
-from appliance.box.orders import Order, OrderInbox, Place
+from appliance.box.orders import Order, OrderInbox
 from appliance.box.show_state import ShowStateReader
+from appliance.levers.addresses import Receiver
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show_control.packet import datagram
@@ -143,7 +144,7 @@ class StageDouble:
 class InboxDouble:
     """Takes orders of another place and answers them, in a thread."""
 
-    def __init__(self, folder: Path, place: Place) -> None:
+    def __init__(self, folder: Path, place: Receiver) -> None:
         self.orders: list[Order] = []
         self._inbox = OrderInbox(folder, place)
         self._is_over = threading.Event()

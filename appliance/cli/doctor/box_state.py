@@ -56,7 +56,7 @@ def stage(host: HostView) -> Iterator[Finding]:
 
 
 def _halves(sentences: str, process: str) -> tuple[str, str]:
-    """What happened and what to do: the last sentence."""
+    """Splits a report into its account and its cure, which is the last sentence."""
     happened, _, cure = sentences.rpartition(". ")
     if not happened:
         return sentences, f"`journalctl -b -u bunraku-{process}` says more."
