@@ -6,13 +6,11 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from typing import IO
 
 from appliance.box.parent_death import PARENT
 
-BUNRAKU = (sys.executable, "-m", "appliance.cli")
 _KILLED_WITHIN_S = 1.0
 
 

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from appliance.box.child import BUNRAKU, end_child, start_child
+from appliance.box.child import end_child, start_child
+from appliance.box.own_command import BUNRAKU
 from appliance.sensor.keys import create_keys
 from appliance.show.box import BoxConfig, UdpConfig
 from appliance.show.show import Show

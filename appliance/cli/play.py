@@ -10,9 +10,9 @@ from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from appliance.box.child import BUNRAKU
 from appliance.box.leftovers import forget_run
 from appliance.box.log_writer import SAID, LogWriter
+from appliance.box.own_command import BUNRAKU
 from appliance.box.runtime_folder import kept_file
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.readings import readings_line

@@ -17,7 +17,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from appliance.box.child import BUNRAKU, end_child, start_child
+from appliance.box.child import end_child, start_child
+from appliance.box.own_command import BUNRAKU
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.doctor.finding import for_phone
 from appliance.console.proofs import Proofs

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from appliance.box.child import BUNRAKU
+from appliance.box.own_command import BUNRAKU
 from appliance.show.look import looks_by_name
 from appliance.show.show import Show
 

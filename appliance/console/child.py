@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from aiohttp import web
 
-from appliance.box.child import BUNRAKU
+from appliance.box.own_command import BUNRAKU
 
 LARGEST = 8 << 20  # bytes of an answer
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from aiohttp import web
 
-from appliance.box.child import BUNRAKU, environment
+from appliance.box.child import environment
+from appliance.box.own_command import BUNRAKU
 from appliance.console.body import said
 from appliance.console.guard import Guard
 from appliance.console.proofs import FOLDER, Proofs

@@ -10,7 +10,7 @@ from typing import Any
 
 from aiohttp import web
 
-from appliance.box.child import BUNRAKU
+from appliance.box.own_command import BUNRAKU
 from appliance.console.body import said
 from appliance.console.guard import Guard
 from appliance.console.stage_view import StageView
