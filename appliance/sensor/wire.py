@@ -17,7 +17,7 @@ MAGIC = 0x4B42  # the bytes "BK" on the wire
 VERSION = 1
 KEY_BYTES = 16
 TAG_BYTES = 8
-Q14 = 1 << 14  # the BNO055's quaternion scale: 16384 stands for 1.0
+Q14 = 1 << 14  # the scale of quaternions: 16384 stands for 1.0
 BATTERY_UNKNOWN = 255
 ROUND_TRIP_UNKNOWN = 0xFFFF
 LED_OFF, LED_ON, LED_SLOW, LED_FAST, LED_STROBE = range(5)
@@ -55,7 +55,7 @@ OFFSETS22 = Coding("22s", "uint8_t[22]")
 LEDS = "0 off, 1 on, 2 slow, 3 fast, 4 strobe"
 FLAGS = (
     "bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF); bit 2: the radio's "
-    "own firmware is older than 19.5.4; bit 3: a crystal for the BNO055; bits 4 to 7: n > 0: the Wi-Fi had "
+    "own firmware is older than 19.5.4; bit 3: the IMU runs by a crystal; bits 4 to 7: n > 0: the Wi-Fi had "
     "4 n - 90 dBm when it was joined"
 )
 
@@ -82,7 +82,7 @@ class Hello(Packet):
     firmware_patch: Annotated[int, U8, ""]
     battery: Annotated[int, U8, "percent; 255 unknown"]
     flags: Annotated[int, U8, FLAGS]
-    imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055; its calibration is kept under it"]
+    imu_id: Annotated[bytes, IDENTITY16, "unique id of the IMU; its calibration is kept under it"]
 
 
 @dataclass(slots=True)
@@ -97,7 +97,7 @@ class Assignment(Packet):
 
 @dataclass(slots=True)
 class Reading(Packet):
-    """One orientation of the sensor, at the rate of the assignment: 50 a second."""
+    """One orientation of the sensor, at the rate of the assignment: 50 or 100 a second."""
 
     sensor_time_us: Annotated[int, U32, "device clock at the measurement; wraps after 71.6 minutes"]
     orientation: Annotated[
@@ -106,12 +106,12 @@ class Reading(Packet):
         "w, x, y, z; 16384 stands for 1; from the case to the room",
     ]
     calibration: Annotated[
-        int, U8, "BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each"
+        int, U8, "system, gyroscope, accelerometer, magnetometer: two bits each, 3 is best"
     ]
     battery: Annotated[int, U8, "percent; 255 unknown"]
     round_trip: Annotated[int, U16, "newest round trip by a heartbeat's echo, 0.1 ms; 65535 unknown"]
     taps: Annotated[int, U8, "counts double taps since power-on; wraps"]
-    recoveries: Annotated[int, U8, "counts restarts of the BNO055 since power-on; wraps; its heading is lost"]
+    recoveries: Annotated[int, U8, "counts restarts of the fusion since power-on; wraps; its heading is lost"]
     flags: Annotated[int, U8, FLAGS]
 
 
@@ -135,16 +135,16 @@ class Call(Packet):
 class Profile(Packet):
     """A calibration that the sensor has learned, for the box to keep: an update erases the sensor's copy."""
 
-    imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055"]
-    offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]
+    imu_id: Annotated[bytes, IDENTITY16, "unique id of the IMU"]
+    offsets: Annotated[bytes, OFFSETS22, "as the IMU has it; the box does not look inside"]
 
 
 @dataclass(slots=True)
 class Restore(Packet):
     """A kept calibration for a sensor that has none, with the first five heartbeats."""
 
-    imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055 that it is for"]
-    offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]
+    imu_id: Annotated[bytes, IDENTITY16, "unique id of the IMU that it is for"]
+    offsets: Annotated[bytes, OFFSETS22, "as that IMU gave it"]
 
 
 def signal_dbm(flags: int) -> int | None:

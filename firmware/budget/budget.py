@@ -4,8 +4,9 @@ Usage: budget.py ELF FOLDER. ELF is the linked core; FOLDER holds the call graph
 objects (`-fcallgraph-info=su`).
 
 The stack is the deepest path of calls from the entry point, each function with its frame. A call through a
-pointer may reach every function without a direct caller. Functions of the C library count as LIBRARY_STACK
-bytes; the ports' own code is outside, and so are parts removed by the linker.
+pointer may reach every function without a direct caller, but not a method of the class that makes the call: a
+driver's bus is not the driver. Functions of the C library count as LIBRARY_STACK bytes; the ports' own code is
+outside, and so are parts removed by the linker.
 """
 
 from __future__ import annotations
@@ -66,6 +67,10 @@ class CallGraph:
         known: dict[str, list[tuple[str, int]]] = {}
         open_calls: list[str] = []
 
+        def reached(caller: str) -> list[str]:
+            owner = owner_of(self.names[caller])
+            return [title for title in by_pointer if not owner or owner_of(self.names[title]) != owner]
+
         def walk(function: str) -> list[tuple[str, int]]:
             if function in known:
                 return known[function]
@@ -74,7 +79,7 @@ class CallGraph:
             open_calls.append(function)
             below: list[tuple[str, int]] = []
             for callee in sorted(self.calls.get(function, ())):
-                for target in by_pointer if callee == INDIRECT else [callee]:
+                for target in reached(function) if callee == INDIRECT else [callee]:
                     path = walk(target) if target in self.frames else [(target, LIBRARY_STACK)]
                     below = max(below, path, key=depth)
             open_calls.pop()
@@ -88,6 +93,11 @@ def readable(signature: str) -> str:
     """A function's name without types and without what all have in common."""
     name = re.sub(r"bunraku::|\{anonymous\}::|\(anonymous namespace\)::", "", signature.split("\\n")[0])
     return re.sub(r"\(.*\)( const)?$", "", name).split(" ")[-1]
+
+
+def owner_of(name: str) -> str:
+    """The class of a method; "" for a function."""
+    return name.rpartition("::")[0]
 
 
 def depth(path: list[tuple[str, int]]) -> int:

@@ -80,7 +80,8 @@ void World::boot() {
   booted_at_us_ = clock.now_us();
   board_clock.power_on(first_micros);
   board.power_on();
-  wearable_ = std::make_unique<Wearable>(Ports{board_clock, imu, wifi, serial, flash, led, board});
+  driver_ = std::make_unique<Bno055>(imu);
+  wearable_ = std::make_unique<Wearable>(Ports{board_clock, *driver_, wifi, serial, flash, led, board});
   wearable_->begin();
   before_ = wearable_->status();
 }

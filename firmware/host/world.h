@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "bno055.h"
 #include "bno055_model.h"
 #include "board_model.h"
 #include "flash_model.h"
@@ -52,6 +53,7 @@ class World {
   uint64_t until_us_;
   Status before_;  // the turn that is over, or that blocks
   uint64_t booted_at_us_ = 0;
+  std::unique_ptr<Bno055> driver_;
   std::unique_ptr<Wearable> wearable_;
 };
 

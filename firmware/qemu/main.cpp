@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "blake2s.h"
+#include "bno055.h"
 #include "golden.h"
 #include "instructions.h"
 #include "scripted_imu.h"
@@ -160,7 +161,8 @@ Cable cable;
 Store store;
 Lamp lamp;
 Microbit board;
-Wearable wearable({virtual_clock, bus, air, cable, store, lamp, board});
+Bno055 imu(bus);
+Wearable wearable({virtual_clock, imu, air, cable, store, lamp, board});
 
 void check(bool is_right, const char* what) {
   if (is_right) return;

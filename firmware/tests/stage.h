@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bno055.h"
 #include "box_side.h"
 #include "fakes.h"
 #include "framing.h"
@@ -41,6 +42,7 @@ struct Stage {
   fakes::FakeFlash flash;
   fakes::FakeLed led;
   fakes::FakeBoard board;
+  std::unique_ptr<Bno055> driver;
   std::unique_ptr<Wearable> wearable;
 
   fakes::BoxSide box;
@@ -57,7 +59,8 @@ struct Stage {
 
   void switch_on() {
     wearable.reset();
-    wearable = std::make_unique<Wearable>(Ports{clock, imu, wifi, serial, flash, led, board});
+    driver = std::make_unique<Bno055>(imu);
+    wearable = std::make_unique<Wearable>(Ports{clock, *driver, wifi, serial, flash, led, board});
     wearable->begin();
     box.boot_nonce = wearable->status().boot_nonce;
     heartbeat_at_us_ = clock.now_us;

@@ -93,7 +93,7 @@ TEST_CASE("the board restarts, the chip does not: it goes on, heading kept, what
     const uint64_t begun_us = rig.clock.now_us();
     while (!restarted.is_running() && rig.clock.now_us() < begun_us + 1000000) {
       restarted.step(rig.clock.micros());
-      if (restarted.has_id()) restarted.use_profile(profile.bytes, rig.clock.micros());  // it is kept by this id
+      if (restarted.has_id()) restarted.use_profile(profile.bytes);  // it is kept by this id
       rig.clock.advance(700);
     }
     CHECK(restarted.is_running());
@@ -175,9 +175,9 @@ TEST_CASE("a loop that stalls, or a bus that stretches much more, breaks no wait
     rig.power_on();
     rig.run(5, loop_us);
     const Offsets profile;
-    rig.imu.use_profile(profile.bytes, rig.clock.micros());
+    rig.imu.use_profile(profile.bytes);
     rig.run(2, loop_us);
-    rig.imu.save_profile(rig.clock.micros());
+    rig.imu.save_profile();
     rig.run(2, loop_us);
     CHECK(rig.imu.is_running());
     CHECK(rig.imu.recoveries() == 2);

@@ -25,7 +25,7 @@ TEST_CASE("the unique id and a saved profile are right even where every fifth an
       rig.power_on();
       rig.run(8);
       if (rig.imu.has_id()) CHECK(memcmp(rig.imu.unique_id(), rig.model.unique_id().data(), 16) == 0);
-      rig.imu.save_profile(rig.clock.micros());
+      rig.imu.save_profile();
       rig.run(1);
       is_saved[is_disturbed] = rig.imu.profile_ready(is_disturbed ? saved : clean);
     }
@@ -38,7 +38,7 @@ TEST_CASE("a profile that fusion refuses is dropped: rather without than not at 
   ImuRig rig;
   const Offsets profile;
   rig.power_on();
-  rig.imu.use_profile(profile.bytes, rig.clock.micros());
+  rig.imu.use_profile(profile.bytes);
   rig.run(2);
   CHECK(rig.imu.has_profile());
   rig.model.poke(bno055::kSystemError, bno055::kErrorConfiguration);
@@ -55,7 +55,7 @@ TEST_CASE("profiles: restored at once before start, through CONFIG mode later, a
   rig.model.set_motion(dance);
   rig.power_on();
   SUBCASE("before fusion starts") {
-    rig.imu.use_profile(profile.bytes, rig.clock.micros());
+    rig.imu.use_profile(profile.bytes);
     rig.run(2);
     CHECK(rig.imu.recoveries() == 0);
     CHECK(rig.model.counts().fusion_starts == 1);
@@ -64,7 +64,7 @@ TEST_CASE("profiles: restored at once before start, through CONFIG mode later, a
     rig.run(2);
     CHECK_FALSE(rig.imu.has_profile());
     for (int i = 0; i < 5; ++i) {
-      rig.imu.use_profile(profile.bytes, rig.clock.micros());
+      rig.imu.use_profile(profile.bytes);
       rig.run(1);
     }
     CHECK(rig.imu.recoveries() == 1);
@@ -88,7 +88,7 @@ TEST_CASE("radii that the chip would choke on are left out; nonsense is refused 
     CHECK(sound_profile_bytes(profile.bytes) == 20);
     ImuRig rig;
     rig.power_on();
-    rig.imu.use_profile(profile.bytes, rig.clock.micros());
+    rig.imu.use_profile(profile.bytes);
     CHECK(rig.run_until_reading() < 0.6);
     CHECK(rig.imu.has_profile());
     CHECK(rig.imu.counts().fusion_errors == 0);
@@ -106,7 +106,7 @@ TEST_CASE("radii that the chip would choke on are left out; nonsense is refused 
     uint8_t blank[22];
     memset(blank, fill, sizeof blank);
     rig.power_on();
-    rig.imu.use_profile(blank, rig.clock.micros());
+    rig.imu.use_profile(blank);
     rig.run(1);
     CHECK(rig.imu.counts().refused_profiles == 1);
     CHECK_FALSE(rig.imu.has_profile());
@@ -123,7 +123,7 @@ TEST_CASE("a saved profile can be restored into the same chip after a power cycl
     rig.run(8);
     REQUIRE(rig.imu.is_calibrated());
     CHECK_FALSE(rig.imu.profile_ready(saved));
-    rig.imu.save_profile(rig.clock.micros());
+    rig.imu.save_profile();
     rig.run(1);
     REQUIRE(rig.imu.profile_ready(saved));
     CHECK_FALSE(rig.imu.profile_ready(saved));
@@ -135,7 +135,7 @@ TEST_CASE("a saved profile can be restored into the same chip after a power cycl
     rig.model.power_on();
     Bno055 restarted(rig.model);
     restarted.start(settings, rig.clock.micros());
-    restarted.use_profile(saved, rig.clock.micros());
+    restarted.use_profile(saved);
     for (int i = 0; i < 4000; ++i) {
       restarted.step(rig.clock.micros());
       rig.clock.advance(700);
@@ -152,7 +152,7 @@ TEST_CASE("a profile is not saved from a chip that fails meanwhile") {
   rig.model.set_motion(dance);
   rig.power_on();
   rig.run(8);
-  rig.imu.save_profile(rig.clock.micros());
+  rig.imu.save_profile();
   rig.model.inject(ImuFault::kBrownOut);
   rig.run(3);
   uint8_t saved[22];

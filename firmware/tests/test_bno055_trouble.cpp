@@ -81,7 +81,7 @@ TEST_CASE("a chip that lost fusion is brought back, and the lost heading is said
       rig.model.set_motion(dance);
       rig.power_on(settings);
       const Offsets profile;
-      rig.imu.use_profile(profile.bytes, rig.clock.micros());
+      rig.imu.use_profile(profile.bytes);
       rig.run(3);
       rig.model.inject(trouble.fault);
       const uint64_t begun_us = rig.clock.now_us();

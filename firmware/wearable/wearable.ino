@@ -5,6 +5,7 @@
 #include "src/arduino/usb_serial.h"
 #include "src/arduino/wifi_link.h"
 #include "src/arduino/wire_bus.h"
+#include "src/core/bno055.h"
 #include "src/core/wearable.h"
 
 namespace {
@@ -16,7 +17,8 @@ bunraku::NvmStore store;
 bunraku::UsbSerial cable;
 bunraku::WifiLink wifi(board);
 bunraku::WireBus bus;
-bunraku::Wearable wearable({board_clock, bus, wifi, cable, store, led, board});
+bunraku::Bno055 imu(bus);
+bunraku::Wearable wearable({board_clock, imu, wifi, cable, store, led, board});
 
 }  // namespace
 

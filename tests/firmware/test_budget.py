@@ -86,6 +86,17 @@ def test_a_call_through_a_pointer_may_reach_what_nobody_names(budget: ModuleType
     assert graph.deepest("run", {"run", "pointed_at"}) == [("run", 8), ("pointed_at", 100)]
 
 
+def test_the_bus_of_a_driver_is_not_the_driver(budget: ModuleType) -> None:
+    graph = call_graph(
+        budget,
+        node("run", 8),
+        node("Driver::step", 100),
+        edge("run", budget.INDIRECT),
+        edge("Driver::step", budget.INDIRECT),
+    )
+    assert graph.deepest("run", {"run", "Driver::step"}) == [("run", 8), ("Driver::step", 100)]
+
+
 def test_a_function_that_calls_itself_has_no_bound(budget: ModuleType) -> None:
     graph = call_graph(budget, node("run", 8), node("again", 8), edge("run", "again"), edge("again", "again"))
     with pytest.raises(budget.UnboundedStackError, match="again calls itself"):

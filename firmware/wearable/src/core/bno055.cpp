@@ -27,14 +27,6 @@ constexpr uint8_t kReadingBytes = 14;           // quaternion and linear acceler
 
 }  // namespace
 
-bool is_axis_remap(uint8_t axis_map, uint8_t axis_sign) {
-  const uint8_t x = axis_map & 3, y = axis_map >> 2 & 3, z = axis_map >> 4 & 3;
-  if ((1 << x | 1 << y | 1 << z) != 7 || axis_map > 0x3F || axis_sign > 7) return false;
-  const bool is_odd = (x > y) != ((x > z) != (y > z));
-  const bool is_mirrored = ((axis_sign >> 2 ^ axis_sign >> 1 ^ axis_sign) & 1) != 0;
-  return is_odd == is_mirrored;
-}
-
 void Bno055::start(const ImuSettings& settings, uint32_t now_us) {
   is_crystal_new_ = has_run_ && settings.has_crystal != settings_.has_crystal;
   settings_ = settings;
@@ -83,15 +75,16 @@ bool Bno055::acceleration(int16_t (&linear)[3]) {
   return is_new;
 }
 
-void Bno055::use_profile(const uint8_t* offsets22, uint32_t) {
+bool Bno055::use_profile(const uint8_t* offsets22) {
   const bool is_same = is_profile_known_ && memcmp(profile_, offsets22, kOffsetBytes) == 0;
-  if (is_same) return;
-  if (sound_profile_bytes(offsets22) == 0) return count(counts_.refused_profiles);
+  if (is_same) return true;
+  if (sound_profile_bytes(offsets22) == 0) return count(counts_.refused_profiles), false;
   memcpy(profile_, offsets22, kOffsetBytes);
   is_profile_known_ = wants_restore_ = true;
+  return true;
 }
 
-void Bno055::save_profile(uint32_t) {
+void Bno055::save_profile() {
   is_profile_ready_ = false;
   wants_save_ = state_ == State::kRunning;
 }

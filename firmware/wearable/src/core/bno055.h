@@ -3,25 +3,11 @@
 
 #include <stdint.h>
 
+#include "imu.h"
 #include "imu_gate.h"
 #include "ports.h"
 
 namespace bunraku {
-
-enum class Fusion : uint8_t { kImuPlus = 0x08, kNdof = 0x0C };  // values of OPR_MODE
-
-struct ImuSettings {
-  Fusion fusion;
-  uint8_t axis_map;   // register 0x41; 0x24 leaves the axes as printed on the chip
-  uint8_t axis_sign;  // register 0x42
-  bool has_crystal = false;  // a 32 kHz crystal is fitted beside the chip (a steadier heading)
-};
-
-struct Sample {
-  int16_t orientation[4];  // w, x, y, z; 16384 stands for 1
-  uint32_t measured_us;
-  uint8_t calibration;  // register 0x35
-};
 
 // Since power-on; they stop at 65535.
 struct ImuCounts {
@@ -41,43 +27,30 @@ struct ImuCounts {
   uint16_t refused_profiles;  // offsets that make no sense
 };
 
-// Whether 0x41 and 0x42 name each axis once and make a right-handed frame. The chip takes no others.
-bool is_axis_remap(uint8_t axis_map, uint8_t axis_sign);
-
-class Bno055 {
+class Bno055 final : public Imu {
  public:
   explicit Bno055(I2cBus& bus) : bus_(bus) {}
 
-  // Power-on or settings changed. A chip that fuses already as asked goes on: its heading is kept. Another
-  // crystal than before is told to it in any case.
-  // An invalid axis remap leaves the axes as they are.
-  void start(const ImuSettings& settings, uint32_t now_us);
+  // A new choice of crystal is told to the chip in any case, which then starts fusion again.
+  void start(const ImuSettings& settings, uint32_t now_us) override;
+  void step(uint32_t now_us) override;
+  bool sample(uint32_t now_us, Sample& out) override;  // one burst read, gated (zero, norm, rate, torn)
+  bool acceleration(int16_t (&linear)[3]) override;
 
-  // Start-up, mode changes, health checks, recovery: at most one bus transaction a call, never waits.
-  void step(uint32_t now_us);
+  bool is_running() const override { return state_ == State::kRunning; }
+  bool has_failed() const override { return has_failed_; }
+  bool has_id() const override { return has_id_; }
+  const uint8_t* unique_id() const override { return unique_id_; }  // page 1, register 0x50
 
-  // One burst read, gated (zero, norm, rate, torn). False: nothing to believe.
-  bool sample(uint32_t now_us, Sample& out);
+  // Registers 0x55 to 0x6A, through CONFIG mode: the heading is lost. Nonsense is refused and counted; a
+  // magnetometer radius outside 144..1280 is left out.
+  bool use_profile(const uint8_t* offsets22) override;
+  void save_profile() override;  // through CONFIG mode: the heading is lost
+  bool profile_ready(uint8_t* offsets22) override;
 
-  // Linear acceleration, 1/100 m/s^2, polled at 100 Hz for taps. False: nothing new since the last call.
-  bool acceleration(int16_t (&linear)[3]);
-
-  bool is_running() const { return state_ == State::kRunning; }  // fusion runs and gives data
-  bool has_failed() const { return has_failed_; }  // no chip, or none that gets well; goes on trying
-  bool has_id() const { return has_id_; }
-  const uint8_t* unique_id() const { return unique_id_; }  // 16 bytes, page 1 register 0x50
-
-  // 22 bytes, registers 0x55 to 0x6A, through CONFIG mode: the heading is lost. The same again: nothing.
-  // Nonsense is refused and counted; a magnetometer radius outside 144..1280 is left out.
-  void use_profile(const uint8_t* offsets22, uint32_t now_us);
-
-  // Reads the offsets through CONFIG mode: the heading is lost. Given up if the chip fails meanwhile.
-  void save_profile(uint32_t now_us);
-  bool profile_ready(uint8_t* offsets22);  // true once after each save
-
-  bool is_calibrated() const { return calibrated_looks_ >= 2; }  // gyr, acc (NDOF: and mag) at 3 for a second
-  bool has_profile() const { return has_profile_; }
-  uint8_t recoveries() const { return recoveries_; }  // rises when fusion was restarted; wraps
+  bool is_calibrated() const override { return calibrated_looks_ >= 2; }  // gyr, acc (NDOF: and mag) at 3
+  bool has_profile() const override { return has_profile_; }
+  uint8_t recoveries() const override { return recoveries_; }
   const ImuCounts& counts() const { return counts_; }
 
  private:

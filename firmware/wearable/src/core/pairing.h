@@ -3,7 +3,6 @@
 
 #include <stdint.h>
 
-#include "bno055.h"
 #include "ports.h"
 #include "timer.h"
 #include "wire.h"

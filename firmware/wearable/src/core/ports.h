@@ -1,8 +1,10 @@
-// The core's interfaces to the world: seven, implemented by the sketch and by the simulation.
+// The core's interfaces to the world, implemented by the sketch and by the simulation.
 // No call may block longer than its comment states: the core streams at 50 Hz on one thread.
 #pragma once
 
 #include <stdint.h>
+
+#include "imu.h"
 
 namespace bunraku {
 
@@ -14,7 +16,8 @@ class Clock {
   ~Clock() = default;
 };
 
-// The bus of the BNO055. A call returns false on NACK or a bus error; 22 bytes take about 5 ms.
+// The bus of the inertial unit. A call returns false on NACK or a bus error; 22 bytes of a BNO055 take about 5 ms.
+// The core's drivers have it; a wearable has the driver.
 class I2cBus {
  public:
   virtual bool write(uint8_t address, uint8_t reg, const uint8_t* data, uint8_t count) = 0;
@@ -100,7 +103,7 @@ class Board {
 
 struct Ports {
   Clock& clock;
-  I2cBus& i2c;
+  Imu& imu;
   DatagramLink& wifi;
   SerialPort& serial;
   FlashStore& flash;

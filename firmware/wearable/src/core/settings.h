@@ -3,7 +3,6 @@
 
 #include <stdint.h>
 
-#include "bno055.h"
 #include "ports.h"
 #include "wire.h"
 
@@ -11,8 +10,6 @@ namespace bunraku {
 
 constexpr uint8_t kLongestName = 24, kLongestNetwork = 32, kLongestPassword = 63;
 constexpr uint16_t kDefaultPort = 9750;  // port of the box, UDP
-constexpr uint8_t kProfileBytes = 22;    // BNO055 registers 0x55 to 0x6A
-constexpr uint8_t kImuIdBytes = 16;
 
 struct Settings {
   char name[kLongestName + 1] = "";
@@ -31,7 +28,7 @@ struct Settings {
 bool load_settings(FlashStore& flash, Settings& settings);
 bool save_settings(FlashStore& flash, const Settings& settings);
 
-// False: there is none, or it belongs to another BNO055.
+// False: there is none, or it belongs to another IMU.
 bool load_profile(FlashStore& flash, const uint8_t* imu_id, uint8_t* offsets);
 bool save_profile(FlashStore& flash, const uint8_t* imu_id, const uint8_t* offsets);
 

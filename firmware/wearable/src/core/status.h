@@ -34,7 +34,7 @@ struct Status {
   uint8_t battery = 0;           // percent; 255 unknown
   uint16_t battery_millivolts = 0;
   uint16_t round_trip = 0;       // 0.1 ms; 65535 unknown
-  uint8_t calibration = 0;       // register 0x35 of the newest sample
+  uint8_t calibration = 0;       // of the newest sample, as in Sample
   uint8_t taps = 0;
   uint8_t recoveries = 0;        // as told to the box: restarts of the IMU and whatever else cost the heading
   PairingCounts dropped;

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "boot_nonce.h"
-#include "imu_profile.h"
 #include "led_pattern.h"
 
 namespace bunraku {
@@ -89,7 +88,7 @@ void Wearable::keep_calibration(uint32_t now_us) {
     has_looked_for_profile_ = true;
     pairing_.introduce();
     if (load_profile(ports_.flash, imu_.unique_id(), offsets)) {
-      imu_.use_profile(offsets, now_us);
+      imu_.use_profile(offsets);
       pairing_.announce_profile(offsets);
     }
   }
@@ -117,12 +116,11 @@ void Wearable::receive(const uint8_t* data, uint16_t count, const Way& from, uin
   if (received != Received::kRestore) return;
   wire::Restore restore;
   restore.read(data);
-  imu_.use_profile(restore.offsets, now_us);
-  if (sound_profile_bytes(restore.offsets) > 0) store_profile(restore.imu_id, restore.offsets);
+  if (imu_.use_profile(restore.offsets)) store_profile(restore.imu_id, restore.offsets);
 }
 
-bool Wearable::store_profile(const uint8_t* imu_id, const uint8_t* offsets) {  // (blocks some 10 ms)
-  status_.is_profile_unsaved = !save_profile(ports_.flash, imu_id, offsets);
+bool Wearable::store_profile(const uint8_t* imu_id, const uint8_t* profile) {  // (blocks some 10 ms)
+  status_.is_profile_unsaved = !save_profile(ports_.flash, imu_id, profile);
   return !status_.is_profile_unsaved;
 }
 

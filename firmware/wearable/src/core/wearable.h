@@ -4,7 +4,6 @@
 #include <stdint.h>
 
 #include "battery.h"
-#include "bno055.h"
 #include "console.h"
 #include "framing.h"
 #include "pairing.h"
@@ -19,7 +18,7 @@ namespace bunraku {
 
 class Wearable {
  public:
-  explicit Wearable(const Ports& ports) : ports_(ports), imu_(ports_.i2c) {}
+  explicit Wearable(const Ports& ports) : ports_(ports), imu_(ports_.imu) {}
 
   void begin();  // once, at power-on: reads the flash, draws the boot nonce, starts the IMU
 
@@ -43,7 +42,7 @@ class Wearable {
   const char* keep_settings(uint32_t now_us);
   const char* forget(uint32_t now_us);
   void save_calibration(uint32_t now_us);
-  bool store_profile(const uint8_t* imu_id, const uint8_t* offsets);  // false: the flash did not take it
+  bool store_profile(const uint8_t* imu_id, const uint8_t* profile);  // false: the flash did not take it
   void say_line(const char* line);
 
   void serve_wifi(uint32_t now_us);
@@ -67,7 +66,7 @@ class Wearable {
   Settings settings_;
   Console console_;
   Pairing pairing_;
-  Bno055 imu_;
+  Imu& imu_;
   Schedule schedule_;
   Battery battery_;
   Taps taps_;

@@ -103,7 +103,7 @@ const char* Wearable::forget(uint32_t now_us) {
 }
 
 void Wearable::save_calibration(uint32_t now_us) {
-  imu_.save_profile(now_us);
+  imu_.save_profile();
   saving_.start(now_us, kSavingUs);
 }
 

@@ -79,8 +79,8 @@ struct Hello {
   uint8_t firmware_minor;
   uint8_t firmware_patch;
   uint8_t battery;  // percent; 255 unknown
-  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF); bit 2: the radio's own firmware is older than 19.5.4; bit 3: a crystal for the BNO055; bits 4 to 7: n > 0: the Wi-Fi had 4 n - 90 dBm when it was joined
-  uint8_t imu_id[16];  // unique id of the BNO055; its calibration is kept under it
+  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF); bit 2: the radio's own firmware is older than 19.5.4; bit 3: the IMU runs by a crystal; bits 4 to 7: n > 0: the Wi-Fi had 4 n - 90 dBm when it was joined
+  uint8_t imu_id[16];  // unique id of the IMU; its calibration is kept under it
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
@@ -119,7 +119,7 @@ struct Assignment {
   }
 };
 
-// One orientation of the sensor, at the rate of the assignment: 50 a second.
+// One orientation of the sensor, at the rate of the assignment: 50 or 100 a second.
 // Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
 #define BUNRAKU_READING(X) \
 X(device_id) X(boot_nonce) X(session) X(sequence) X(sensor_time_us) X(orientation) X(calibration) \
@@ -134,12 +134,12 @@ struct Reading {
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
   uint32_t sensor_time_us;  // device clock at the measurement; wraps after 71.6 minutes
   int16_t orientation[4];  // w, x, y, z; 16384 stands for 1; from the case to the room
-  uint8_t calibration;  // BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each
+  uint8_t calibration;  // system, gyroscope, accelerometer, magnetometer: two bits each, 3 is best
   uint8_t battery;  // percent; 255 unknown
   uint16_t round_trip;  // newest round trip by a heartbeat's echo, 0.1 ms; 65535 unknown
   uint8_t taps;  // counts double taps since power-on; wraps
-  uint8_t recoveries;  // counts restarts of the BNO055 since power-on; wraps; its heading is lost
-  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF); bit 2: the radio's own firmware is older than 19.5.4; bit 3: a crystal for the BNO055; bits 4 to 7: n > 0: the Wi-Fi had 4 n - 90 dBm when it was joined
+  uint8_t recoveries;  // counts restarts of the fusion since power-on; wraps; its heading is lost
+  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF); bit 2: the radio's own firmware is older than 19.5.4; bit 3: the IMU runs by a crystal; bits 4 to 7: n > 0: the Wi-Fi had 4 n - 90 dBm when it was joined
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
@@ -212,8 +212,8 @@ struct Profile {
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
   uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
-  uint8_t imu_id[16];  // unique id of the BNO055
-  uint8_t offsets[22];  // BNO055 registers 0x55 to 0x6A
+  uint8_t imu_id[16];  // unique id of the IMU
+  uint8_t offsets[22];  // as the IMU has it; the box does not look inside
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
@@ -237,8 +237,8 @@ struct Restore {
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
   uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
-  uint8_t imu_id[16];  // unique id of the BNO055 that it is for
-  uint8_t offsets[22];  // BNO055 registers 0x55 to 0x6A
+  uint8_t imu_id[16];  // unique id of the IMU that it is for
+  uint8_t offsets[22];  // as that IMU gave it
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
