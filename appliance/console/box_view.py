@@ -12,10 +12,12 @@ from appliance.console.desk import NO_COMMANDS, SILENT, Desk
 from appliance.console.seen_stage import SeenStage
 from appliance.console.stage_view import StageView
 from appliance.console.verdict import Verdict, verdict
+from appliance.levers.addresses import NAMED
 from appliance.levers.lever import Lever
 from appliance.levers.show_state import ShowState
+from appliance.levers.status import Status
 from appliance.levers.table import FEEDBACK, MADE_NUMBERS, PATH_POINTS, SPRINGS, STIFFNESS, STORM, STRINGS
-from appliance.show_control.status_messages import LISTED, Status, hands_of, names_of, status
+from appliance.show_control.status_messages import hands_of, names_of, status
 
 _NO_BATTERY = 255
 _KNOBS = (STIFFNESS, STORM, FEEDBACK)  # knobs of the springs
@@ -76,7 +78,7 @@ class BoxView:
                     {"name": name, "now": is_now}
                     for name, is_now in (names_of(question, state, known, seen) if known else ())
                 ]
-                for question in LISTED
+                for question in NAMED
             },
         }
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
-from appliance.show_control.status_messages import Status
+from appliance.levers.status import Status
 
 _RECENT_S = 60.0  # a late tick stays in the verdict for this long
 

@@ -6,6 +6,7 @@ from typing import Any, Literal, NamedTuple
 
 from appliance.levers.form import FADE, FAR, Form, Number
 from appliance.levers.lever import Lever
+from appliance.levers.status import STATUS
 from appliance.levers.table import AGAIN, LEVERS, LOOK_FADE_S, STOP_FADE_S, VELOCITY
 
 Receiver = Literal["stage", "projector", "lights", "generator"]
@@ -224,7 +225,7 @@ def _listed(lever: Lever[Any]) -> Question:
 
 LISTS: dict[str, Lever[Any]] = {f"/{one.names[0]}": one for one in LEVERS if one.listed}
 QUESTIONS = (
-    Question("/status", (("/bunraku/status", "", "as below"),)),
+    Question("/status", ((f"{STATUS}/…", "", "one message for each field, as below"),)),
     Question("/cues", (("/cues/cue", ",si", "name; 1: in force"),)),
     Question(
         "/phrases",
@@ -271,6 +272,9 @@ QUESTIONS = (
 )
 ADDRESSES: dict[str, Address] = {
     one.address: one for one in (*THE_SHOW, *PLAYBACK, *PROJECTOR, *SENSORS, *MADE_AHEAD)
+}
+NAMED: dict[str, str] = {  # questions for names, and the address that each of these names comes with
+    one.address: answer for one in QUESTIONS for answer, tags, _ in one.answers if tags == ",si"
 }
 ANSWERS = frozenset(answer for question in QUESTIONS for answer, *_ in question.answers)
 FORMS: dict[str, Form] = {

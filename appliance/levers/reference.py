@@ -9,6 +9,7 @@ from pathlib import Path
 from appliance.levers import addresses
 from appliance.levers.addresses import QUESTIONS, Address
 from appliance.levers.form import FADE
+from appliance.levers.status import FIELDS, STATUS, TAGS
 
 SECTIONS = {
     "### The show": addresses.THE_SHOW,
@@ -19,12 +20,16 @@ SECTIONS = {
 }
 _COMMANDS = "| address | arguments | what it does |\n|---|---|---|\n"
 _QUESTIONS = "| question | answers | arguments |\n|---|---|---|\n"
+_STATUS = "| address | type tag | meaning |\n|---|---|---|\n"
 
 
 def written(page: str) -> str:
-    """The page with its tables of commands and questions anew. Raises ValueError where one is missing."""
+    """The page with its tables of commands, questions and the status anew. Raises ValueError where one is
+    missing.
+    """
     for heading, section in SECTIONS.items():
         page = _replaced(page, page.index(f"\n{heading}\n"), _COMMANDS, map(_row, section))
+    page = _replaced(page, 0, _STATUS, _fields())
     return _replaced(page, 0, _QUESTIONS, _answers())
 
 
@@ -53,6 +58,11 @@ def _answers() -> Iterator[str]:
             asked = "" if place else f"`{question.address}`"
             yield f"|{_spaced(asked)}| `{answer}`{f' `{tags}`' if tags else ''} | {about} |"
     yield "| all of them | `/end` `,si` | the question's address; how many answers came before |"
+
+
+def _fields() -> Iterator[str]:
+    for name, (kind, meaning) in FIELDS.items():
+        yield f"| `{STATUS}/{name}` | `,{TAGS[kind]}` | {meaning} |"
 
 
 def _spaced(cell: str) -> str:

@@ -12,6 +12,7 @@ from appliance.levers.addresses import ADDRESSES, ANSWERS, QUESTIONS, Receiver
 from appliance.levers.lever import Lever
 from appliance.levers.show_state import Change, ShowState
 from appliance.levers.sources import LIVE
+from appliance.levers.status import STATUS, Status
 from appliance.levers.table import CAMERA, CARD, CUE, LIGHTS, LOOK, PHRASE, RATE, SPRINGS, find_lever
 from appliance.show_control.acknowledgements import Acknowledgements
 from appliance.show_control.command import (
@@ -34,7 +35,7 @@ from appliance.show_control.sensor_roster import END as ROSTER_END
 from appliance.show_control.sensor_roster import SENSOR, roster_messages
 from appliance.show_control.show_state_commands import declare, in_cue, let_go, of_this_show
 from appliance.show_control.stage_observer import StageObserver
-from appliance.show_control.status_messages import END, Status, status, told
+from appliance.show_control.status_messages import END, status, told
 from appliance.show_control.trackers import TRACKERS, Trackers
 
 if TYPE_CHECKING:
@@ -42,7 +43,10 @@ if TYPE_CHECKING:
 
 # Messages of a box are never answered: two boxes would go on answering each other for ever.
 _ANSWERS = frozenset((*ANSWERS, REPLY, SENSORS_REPLY, PONG, END, SENSOR, ROSTER_END))
-_LISTED = tuple(f"{question.address}/" for question in QUESTIONS if question.address != "/motion")
+_LISTED = (
+    f"{STATUS}/",
+    *(f"{question.address}/" for question in QUESTIONS if question.address not in ("/motion", "/status")),
+)
 _QUESTIONS = frozenset(question.address for question in QUESTIONS)
 _ONCE_A_BUNDLE = frozenset((*_QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."

@@ -1,12 +1,12 @@
-"""The heartbeat: once a second `/bunraku/status` to every listener in the box file."""
+"""The heartbeat: once a second the status, in one bundle, to every listener in the box file."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from appliance.levers.status import Status
 from appliance.show_control.listeners import Listeners
 from appliance.show_control.settings import Listener
-from appliance.show_control.status_messages import STATUS, Status
 
 EVERY_S = 1.0
 
@@ -21,7 +21,7 @@ class Heartbeat:
     def beat(self, status: Status, now: float) -> None:
         """Send it; after a stall the grid starts over, and nothing is sent twice."""
         self.due = self.due + EVERY_S if self.due + EVERY_S > now else now + EVERY_S
-        self._listeners.send((STATUS, *status))
+        self._listeners.send(*status.messages())
 
     def close(self) -> None:
         """Send no more."""

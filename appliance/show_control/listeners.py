@@ -19,10 +19,10 @@ class Listeners:
             one.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
             one.setblocking(False)
 
-    def send(self, message: Message, but: Listener | None = None) -> None:
-        """Send a message to all of them but one; what the network does not take at once is dropped."""
+    def send(self, *messages: Message, but: Listener | None = None) -> None:
+        """Send messages, in one datagram, to all of them but one; it is dropped where the network is busy."""
         with contextlib.suppress(ValueError):  # a text that OSC cannot carry
-            packed = datagram(message)
+            packed = datagram(*messages)
             for listener, sender in self._listeners.items():
                 if listener != but:
                     with contextlib.suppress(OSError):

@@ -16,7 +16,8 @@ DEEPEST_BUNDLE = 8
 BUNDLE = b"#bundle\0"  # how a bundle begins
 URGENT = ("/panic", "/blackout", "/stop", "/go")
 
-_HEAD_BYTES = 16  # head of a bundle: BUNDLE, then the time tag
+_NOW = bytes([0, 0, 0, 0, 0, 0, 0, 1])  # time tag
+_HEAD_BYTES = len(BUNDLE + _NOW)
 _NUMBERS = {tag: struct.Struct(f">{packed}") for tag, packed in zip("ifhd", "ifqd", strict=True)}
 _CONSTANTS = {"T": True, "F": False}
 _TRIGGERS = "IN"  # OSC's impulse and nil: a trigger, and no value
@@ -53,15 +54,24 @@ def urgent_address(received: bytes) -> bytes:
     return found[1] if found else b""
 
 
-def datagram(message: Message) -> bytes:
-    """One OSC message: its address, then whole numbers, fractions and texts. Raises ValueError for others."""
+def datagram(*messages: Message) -> bytes:
+    """One OSC message, several in a bundle: address, then whole numbers, fractions and texts. Raises
+    ValueError for others.
+    """
     try:
-        builder = OscMessageBuilder(str(message[0]))
-        for argument in message[1:]:
-            builder.add_arg(argument)
-        return bytes(builder.build().dgram)
+        packed = [_packed(one) for one in messages]
     except (BuildError, osc_types.BuildError, ValueError, OverflowError) as error:  # a fraction above 3.4e38
         raise ValueError(f"This is no OSC: {error}") from None
+    if len(packed) == 1:
+        return packed[0]
+    return b"".join((BUNDLE, _NOW, *(part for one in packed for part in (struct.pack(">i", len(one)), one))))
+
+
+def _packed(message: Message) -> bytes:
+    builder = OscMessageBuilder(str(message[0]))
+    for argument in message[1:]:
+        builder.add_arg(argument)
+    return bytes(builder.build().dgram)
 
 
 def readable(text: str) -> str:

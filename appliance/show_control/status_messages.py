@@ -6,50 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, Protocol
 
 from appliance.box.fallback import Fallen
-from appliance.levers.addresses import LISTS
+from appliance.levers.addresses import LISTS, NAMED
 from appliance.levers.show_state import ShowState
+from appliance.levers.status import Status
 from appliance.levers.table import LIGHTS, LOOK, MADE_NUMBERS
 from appliance.pose.foreign_file import plain_json
 from appliance.show_control.packet import Message
 
 StageState = Literal["dancing", "stopped", "hung", "absent"]
-STATUS, END = "/bunraku/status", "/end"
-LISTED = {"/cues": "/cues/cue", "/phrases": "/phrases/phrase"} | {
-    question: f"{question}/{lever.listed}" for question, lever in LISTS.items()
-}
-UNKNOWN = -1.0
+END = "/end"
 _LONGEST_WORDS = 1000  # longest sentence in an answer
-
-
-class Status(NamedTuple):
-    """How the box is, as the arguments of `/bunraku/status` in this order; docs/osc.md explains them."""
-
-    state: str  # dancing, stopped, panic, blackout, hung, absent
-    show: str
-    rate_hz: float
-    late: int
-    skipped: int
-    tick_p50_ms: float
-    tick_p99_ms: float
-    sensor_age_s: float
-    coding: int
-    interaction: int
-    phrase: str
-    position_s: float
-    cue: str
-    look: str
-    lights: str
-    level: float
-    panic: int
-    blackout: int
-    temperature_c: float
-    uptime_s: float
-    refused: int
-    strangers: int
-    fallbacks: int
-    liveliness: float
-    seed: int
-    live: str = ""
 
 
 class SeenFacts(Protocol):
@@ -107,34 +73,20 @@ def status(
 ) -> Status:
     """The stage's last report, and what show control sees of a stage that hangs or is absent."""
     stage, health, facts = observer.state(now), observer.health(), observer.facts
-    if stage == "absent":
-        health = {}
-    return Status(
+    seen = Status.reported({} if stage == "absent" else health)
+    return seen._replace(
         state=_state(stage, show_state),
         show=facts.show_name if facts else "",
-        rate_hz=float(health.get("rate_hz", 0.0)) if stage in ("dancing", "stopped") else 0.0,
-        late=int(health.get("late", 0)),
-        skipped=int(health.get("skipped", 0)),
-        tick_p50_ms=float(health.get("tick_p50_ms", 0.0)),
-        tick_p99_ms=float(health.get("tick_p99_ms", 0.0)),
-        sensor_age_s=_known(health.get("sensor_age_s")),
-        coding=int(health.get("coding", 0)),
-        interaction=int(health.get("interaction", 0)),
-        phrase=str(health.get("phrase", "")),
-        position_s=_known(health.get("position_s")),
+        rate_hz=seen.rate_hz if stage in ("dancing", "stopped") else 0.0,
         cue=show_state.cue,
         look=show_state[LOOK].value or (facts.looks[0] if facts and facts.looks else ""),
         lights=show_state[LIGHTS].value or (facts.lights[0] if facts and facts.lights else ""),
         level=show_state.level(now),
         panic=int(show_state.panic),
         blackout=int(show_state.blackout),
-        temperature_c=_known(health.get("temperature_c")),
-        uptime_s=_known(health.get("uptime_s")),
         refused=refused,
         strangers=strangers,
         fallbacks=sum(one.active for _, one in observer.fallbacks(now)),
-        liveliness=_known(health.get("liveliness")),
-        seed=int(health.get("seed", -1)),
         live=live,
     )
 
@@ -144,10 +96,10 @@ def told(
 ) -> Iterator[Message]:
     """The answer to a question: a message for each thing, and one to end with."""
     if question == "/status":
-        answers: list[Message] = [(STATUS, *now_status)]
-    elif question in LISTED:
+        answers: list[Message] = [*now_status.messages()]
+    elif question in NAMED:
         names = names_of(question, show_state, now_status, observer)
-        answers = [(LISTED[question], name, int(is_now)) for name, is_now in names]
+        answers = [(NAMED[question], name, int(is_now)) for name, is_now in names]
     elif question == "/hands":
         answers = [
             ("/hands/hand", one.joint, one.source, int(one.holds), one.by) for one in hands_of(observer)
@@ -163,7 +115,7 @@ def told(
 def names_of(
     question: str, show_state: ShowState, now_status: Status, observer: Seen
 ) -> list[tuple[str, bool]]:
-    """The names that a question of LISTED asks for, and which is in force."""
+    """The names that a question of NAMED asks for, and which is in force."""
     facts = observer.facts
     if facts is None:
         return []
@@ -224,7 +176,3 @@ def _state(stage: str, show_state: ShowState) -> str:
     if show_state.blackout:
         return "blackout"
     return stage if show_state.going else "stopped"
-
-
-def _known(value: float | None) -> float:
-    return UNKNOWN if value is None else float(value)

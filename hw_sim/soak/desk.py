@@ -13,9 +13,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from hw_sim.osc_receiver import Argument, MalformedOscError, decode
 from hw_sim.peers import HOST
 
-_STATUS = "/bunraku/status"
-# Fields of /bunraku/status at these places (docs/osc.md).
-_LATE, _SKIPPED, _TICK_P50_MS = 3, 4, 5
+_STATUS = "/bunraku/status/"
 _WELL = (  # each of these restores what another one changed
     *(("/cue", ()), ("/cue", ()), ("/go", ()), ("/stop", (1.0,)), ("/go", ()), ("/blackout", (1,))),
     *(("/blackout", (0,)), ("/master", (0.3, 1.0)), ("/master", (1.0, 0.5)), ("/panic", ()), ("/go", ())),
@@ -72,8 +70,10 @@ class Desk:
             except ConnectionRefusedError:
                 continue  # show control was away when something was sent
             with contextlib.suppress(MalformedOscError):
-                for address, arguments in decode(datagram):
+                messages = decode(datagram)
+                for address, arguments in messages:
                     self._take(address, arguments)
+                self._take_heartbeat({address: arguments[0] for address, arguments in messages if arguments})
 
     def close(self) -> None:
         """Close the socket."""
@@ -82,11 +82,12 @@ class Desk:
     def _take(self, address: str, arguments: list[Argument]) -> None:
         if address in ("/reply", "/sensors/reply"):
             self.counts["done" if arguments[1] else "refused"] += 1
-        elif address == _STATUS:
+
+    def _take_heartbeat(self, values: dict[str, Argument]) -> None:
+        late, skipped, p50_ms = (values.get(_STATUS + field) for field in Said._fields)
+        if isinstance(late, int) and isinstance(skipped, int) and isinstance(p50_ms, float):
             self.counts["heartbeats"] += 1
-            late, skipped, p50_ms = (arguments[place] for place in (_LATE, _SKIPPED, _TICK_P50_MS))
-            if isinstance(late, int) and isinstance(skipped, int) and isinstance(p50_ms, float) and late >= 0:
-                self.said = Said(late, skipped, p50_ms)
+            self.said = Said(late, skipped, p50_ms)
 
     def _nonsense(self, port: int) -> str:
         if self._random.random() < 0.5:

@@ -43,7 +43,9 @@ def test_show_control_answers_again_after_it_was_killed(dancing: Box) -> None:
     dancing.machine.kill("bunraku-control")
     answered = dancing.machine.await_that(
         lambda: [
-            arguments for where, arguments in dancing.hall.ask("/status", 0.5) if where == "/bunraku/status"
+            arguments
+            for where, arguments in dancing.hall.ask("/status", 0.5)
+            if where == "/bunraku/status/state"
         ],
         "show control does not answer",
     )

@@ -18,7 +18,9 @@ def _name_of_the_show(box: Box) -> str:
     """As show control tells it."""
     return str(
         box.machine.await_that(
-            lambda: [words[1] for where, words in box.hall.ask("/status", 0.5) if where == "/bunraku/status"],
+            lambda: [
+                words[0] for where, words in box.hall.ask("/status", 0.5) if where == "/bunraku/status/show"
+            ],
             "show control does not answer",
         )[0]
     )

@@ -14,7 +14,6 @@ from appliance.console.box_view import BoxView
 from appliance.console.desk import NO_COMMANDS, SILENT, Desk
 from appliance.console.seen_stage import SeenStage
 from appliance.console.stage_view import StageView
-from appliance.show_control.status_messages import Status
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, until
 
 LINE = RosterLine(
@@ -46,7 +45,7 @@ def test_the_page_tells_what_a_desk_is_answered(tmp_path: Path, view: BoxView) -
 
         until(is_told)
         told = view.value
-        answered = Status(*asker.ask_all("/status")[0][1:])._asdict()
+        answered = asker.status()._asdict()
         for changing in ("level", "uptime_s"):
             answered.pop(changing), told["status"].pop(changing)
         assert told["status"] == {name: pytest.approx(value) for name, value in answered.items()}

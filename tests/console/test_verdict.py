@@ -12,14 +12,10 @@ import pytest
 
 from appliance.console.page_files import FOLDER, languages
 from appliance.console.verdict import verdict
-from appliance.show_control.status_messages import Status
+from appliance.levers.status import Status
 from hw_sim.figures import verdict as verdict_of_measure
 
-GOOD: dict[str, Any] = dict.fromkeys(Status._fields, 0) | {
-    "state": "dancing",
-    "rate_hz": 50.0,
-    "level": 1.0,
-}
+GOOD = Status(state="dancing", rate_hz=50.0, level=1.0)
 HEARD = {"name": "left-wrist", "is_worn": True, "heard": True}
 LOST = {"name": "right-wrist", "is_worn": True, "heard": False}
 SPARE = {"name": "spare", "is_worn": False, "heard": False}
@@ -28,7 +24,7 @@ NOW, HOUR_AGO = 0.0, 3600.0  # seconds since a tick was late
 
 
 def status(**values: Any) -> Status:
-    return Status(**{**GOOD, **values})
+    return GOOD._replace(**values)
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from appliance.box.notify import Notifier
 from appliance.box.orders import Order, OrderInbox
 from appliance.box.show_state import ShowStateReader
 from appliance.levers.addresses import Receiver
+from appliance.levers.status import STATUS, Status
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show_control.packet import datagram
@@ -222,6 +223,11 @@ class Asker:
         heard = self.hear()
         assert heard is not None, f"nothing came back for {address}"
         return heard
+
+    def status(self) -> Status:
+        """The answer to /status."""
+        *fields, _ = self.ask_all("/status")
+        return Status(**{address.removeprefix(f"{STATUS}/"): value for address, value in fields})
 
     def order(self, address: str, *arguments: Any) -> list[Any]:
         """Like `ask`, for what stage or projector carry out: again while these were held up for too long.

@@ -123,7 +123,7 @@ def test_how_alive_and_which_dance_is_declared(folder: Path, stage: StageDouble,
     assert asker.ask("/seed", 2**31 - 1) == ["/reply", "/seed", 1, words]
     assert declared(folder, SEED) == (2**31 - 1, 0.0)
     stage.tell(liveliness=0.75, seed=5)
-    assert asker.ask("/status")[-3:] == [0.75, 5, ""]
+    assert (asker.status().liveliness, asker.status().seed) == (0.75, 5)
 
 
 def test_hands_are_declared_by_name_or_number(folder: Path, stage: StageDouble, asker: Asker) -> None:
@@ -209,8 +209,9 @@ def test_questions_are_answered_with_what_is_in_force(stage: StageDouble, asker:
 def test_questions_without_a_stage_have_empty_answers(asker: Asker) -> None:
     for question in ("/cues", "/phrases", "/looks", "/hands"):
         assert asker.ask_all(question) == [["/end", question, 0]]
-    status, end = asker.ask_all("/status")
-    assert (status[0], status[1], end) == ("/bunraku/status", "absent", ["/end", "/status", 1])
+    *status, end = asker.ask_all("/status")
+    assert status[0] == ["/bunraku/status/state", "absent"]
+    assert end == ["/end", "/status", len(status)]
 
 
 def test_reasons_may_be_shown_on_any_terminal(control: ControlInThread, asker: Asker) -> None:

@@ -58,7 +58,15 @@ def test_what_a_box_says_is_never_answered_so_that_two_boxes_do_not_talk_for_eve
     control: ControlInThread, asker: Asker
 ) -> None:
     answers = [
-        *("/reply", "/pong", "/end", "/sensors/reply", "/sensors/sensor", "/sensors/end", "/bunraku/status"),
+        *(
+            "/reply",
+            "/pong",
+            "/end",
+            "/sensors/reply",
+            "/sensors/sensor",
+            "/sensors/end",
+            "/bunraku/status/state",
+        ),
         *("/cues/cue", "/phrases/phrase", "/looks/look", "/hands/hand"),
     ]
     for address in answers:

@@ -141,7 +141,7 @@ def test_what_comes_while_others_are_carried_out_goes_before_the_next_of_them(
     for address in ("/ping", "/status", "/status"):
         desk.tell(address)
     process.turn()
-    assert heard(desk)[:3] == ["/pong", "/panic", "/bunraku/status"]
+    assert heard(desk)[:3] == ["/pong", "/panic", "/bunraku/status/state"]
 
 
 def test_of_too_many_the_oldest_give_way_are_counted_and_the_status_says_so(
@@ -160,7 +160,7 @@ def test_of_too_many_the_oldest_give_way_are_counted_and_the_status_says_so(
         process.turn()
         answers += heard(desk)
     assert answers.count("/nonsense") == DATAGRAMS_WAITING - 1
-    assert "/bunraku/status" in answers
+    assert "/bunraku/status/fallbacks" in answers
     assert process.handler.status(0, NOW).fallbacks == 1
 
 

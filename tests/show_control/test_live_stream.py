@@ -187,7 +187,7 @@ def test_how_much_of_a_live_dancer_comes_is_answered_and_told(
         for _ in range(3):
             for name in names:
                 asker.socket.send(bone(name))
-        return str(asker.ask_all("/status")[0][-1])
+        return asker.status().live
 
     until(lambda: stream("LeftUpperArm") == f"1 of {len(BONES)} bones")
     answer = asker.ask("/phrase", LIVE)[3]

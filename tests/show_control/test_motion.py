@@ -13,11 +13,12 @@ import pytest
 from appliance.box.made_motion import KeptNamesWriter
 from appliance.levers.show_state import ShowState
 from appliance.levers.sources import MOST_POINTS, PARAMETERS
+from appliance.levers.status import Status
 from appliance.levers.table import AGAIN, MADE_NUMBERS, PATH_POINTS, PHRASE
 from appliance.show_control.command import command
 from appliance.show_control.show_state_commands import declare
 from appliance.show_control.stage_observer import StageObserver
-from appliance.show_control.status_messages import Status, told
+from appliance.show_control.status_messages import told
 from tests.show_control.doubles import facts
 
 SOURCES = ("main", "quiet", "vary", "granular", "path", "improvise")
@@ -93,8 +94,7 @@ def test_the_status_tells_what_is_danced_and_every_parameter() -> None:
     recipe = {"source": "vary", "sigma": 0.9, "seed": 4, "number": 1001, "prompt": "long"}
     for made, danced in (("", []), (json.dumps(recipe), [("source", "vary"), ("sigma", 0.9), ("seed", 4)])):
         observer = cast(StageObserver, SimpleNamespace(facts=shown, health=lambda made=made: {"made": made}))
-        status = cast(Status, SimpleNamespace(phrase="vary"))
-        *answers, end = told("/motion", state, observer, status, NOW)
+        *answers, end = told("/motion", state, observer, Status(phrase="vary"), NOW)
         assert [answer[1:] for answer in answers if answer[0] == "/motion/is"] == danced
         parameters = [answer[1:] for answer in answers if answer[0] == "/motion/parameter"]
         assert parameters == [("vary", "sigma", 2.0), ("vary", "seed", 3.0)]

@@ -18,7 +18,6 @@ from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STA
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 from appliance.release.trial import MirroredProof
 from appliance.show_control.stage_observer import StageObserver
-from appliance.show_control.status_messages import Status
 from tests.bundles import FIGURE
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts, until
 
@@ -169,6 +168,6 @@ def test_the_desk_answers_and_the_status_counts(folder: Path) -> None:
 
         until(lambda: len(told()) == 2)
         assert told()[0] == ["/fallbacks/fallback", "tick-late", "stage", 3, 1, words, ""]
-        until(lambda: Status(*asker.ask_all("/status")[0][1:]).fallbacks == 1)
+        until(lambda: asker.status().fallbacks == 1)
         asker.close()
     control.close()

@@ -37,11 +37,9 @@ def answers(port: int) -> bool:
 
 
 def status(asker: Asker) -> dict[str, Any]:
-    """The first arguments of /bunraku/status by name, and the later ones that tests look at."""
-    message, _ = asker.ask_all("/status")
-    names = {1: "state", 9: "coding", 10: "interaction", 13: "cue", 14: "look", 16: "level", 17: "panic"}
-    now = {name: message[place] for place, name in names.items()}
-    return now | {"level": round(now["level"], 3)}
+    """The status by name, its level rounded."""
+    now = asker.status()
+    return now._asdict() | {"level": round(now.level, 3)}
 
 
 def await_status(asker: Asker, **wanted: Any) -> None:

@@ -94,38 +94,42 @@ def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_p
             def send(*words: str) -> None:
                 subprocess.run(["oscsend", HOST, str(port), *words], check=True)
 
-            def says(*words: str) -> bool:
-                lines = [line for line in heard.read_text().splitlines() if "/bunraku/status" in line]
-                return any(all(word in line for word in words) for line in lines)
+            def says(**wanted: str) -> bool:
+                line = re.compile(r"/bunraku/status/(\w+) \w \"?([^\"\n]*)\"?$", re.M)
+                return wanted.items() <= dict(line.findall(heard.read_text())).items()
 
-            def confirms(*command: str, words: str) -> bool:
+            def confirms(*command: str, **wanted: str) -> bool:
                 """Send a command; the caller repeats it, because a delayed stage refuses orders."""
                 send(*command)
                 soon = time.monotonic() + 2.0
-                while not says(words) and time.monotonic() < soon:
+                while not says(**wanted) and time.monotonic() < soon:
                     time.sleep(0.05)
-                return says(words)
+                return says(**wanted)
 
-            wait_until(lambda: says('"dancing" "A test"'))
-            wait_until(lambda: confirms("/iterations", "ii", "5", "4", words=' 5 4 "main"'))
-            wait_until(lambda: confirms("/cue", "s", "storm", words='"storm" "ink"'))
+            wait_until(lambda: says(state="dancing", show="A test"))
+            wait_until(
+                lambda: confirms("/iterations", "ii", "5", "4", coding="5", interaction="4", phrase="main")
+            )
+            wait_until(lambda: confirms("/cue", "s", "storm", cue="storm", look="ink"))
             send("/master", "f", "0.25")
-            wait_until(lambda: says('"dancing"', '"storm" "ink"', " 0.250000 0 0 "))
+            wait_until(lambda: says(state="dancing", cue="storm", level="0.250000", panic="0"))
             send("/blackout", "T")
-            wait_until(lambda: says('"blackout"'))
+            wait_until(lambda: says(state="blackout"))
             send("/panic")
-            wait_until(lambda: says('"panic"'))
+            wait_until(lambda: says(state="panic"))
             send("/blackout", "F")
             send("/go")
             send("/stop", "f", "0.1")
-            wait_until(lambda: says('"stopped"'))
+            wait_until(lambda: says(state="stopped"))
             await_stage(box, "stopped")
             box.receiver.poll()
             box.frames(20)
             assert box.end() == 0
         beats = [
             float.fromhex(f"0x{seconds}.{fraction}")
-            for seconds, fraction in re.findall(r"^(\w{8})\.(\w{8}) /bunraku/status", heard.read_text(), re.M)
+            for seconds, fraction in re.findall(
+                r"^(\w{8})\.(\w{8}) /bunraku/status/state", heard.read_text(), re.M
+            )
         ]
         assert np.median(np.diff(beats)) == pytest.approx(1.0, abs=0.2)
     finally:
