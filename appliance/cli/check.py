@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from appliance.body.mesh_file import MESH_FILE, read_mesh, write_mesh
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import SHOW_OR_NAME, BoxFile
 from appliance.dancer.material.maker import open_network
@@ -79,7 +81,8 @@ def _check(directory: Path, box_file: Path | None) -> None:
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
     too_many = too_much(show.config.cues, verdict.most_coding, show.file)
-    for warning in (*reach(list(parts.worn), box), *unwired(show, box), *too_many, *_dead_map(show)):
+    found = (*reach(list(parts.worn), box), *unwired(show, box), *too_many, *_dead_map(show), *_no_mesh(show))
+    for warning in found:
         print(warning)
 
 
@@ -112,6 +115,11 @@ def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you cha
     except StageError:
         checksums.unlink() if before is None else checksums.write_bytes(before)
         raise
+    try:
+        if write_mesh(show, load_show(show).skeleton):
+            write_checksums(show)
+    except OSError as error:
+        raise StageError(f"{sentence(error, show)} Pack the show again.") from error
     size_mb = bundle_bytes(show) / 1e6
     print(f"{show}: {len(bundle_files(show))} files, {size_mb:.1f} MB, packed in {CHECKSUMS}.")
 
@@ -137,6 +145,15 @@ def _refuse_motion_networks(show: Show) -> None:
             problems.append(show.file.problem(("motion", source), f"{file.name}: {error}", cure))
     if problems:
         raise ConfigError(problems)
+
+
+def _no_mesh(show: Show) -> Iterator[str]:
+    """A note where the projector models the body at its start."""
+    if read_mesh(show.directory, show.skeleton) is None:
+        yield (
+            f"The bundle has no {MESH_FILE} for this skeleton: the projector models the body at every start, "
+            f"which takes half a second or more. bunraku pack {shlex.quote(str(show.directory))} writes it."
+        )
 
 
 def _dead_map(show: Show) -> Iterator[str]:

@@ -56,7 +56,7 @@ class Painter(Protocol):
     def release(self) -> None: ...
 
 
-MakePainter = Callable[[moderngl.Context, Skeleton, Looks], Painter]
+MakePainter = Callable[[moderngl.Context, Skeleton, Looks, Path], Painter]
 
 
 class Projector:
@@ -178,7 +178,7 @@ class Projector:
             self._drawn, self._to_draw = show, None
             return
         self.is_preparing = True
-        self._painter = self._make_painter(self._gl, show.skeleton, show.looks)
+        self._painter = self._make_painter(self._gl, show.skeleton, show.looks, show.directory)
         self._cards = Cards(self._gl, show.cards, show.directory, self._say)
         for part in (SHARES[-1], share):
             size = picture_size(self._config, display, part)

@@ -55,7 +55,7 @@ class TellingPainter:
     made = 0
     released = 0
 
-    def __init__(self, gl: moderngl.Context, skeleton: Skeleton, looks: Looks) -> None:
+    def __init__(self, gl: moderngl.Context, skeleton: Skeleton, looks: Looks, show: Path) -> None:
         type(self).made += 1
         self.looks, self._joints = looks, len(skeleton)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Protocol
 
 import moderngl
@@ -39,13 +40,19 @@ _LOOKS: dict[Style, Callable[[Easel], _Look]] = {
 class Renderer:
     """Owns what the looks need on the GPU; draws any of them into a framebuffer, or right onto the wall.
 
-    looks: by name, at least one, in the show's order.
+    looks: by name, at least one, in the show's order; show: its folder, which has the body's surface.
     The same moment makes the same picture, whatever was drawn before.
     """
 
-    def __init__(self, ctx: moderngl.Context, skeleton: Skeleton, looks: Mapping[str, LookConfig]) -> None:
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        skeleton: Skeleton,
+        looks: Mapping[str, LookConfig],
+        show: Path | None = None,
+    ) -> None:
         self._looks = looks
-        self._easel = Easel(ctx, skeleton)
+        self._easel = Easel(ctx, skeleton, show)
         styles = dict.fromkeys(look.style for look in looks.values())
         self._styles = {style: _LOOKS[style](self._easel) for style in styles}
 

@@ -6,13 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.body.body_mesh import body_mesh
+from appliance.body.mesh_file import mesh_of_show
 from appliance.body.skinning import BodyMesh
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
@@ -112,11 +113,14 @@ class _FigureTextures:
 
 
 class Easel:
-    """The body, its poses, the noise and the canvases: once on the GPU, for all looks."""
+    """The body, its poses, the noise and the canvases: once on the GPU, for all looks.
 
-    def __init__(self, ctx: moderngl.Context, skeleton: Skeleton) -> None:
+    show: the folder with the body's surface; None: it is modelled here.
+    """
+
+    def __init__(self, ctx: moderngl.Context, skeleton: Skeleton, show: Path | None = None) -> None:
         self.ctx, self.skeleton = ctx, skeleton
-        mesh = body_mesh(skeleton)
+        mesh = mesh_of_show(skeleton, show)
         self.height = mesh.height
         self.sole = float(mesh.bind_positions[:, 1].min() - mesh.vertices[:, 1].min())
         self.bind_positions = mesh.bind_positions / mesh.height
