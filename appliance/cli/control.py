@@ -14,9 +14,12 @@ import typer
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
+from appliance.sensor.foreign.sources import SourceSettings
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import NotAskedForError, Problem, did_you_mean
 from appliance.show.control import ControlConfig
+from appliance.show.foreign_sensors import ForeignSensorConfig
+from appliance.show_control.foreign_sensors import ForeignPort
 from appliance.show_control.packet import datagram
 from appliance.show_control.port import open_port
 from appliance.show_control.settings import Settings
@@ -104,8 +107,32 @@ def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
         heartbeat=tuple((one.host, one.port) for one in control.heartbeat),
         key_file=str(box.sensors.keys or ""),
         replies=tuple((one.host, one.port) for one in control.replies),
+        foreign=foreign_ports(box),
     )
     return sys.executable, "-m", "appliance.show_control", settings.packed()
+
+
+def foreign_ports(box: BoxConfig) -> tuple[ForeignPort, ...]:
+    """The ports of foreign sensors that are programs; those on one port share it."""
+    ports: dict[tuple[str, int], list[ForeignSensorConfig]] = {}
+    for one in box.sensors.foreign:
+        if one.program is not None:
+            ports.setdefault((one.host, one.usual_port), []).append(one)
+    return tuple(
+        ForeignPort(
+            host,
+            port,
+            tuple(dict.fromkeys(sender for one in sensors for sender in one.senders)),
+            tuple(
+                SourceSettings(
+                    *(one.name, one.from_, one.address or "", one.values or "", one.axes or ""),
+                    *(one.facing or "", one.bone or ""),
+                )
+                for one in sensors
+            ),
+        )
+        for (host, port), sensors in ports.items()
+    )
 
 
 def _from_systemd() -> int | None:

@@ -56,6 +56,10 @@ def _sensors(box: BoxConfig) -> Iterator[str]:
     udp = box.sensors.udp
     if udp is not None and udp.port and not _is_loopback(udp.host):
         yield f'{_to(udp.host)}udp dport {udp.port} accept comment "sensors"'
+    for one in box.sensors.foreign:
+        if one.program is not None and not _is_loopback(one.host):
+            where = f"{_to(one.host)}ip saddr {{ {', '.join(one.senders)} }}"
+            yield f'{where} udp dport {one.usual_port} accept comment "{one.name}"'
 
 
 def _commands(box: BoxConfig) -> Iterator[str]:

@@ -7,15 +7,14 @@ import os
 import secrets
 import stat
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from difflib import get_close_matches
-from hashlib import blake2s
 from pathlib import Path
 
 import yaml
 
 from appliance.pose.foreign_file import content
 from appliance.pose.foreign_yaml import composed
+from appliance.sensor.sensor_key import SensorKey as SensorKey
 from appliance.sensor.wire import KEY_BYTES
 
 HEADER = "# Sensors of this box and their secret keys. With this file anyone can move the puppet.\n"
@@ -32,21 +31,6 @@ class KeyFileError(ValueError):
         self.path = path
         self.line = line
         self.message = message
-
-
-@dataclass(frozen=True)
-class SensorKey:
-    """One sensor: its name in the show, its 32-bit device id, and its 128-bit key (which repr leaves out)."""
-
-    name: str
-    device_id: int
-    key: bytes = field(repr=False)
-
-    @property
-    def wearable(self) -> int:
-        """Identifies the wearable that this entry lets in, 32 bits; changes at each provisioning."""
-        tag = blake2s(self.device_id.to_bytes(4, "little"), key=self.key, digest_size=4, person=b"wearable")
-        return int.from_bytes(tag.digest(), "little")
 
 
 def load_keys(path: Path) -> dict[str, SensorKey]:

@@ -6,8 +6,8 @@ from math import inf, sqrt
 
 from appliance.sensor import wire
 from appliance.sensor.device_clock import DeviceClock
-from appliance.sensor.keys import SensorKey
 from appliance.sensor.pairing import LOST_S, Pairing
+from appliance.sensor.sensor_key import SensorKey
 from appliance.sensor.state import Orientation, Reception, SensorReading, SensorState
 from appliance.sensor.transports.transport import Route
 
@@ -88,7 +88,7 @@ class KnownSensor:
             name=self.key.name,
             device_id=self.key.device_id,
             state=self._word(now),
-            way="" if session is None else session.route[0].describe(session.route[1]),
+            way=self.key.source or ("" if session is None else session.route[0].describe(session.route[1])),
             rate_hz=self.reception.rate_hz(now),
             loss=self.reception.loss(),
             round_trip_s=None if newest is None else _round_trip_s(newest),

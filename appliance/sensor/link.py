@@ -10,10 +10,10 @@ from types import MappingProxyType
 from typing import cast
 
 from appliance.sensor import wire
-from appliance.sensor.keys import SensorKey
 from appliance.sensor.known_sensor import KnownSensor
 from appliance.sensor.memory import with_profile
 from appliance.sensor.pairing import NO_HAND, Pairing
+from appliance.sensor.sensor_key import SensorKey
 from appliance.sensor.state import SensorReading as SensorReading
 from appliance.sensor.state import SensorState as SensorState
 from appliance.sensor.transports.serial import SerialIntake
@@ -40,15 +40,19 @@ def open_link(
     serial: Iterable[tuple[str, int]] = (),
     profiles: Mapping[bytes, bytes] = MappingProxyType({}),
     hands: Sequence[str] = (),
+    foreign: tuple[UdpIntake, Mapping[str, SensorKey]] | None = None,
 ) -> SensorLink:
     """A link over a UDP (host, port) and serial (device, baud) pairs.
 
     `profiles`: kept calibrations by the IMU's unique id. `hands`: sensors in the order of the show's hands.
+    `foreign`: the door of foreign sensors, and their keys.
     Raises PortError when the UDP port cannot be opened; an absent serial device may come later.
     """
     intakes: list[Intake] = [UdpIntake(*udp)] if udp is not None else []
     intakes += (SerialIntake(device, baud) for device, baud in serial)
-    return SensorLink(keys, intakes, profiles, hands)
+    door, others = foreign or (None, {})
+    intakes += [door] if door is not None else []
+    return SensorLink(keys, intakes, profiles, hands, others)
 
 
 class SensorLink:
@@ -60,12 +64,13 @@ class SensorLink:
         intakes: Sequence[Intake],
         profiles: Mapping[bytes, bytes] = MappingProxyType({}),
         hands: Sequence[str] = (),
+        foreign: Mapping[str, SensorKey] = MappingProxyType({}),
     ) -> None:
         self.intakes = tuple(intakes)
         self.wants_neutral: set[str] = set()  # sensors whose wearers should stand still: their light shows it
         self.light = True  # whether a linked sensor's light flashes now and then
         self.sent: Counter[str] = Counter()  # packets to sensors by kind
-        self._hands = tuple(hands)
+        self._hands, self._foreign = tuple(hands), dict(foreign)
         self._profiles = dict(profiles)
         self._new_profiles: dict[bytes, bytes] = {}
         self._by_device: dict[int, KnownSensor] = {}
@@ -135,9 +140,11 @@ class SensorLink:
             self._by_name[sensor].strobe_until = now + seconds
 
     def set_keys(self, keys: Mapping[str, SensorKey]) -> None:
-        """Let in these sensors only. One that keeps device id and key stays linked, even under a new name."""
+        """Let in these sensors only, beside the foreign ones. One that keeps device id and key stays linked,
+        even under a new name.
+        """
         before, self._by_device, self._by_name = self._by_device, {}, {}
-        for place, key in enumerate(keys.values()):
+        for place, key in enumerate({**keys, **self._foreign}.values()):
             sensor = before.get(key.device_id)
             if sensor is None or sensor.key.key != key.key:
                 phase_s = place % HEARTBEATS_APART / HEARTBEATS_APART

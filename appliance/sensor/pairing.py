@@ -16,7 +16,7 @@ from math import inf
 
 from appliance.sensor import wire
 from appliance.sensor.answer_queue import REMEMBERED_BOOTS, AnswerQueue
-from appliance.sensor.keys import SensorKey
+from appliance.sensor.sensor_key import SensorKey
 from appliance.sensor.sequence import REMEMBERED, SequenceWindow
 from appliance.sensor.transports.transport import Route
 

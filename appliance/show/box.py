@@ -12,6 +12,8 @@ from appliance.show.config_error import Problem
 from appliance.show.console import ConsoleConfig
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
+from appliance.show.foreign_sensors import MOST as MOST_FOREIGN
+from appliance.show.foreign_sensors import ForeignSensorConfig
 from appliance.show.osc import OscConfig, osc_misfits
 from appliance.show.posistagenet import PosiStageNetConfig, misfits
 from appliance.show.projector import ProjectorConfig
@@ -60,11 +62,21 @@ class SensorsConfig(Section):
     keys: LocalFile | None = key(
         "File with the sensors' keys, relative to the box file; null: no sensor is let in.", None
     )
+    foreign: list[ForeignSensorConfig] = key(
+        "Phones and programs in place of wearables.", [], length=(0, MOST_FOREIGN)
+    )
     light: bool = key(
         "A short flash of a sensor's lamp every 3 seconds shows that it is linked; false: it stays "
         "dark on stage. Signals that ask for something are still shown.",
         True,
     )
+
+    @field_validator("foreign")
+    @classmethod
+    def _each_name_once(cls, foreign: list[ForeignSensorConfig]) -> list[ForeignSensorConfig]:
+        cure = "Give each sensor a name by itself."
+        refuse_repeats([one.name for one in foreign], "Two foreign sensors are called '{value}'.", cure)
+        return foreign
 
 
 def out_of_reach(sensors: SensorsConfig) -> str | None:

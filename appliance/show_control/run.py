@@ -20,6 +20,7 @@ from appliance.levers.show_state import ShowState
 from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.fallback import LIVE_DROPPED, SENDER_NOT_LISTED
+from appliance.show_control.foreign_sensors import ForeignSensors
 from appliance.show_control.heartbeat import Heartbeat
 from appliance.show_control.intake import Intake
 from appliance.show_control.key_file import KeyFile
@@ -64,6 +65,8 @@ class ControlProcess:
             opened.callback(self._heartbeat.close)
             self._replies = Listeners(settings.replies)
             opened.callback(self._replies.close)
+            self._foreign = ForeignSensors(settings.foreign, folder)
+            opened.callback(self._foreign.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
             live = LiveInput(folder)
             opened.callback(live.close)
@@ -96,6 +99,7 @@ class ControlProcess:
 
         The clock is read after each datagram: this process may have been held up while it received one.
         """
+        self._foreign.take(self._monotonic())
         taken = 0
         while taken < _AT_ONCE and (found := self._intake.take()) is not None:
             taken += 1
@@ -124,7 +128,10 @@ class ControlProcess:
         self._health.publish_health(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)
-        for words in (self.port.news(now), self._news.look(self.handler.show_state, now)):
+        for descriptor in self._foreign.opened(now):
+            self._poll.register(descriptor, select.POLLIN)
+        news = self._news.look(self.handler.show_state, now)
+        for words in (self.port.news(now), news, *self._foreign.news(now)):
             if words:
                 self._say(words)
 

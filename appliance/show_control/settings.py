@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 
+from appliance.sensor.foreign.sources import SourceSettings
+from appliance.show_control.foreign_sensors import ForeignPort
+
 Listener = tuple[str, int]  # address and port
 
 
@@ -18,6 +21,7 @@ class Settings:
     heartbeat: tuple[Listener, ...] = ()
     key_file: str = ""
     replies: tuple[Listener, ...] = ()
+    foreign: tuple[ForeignPort, ...] = ()
 
     def packed(self) -> str:
         """As one argument of a command line; there are no secrets in it."""
@@ -30,5 +34,14 @@ class Settings:
         heartbeat, replies = (
             tuple((str(host), int(port)) for host, port in values[name]) for name in ("heartbeat", "replies")
         )
-        changed = {"senders": tuple(values["senders"]), "heartbeat": heartbeat, "replies": replies}
-        return cls(**values | changed)
+        foreign = tuple(
+            ForeignPort(
+                str(one["host"]),
+                int(one["port"]),
+                tuple(one["senders"]),
+                tuple(SourceSettings(**sensor) for sensor in one["sensors"]),
+            )
+            for one in values["foreign"]
+        )
+        changed = {"heartbeat": heartbeat, "replies": replies, "foreign": foreign}
+        return cls(**values | changed | {"senders": tuple(values["senders"])})

@@ -191,7 +191,7 @@ def assemble(
             if hand.sensor is not None and isinstance(puppeteer, WornSensor):
                 worn.setdefault(hand.sensor, []).append(puppeteer)
                 mountings.setdefault(hand.sensor, []).append(mounting_of(hand))
-    link, complaints = open_sensors(box, list(worn), profiles)
+    link, complaints = open_sensors(box, list(worn), profiles, memory.parent if memory else None)
     return StageParts(
         skeleton=show.skeleton,
         network=network,

@@ -12,10 +12,12 @@ from appliance.cli.sensors.table import HIGH_LOSS
 from appliance.sensor.state import LOW_BATTERY
 from appliance.sensor.wire import BATTERY_UNKNOWN
 from appliance.show.config_error import ConfigError
+from appliance.show.programs import SOURCES
 from appliance.show.show import load_show
 from appliance.show_control.sensor_roster import RosterLine
 
 _SPARE = "Or put a spare in its place: `bunraku sensors replace {name} SPARE`."
+_PROGRAM = "Start the program that sends it; for a phone, open the page there. It is under sensors: foreign."
 _STATES = {  # a sensor that does not send: what happened, what to do
     "greeted": ("It greets the box, and sends nothing yet", "Wait for a breath, then switch it off and on."),
     "lost": ("It is lost{ago}", "Check its battery, switch it on, and look at its network."),
@@ -49,7 +51,10 @@ def _sensor(line: RosterLine) -> Finding:
     if line.state in _STATES:
         words, cure = _STATES[line.state]
         ago = f", last heard {_duration(line.age_s)} ago" if line.age_s >= 0 else ""
-        cure = line.complaint or f"{cure} {_SPARE.format(name=line.name)}"
+        if line.way in SOURCES:
+            cure = _PROGRAM
+        else:
+            cure = line.complaint or f"{cure} {_SPARE.format(name=line.name)}"
         return wrong(what, f"{words.format(ago=ago)}: its joint moves freely.", cure)
     known = line.battery != BATTERY_UNKNOWN
     battery = f"its battery is at {line.battery} %" if known else "its battery is not known"

@@ -21,6 +21,7 @@ from appliance.cli.sensors.box_keys import (
 from appliance.cli.sensors.control_client import NoBoxError, Roll
 from appliance.cli.sensors.table import SensorTable, known_table, plain_values, unheard
 from appliance.sensor.keys import KeyFileError, exposure, load_keys
+from appliance.show.programs import SOURCES
 from appliance.stage.stage_error import StageError
 
 _OLD_ROLL_S = 3.0
@@ -85,7 +86,7 @@ def _about_file(box_keys: BoxKeys, roll: Roll) -> list[str]:
     except OSError:  # another user's or machine's file, which only the box can judge
         return []
     notes = [warning] if warning else []
-    if in_file != {(line.name, line.device_id) for line in roll.lines}:
+    if in_file != {(line.name, line.device_id) for line in roll.lines if line.way not in SOURCES}:
         notes.append(f"{roll.key_file} has other sensors than the running box. Run: bunraku sensors reload")
     return notes
 
