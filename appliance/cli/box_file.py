@@ -1,4 +1,4 @@
-"""`bunraku console box-file`: what the page shows and changes of the box file, checked as the file itself."""
+"""The box file for the page: shown and changed there, checked as the file itself."""
 
 from __future__ import annotations
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import socket
 import sys
@@ -20,7 +19,6 @@ from appliance.cli.companions import Companion
 from appliance.cli.options import (
     BoxFile,
     ChosenFile,
-    ShowFolder,
     ThisBoxFile,
     command_group,
     is_for_subcommand,
@@ -100,95 +98,10 @@ def revoke(
     print(f"{device} is forgotten.")
 
 
-@console.command("about", hidden=True)
-def tell_about(box: BoxFile = None, chosen: ChosenFile = None) -> None:
-    """Print what this box is, as JSON for the page."""
-    from appliance.release.about import about
-
-    print(json.dumps(about(chosen, box)))
-
-
-@console.command("prove", hidden=True)
-def prove_wanted(box: BoxFile = None, chosen: ChosenFile = None) -> None:
-    """Measure what the page wants proven, and keep it."""
-    from appliance.cli.proof import prove
-    from appliance.console.proofs import FOLDER, Proofs
-    from appliance.release.choice import box_of
-    from appliance.show.box import load_box
-
-    path = box_of(box, chosen)
-    config = load_box(path)
-    proofs = Proofs(_kept_here(config).parent / FOLDER)
-    raise typer.Exit(prove(_runtime(config), proofs, path, chosen))
-
-
-@console.command("map", hidden=True)
-def tell_map(show: ShowFolder = None) -> None:
-    """Print the map of a show's poses, as JSON for the page."""
-    from appliance.generator.pose_map import pose_map
-    from appliance.show.bundle import default_show_path
-    from appliance.show.show import load_show
-
-    try:
-        print(json.dumps(pose_map(load_show(show or default_show_path()))))
-    except LookupError as error:
-        raise StageError(str(error)) from None
-
-
-@console.command("cue", hidden=True)
-def keep_cue(
-    show: Annotated[Path, typer.Option(help="The show that dances.")],
-    into: Annotated[Path, typer.Option(help="Where its copy lies.")],
-    cue: Annotated[str, typer.Option(help="As JSON.")],
-) -> None:
-    """Write a cue into the copy of a show."""
-    from appliance.release import rehearsed
-
-    try:
-        print(rehearsed.keep_cue(show, into, json.loads(cue)))
-    except OSError as error:
-        raise StageError(f"{into}: the copy of the show cannot be kept ({error.strerror}).") from error
-
-
-@console.command("box-file", hidden=True)
-def show_or_change_box_file(
-    box: BoxFile = None,
-    chosen: ChosenFile = None,
-    change: Annotated[bool, typer.Option("--change", help="Read a change from standard input.")] = False,
-) -> None:
-    """Print the box file for the page, or change it."""
-    from appliance.cli import box_file
-
-    if not change:
-        print(json.dumps(box_file.told(box, chosen)))
-        return
-    wanted = box_file.Change(**json.loads(sys.stdin.read()))
-    print(json.dumps(box_file.change(box, chosen, wanted)))
-
-
-@console.command("choose-show", hidden=True)
-def choose_show(
-    show: Annotated[
-        str,
-        typer.Argument(help="Id, as `bunraku console about` tells it, or folder of `bunraku console cue`."),
-    ],
-    chosen: ChosenFile = None,
-) -> None:
-    """Let a show that the box has kept dance from now on, or the copy of a rehearsal."""
-    from appliance.cli import box_file
-    from appliance.release.choice import CHOSEN, RUN
-
-    place = chosen or RUN / CHOSEN
-    is_copy = Path(show).is_dir() or "+" not in show  # an id has one
-    print(
-        json.dumps(box_file.adopt_show(place, Path(show)) if is_copy else box_file.dance_again(place, show))
-    )
-
-
 def card_lines(box: BoxConfig) -> tuple[str, ...]:
     """For the projector's test card: address and PIN of the page that runs here; nothing without one."""
     try:
-        kept, host, port = (_runtime(box) / WHERE).read_text().splitlines()
+        kept, host, port = (runtime_of(box) / WHERE).read_text().splitlines()
         https = box.console is not None and box.console.https
         return f"page {address(host, int(port), https)}", f"pin {Devices(Path(kept)).pin}"
     except (OSError, ValueError, StageError):
@@ -215,7 +128,7 @@ def console_command(
         control = own.host, own.port
     if control is not None and control[0] == "0.0.0.0":
         control = "127.0.0.1", control[1]
-    folder = _runtime(box)
+    folder = runtime_of(box)
     with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as opened:
         host, port = opened.getsockname()[:2]
         (folder / WHERE).write_text(f"{kept}\n{host}\n{port}\n")
@@ -229,7 +142,7 @@ def console_command(
         rehearsal=console.rehearsal,
         https=console.https,
         journal=None if journal is None else str(journal.resolve()),
-        about=_named(box, chosen),
+        box=_named(box, chosen),
         is_installed=chosen is not None,
     )
     return sys.executable, "-m", "appliance.console", settings.packed()
@@ -248,7 +161,7 @@ def page_companion(
     rehearsal: PIN and devices are not the venue's; they stay until the machine is off.
     """
     heard_on = None if control is None else control.getsockname()
-    kept = _runtime(box) / _KEPT if rehearsal else kept_in(box)
+    kept = runtime_of(box) / _KEPT if rehearsal else kept_in(box)
     command = console_command(box, page.fileno(), kept, heard_on, journal)
     try:
         https = box.console is not None and box.console.https
@@ -266,21 +179,21 @@ def page_companion(
 
 def kept_in(box: BoxConfig) -> Path:
     """The file with PIN and devices: where the box keeps what it learns, else until the machine is off."""
-    return (box.state_folder or _runtime(box)) / _KEPT
+    return (box.state_folder or runtime_of(box)) / _KEPT
 
 
-def _named(box: BoxConfig, chosen: Path | None) -> tuple[str, ...]:
-    """Options by which a command finds the same box."""
+def _named(box: BoxConfig, chosen: Path | None) -> dict[str, str]:
+    """By which keyword and path others find the same box."""
     if chosen is not None:
-        return "--chosen", str(chosen.resolve())
-    return () if box._file is None else ("--box", str(box.file.path.resolve()))
+        return {"chosen": str(chosen.resolve())}
+    return {} if box._file is None else {"box": str(box.file.path.resolve())}
 
 
 def _devices(box: Path | None) -> Devices:
     from appliance.release.installed_box import box_here
     from appliance.show.box import load_box
 
-    path = _kept_here(load_box(box_here(box)))
+    path = kept_here(load_box(box_here(box)))
     try:
         return Devices(path)
     except OSError as error:
@@ -290,16 +203,17 @@ def _devices(box: Path | None) -> Devices:
         ) from error
 
 
-def _kept_here(box: BoxConfig) -> Path:
+def kept_here(box: BoxConfig) -> Path:
     """The same as the page that runs here says: in a rehearsal it keeps them elsewhere."""
     path = kept_in(box)
     with contextlib.suppress(OSError, StageError):  # root does not meet the box's processes
-        told = Path((_runtime(box) / WHERE).read_text().partition("\n")[0])
+        told = Path((runtime_of(box) / WHERE).read_text().partition("\n")[0])
         path = told if told.is_file() else path
     return path
 
 
-def _runtime(box: BoxConfig) -> Path:
+def runtime_of(box: BoxConfig) -> Path:
+    """Where the box's processes meet. Raises StageError."""
     try:
         return runtime_folder(box)
     except RuntimeFolderError as error:

@@ -85,43 +85,6 @@ def _minutes(run: dict[str, Any]) -> Iterator[str]:
         yield f"   {first * run['bin_s'] / 60:6.1f} min  {', '.join([*counts, slowest])}"
 
 
-@journal.command("stretch", hidden=True)
-def write_stretch(
-    run: Annotated[int, typer.Option(min=1, help="Its number in the list.")],
-    box: ThisBoxFile = None,
-    chosen: ChosenFile = None,
-    recorded: Recorded = None,
-    start: Annotated[float, typer.Option(help="Second of the run.")] = 0.0,
-    seconds: Annotated[float, typer.Option(min=0.02)] = 10.0,
-    out: Annotated[
-        Path | None, typer.Option(help="A BVH, glTF or .bunraku file. Default: frames to stdout.")
-    ] = None,
-) -> None:
-    """Write a stretch of a run for the page."""
-    from appliance.exchange.formats import write_recording
-    from appliance.pose.counted import counted
-    from appliance.pose.recording import Recording
-    from appliance.recorder.export import export_stretch
-    from appliance.recorder.journal_error import JournalError
-    from appliance.recorder.reading import EXPORTED, read_journal
-    from appliance.recorder.timeline import stretch
-
-    source = _recorded(box, chosen, recorded)
-    runs = read_journal(source).runs
-    if run > len(runs):
-        raise JournalError(f"The journal has {counted(len(runs), 'run')}, and no run {run}.")
-    one = runs[run - 1]
-    if out is None:
-        for part in stretch(one, start, seconds):
-            sys.stdout.buffer.write(part)
-        return
-    if out.suffix.casefold() == EXPORTED:
-        export_stretch(source, out, one, start, seconds)
-        return
-    whole = Recording(one.skeleton, one.ticks["pose"], one.ticks["root"], 1.0 / one.header["tick_s"])
-    write_recording(out, whole.excerpt(start, start + seconds))
-
-
 @journal.command("export")
 def export_journal(
     context: typer.Context,

@@ -1,4 +1,4 @@
-"""`bunraku console prove`: what the page wants proven, measured and kept as a document."""
+"""Measures what the page wants proven, and keeps it as a document: `python -m appliance.cli.proof`."""
 
 from __future__ import annotations
 
@@ -10,21 +10,24 @@ import platform
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from appliance.box.child import end_child, start_child
 from appliance.box.own_command import BUNRAKU
+from appliance.box.parent_death import end_with_parent
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.doctor.finding import for_phone
-from appliance.console.proofs import Proofs
+from appliance.console.proofs import FOLDER, Proofs
 from appliance.console.proving import SHOW_GOES, Proving, Wanted
 from appliance.outputs.frame_reader import FrameReader
-from appliance.release.choice import Choice
+from appliance.release.choice import Choice, box_of
+from appliance.show.box import load_box
 from appliance.show.bundle import bundle_files, default_show_path
 
 _LOOK_S = 0.2
@@ -32,6 +35,23 @@ _ENDS_WITHIN_S = 20.0  # measure ends its box and its sensor
 _MODELS = ("/proc/device-tree/model", "/sys/class/dmi/id/product_name")
 _PACKAGES = ("bunraku", "onnxruntime", "numpy")
 _ENDED = "It was ended before its end. Nothing was kept."
+
+
+def main(given: Sequence[str]) -> int:
+    """Prove what the page of a box wants; the arguments name the box: `--box FILE` or `--chosen FILE`."""
+    from appliance.cli.console import kept_here, runtime_of
+
+    end_with_parent()
+    named = {name: Path(path) for name, path in zip(given[::2], given[1::2], strict=True)}
+    chosen = named.get("--chosen")
+    try:
+        path = box_of(named.get("--box"), chosen)
+        config = load_box(path)
+        return prove(runtime_of(config), Proofs(kept_here(config).parent / FOLDER), path, chosen)
+    except Exception as error:
+        from appliance.cli.app import refuse
+
+        refuse(error)
 
 
 def prove(runtime: Path, proofs: Proofs, box: Path | None, chosen: Path | None) -> int:
@@ -192,3 +212,7 @@ def _text(path: str) -> str:
         return Path(path).read_text(errors="replace").strip("\0\n ")
     except OSError:
         return ""
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

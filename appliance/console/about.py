@@ -14,10 +14,10 @@ _FRESH_S = 10.0
 
 
 class About:
-    """Reads at most once in 10 s, however many browsers ask. options: the command's, which name the box."""
+    """Reads at most once in 10 s, however many browsers ask. box: as in Settings."""
 
-    def __init__(self, options: tuple[str, ...]) -> None:
-        self._options = options
+    def __init__(self, box: dict[str, str]) -> None:
+        self._box = box
         self._reading = asyncio.Lock()
         self._read, self._read_at = b"", -_FRESH_S
 
@@ -25,6 +25,6 @@ class About:
         """As JSON: release/about.py."""
         async with self._reading:
             if time.monotonic() - self._read_at > _FRESH_S:
-                self._read = await answer_of("console", "about", *self._options, patience_s=_PATIENCE_S)
+                self._read = await answer_of("about", _PATIENCE_S, **self._box)
                 self._read_at = time.monotonic()
         return web.Response(body=self._read, content_type="application/json")

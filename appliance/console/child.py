@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
+import sys
 from collections.abc import Mapping
+from typing import Any
 
 from aiohttp import web
-
-from appliance.box.own_command import BUNRAKU
 
 LARGEST = 8 << 20  # bytes of an answer
 
 
-async def answer_of(*arguments: str, patience_s: float, said: bytes | None = None) -> bytes:
-    """The output of `bunraku` with these arguments, LARGEST bytes at most. said: its standard input.
+async def answer_of(function: str, patience_s: float, **keywords: Any) -> bytes:
+    """The answer of a function of cli/page_calls.py with these keywords, as JSON, LARGEST bytes at most.
 
     Raises 404 with its own sentence where it refuses, 503 where it takes too long or says too much.
     """
-    command = *BUNRAKU, *arguments
+    command = sys.executable, "-m", "appliance.cli.page_calls", function
+    said = json.dumps(keywords).encode()
     env = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     try:
         status, answer, troubles = await output_of(*command, patience_s=patience_s, said=said, env=env)

@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 from aiohttp import web
 
@@ -37,7 +38,7 @@ class Happened:
         """All runs, newest last, as JSON: recorder/timeline.py."""
         async with self._turn():
             if time.monotonic() - self._read_at > _FRESH_S:
-                self._timeline = await self._read("timeline", "--json")
+                self._timeline = await self._read("timelines")
                 self._read_at = time.monotonic()
             return web.Response(body=self._timeline, content_type="application/json")
 
@@ -45,7 +46,7 @@ class Happened:
         """A stretch of the dance, as frames for the page."""
         part = self._part(request)
         async with self._turn():
-            body = await self._read("stretch", *part)
+            body = await self._read("stretch", **part)
         return web.Response(body=body, content_type="application/octet-stream")
 
     async def download(self, request: web.Request) -> web.Response:
@@ -58,7 +59,7 @@ class Happened:
         async with self._turn():
             with tempfile.TemporaryDirectory(prefix="bunraku-") as folder:
                 out = Path(folder) / f"dance.{ending}"
-                await self._read("stretch", *part, "--out", str(out))
+                await self._read("stretch", **part, out=str(out))
                 if out.stat().st_size > _LARGEST:
                     raise web.HTTPServiceUnavailable(text="That is too much at once. Take fewer seconds.")
                 body = out.open("rb")  # sent piece by piece, and closed then
@@ -73,8 +74,8 @@ class Happened:
         async with self._reading:
             yield
 
-    def _part(self, request: web.Request) -> list[str]:
-        """Options of a stretch from a request's query. Raises 400."""
+    def _part(self, request: web.Request) -> dict[str, float]:
+        """Keywords of a stretch from a request's query. Raises 400."""
         try:
             run, start_s = int(request.query["run"]), float(request.query["from"])
             seconds = float(request.query.get("seconds", "10"))
@@ -82,12 +83,12 @@ class Happened:
             raise web.HTTPBadRequest(text="Give run, from and seconds as numbers.") from None
         if not (1 <= run < 1e6 and 0 <= start_s < 1e7 and 0 < seconds <= LONGEST_S):
             raise web.HTTPBadRequest(text=f"A stretch has at most {LONGEST_S:g} seconds.")
-        return ["--run", str(run), "--start", str(start_s), "--seconds", str(seconds)]
+        return {"run": run, "start": start_s, "seconds": seconds}
 
-    async def _read(self, what: str, *options: str) -> bytes:
+    async def _read(self, function: str, **keywords: Any) -> bytes:
         """The answer of a reading process. Raises 404 with its own sentence, 503 where it takes too long."""
         if self._journal is None:
             raise web.HTTPNotFound(
                 text="This box keeps no journal. Write `journal: {folder: journal}` into its box file."
             )
-        return await answer_of("journal", what, "--journal", self._journal, *options, patience_s=_PATIENCE_S)
+        return await answer_of(function, _PATIENCE_S, journal=self._journal, **keywords)

@@ -31,7 +31,6 @@ class PoseMap:
             if folder is None:
                 raise web.HTTPNotFound(text="No stage dances on this box. Start it: bunraku play.")
             if generation != self._generation:
-                options = "console", "map", "--show", str(folder)
-                self._made = await answer_of(*options, patience_s=_PATIENCE_S)
+                self._made = await answer_of("pose_map", _PATIENCE_S, show=str(folder))
                 self._generation = generation
             return web.Response(body=self._made, content_type="application/json")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sys
 from pathlib import Path
 
 from aiohttp import web
 
 from appliance.box.child import environment
-from appliance.box.own_command import BUNRAKU
 from appliance.console.body import said
 from appliance.console.guard import Guard
 from appliance.console.proofs import FOLDER, Proofs
@@ -21,16 +21,16 @@ _ENDS_WITHIN_S = 20.0
 
 
 class Prove:
-    """Requests about proofs. options: the command's, which name the box.
+    """Requests about proofs. box: as in Settings.
 
     On an installed box systemd starts the prover, with the stage's rights, when something is wanted;
     elsewhere it is a child of this process.
     """
 
     def __init__(
-        self, guard: Guard, runtime: Path, kept: Path, options: tuple[str, ...], is_installed: bool
+        self, guard: Guard, runtime: Path, kept: Path, box: dict[str, str], is_installed: bool
     ) -> None:
-        self._guard, self._options, self._is_installed = guard, options, is_installed
+        self._guard, self._box, self._is_installed = guard, box, is_installed
         self._proving, self._proofs = Proving(runtime), Proofs(kept / FOLDER)
         self._child: asyncio.subprocess.Process | None = None
         self._waiting: set[asyncio.Task[int]] = set()
@@ -124,7 +124,8 @@ class Prove:
 
     async def _start(self) -> None:
         self._child = await asyncio.create_subprocess_exec(
-            *(*BUNRAKU, "console", "prove", *self._options),
+            *(sys.executable, "-m", "appliance.cli.proof"),
+            *(word for name, path in self._box.items() for word in (f"--{name}", path)),
             stdin=asyncio.subprocess.DEVNULL,
             env=environment(OPENBLAS_NUM_THREADS="1"),
         )

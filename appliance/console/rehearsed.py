@@ -42,11 +42,11 @@ class Rehearsed:
         show = self._stage.show_directory
         if show is None or self._box.value.get("status") is None:
             raise web.HTTPConflict(text="No stage dances on this box: there are no settings to keep.")
-        cue = json.dumps(present_cue(name.strip(), self._box.value, self._stage.facts))
+        cue = present_cue(name.strip(), self._box.value, self._stage.facts)
         async with self._writing:
-            options = "--show", str(show), "--into", str(self._folder), f"--cue={cue}"
-            words = await answer_of("console", "cue", *options, patience_s=_PATIENCE_S)
-        return web.json_response({"words": words.decode().strip()})
+            places = {"show": str(show), "into": str(self._folder)}
+            words = await answer_of("keep_cue", _PATIENCE_S, cue=cue, **places)
+        return web.json_response({"words": json.loads(words)})
 
     async def download(self, request: web.Request) -> web.StreamResponse:
         """The copy, packed in the layout of a stick."""

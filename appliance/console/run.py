@@ -73,14 +73,14 @@ async def _serve(settings: Settings) -> int:
     seen = SeenStage(folder, stage)
     box = BoxView(desk, stage, seen, ShowStateReader(folder))
     health, notifier = ProcessHealthWriter(folder, "console", fallbacks), Notifier()
-    happened, about = Happened(guard, settings.journal), About(settings.about)
-    prove = Prove(guard, folder, Path(settings.kept).parent, settings.about, settings.is_installed)
+    happened, about = Happened(guard, settings.journal), About(settings.box)
+    prove = Prove(guard, folder, Path(settings.kept).parent, settings.box, settings.is_installed)
     logs = Logs(guard, folder, settings.is_installed)
     rehearsed = Path(settings.kept).parent / FOLDER
-    venue = Venue(guard, folder, settings.about, settings.is_installed, rehearsed)
+    venue = Venue(guard, folder, settings.box, settings.is_installed, rehearsed)
     hands, rig = Hands(guard, desk, folder), Rig(folder)
     others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes()]
-    named = settings.about if settings.about[:1] == ("--box",) else ()
+    named = ("--box", settings.box["box"]) if "box" in settings.box else ()
     others += SensorChanges(guard, stage, named).routes()
     if settings.rehearsal:
         others += Rehearsed(guard, stage, box, Path(settings.kept).parent).routes()

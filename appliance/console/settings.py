@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 WHERE = "console.path"  # in the runtime folder: PIN and devices, host and port of the page that runs
 
@@ -12,10 +12,10 @@ WHERE = "console.path"  # in the runtime folder: PIN and devices, host and port 
 class Settings:
     """The port's socket is open already: `descriptor`. control: where commands arrive; None: nowhere.
 
-    journal: its folder; None: none is kept. about: options of `bunraku console about` that name this box.
-    is_installed: systemd starts what the page wants done. folder: where the box's processes meet. kept: the
-    file with PIN and remembered devices. viewers, names, rehearsal, https: as in
-    the box file.
+    journal: its folder; None: none is kept. box: the path of its box file as `box`, or of what the preflight
+    chose as `chosen`, or neither. is_installed: systemd starts what the page wants done. folder: where the
+    box's processes meet. kept: the file with PIN and remembered devices. viewers, names, rehearsal, https: as
+    in the box file.
     """
 
     folder: str
@@ -27,7 +27,7 @@ class Settings:
     rehearsal: bool = True
     https: bool = False
     journal: str | None = None
-    about: tuple[str, ...] = ()
+    box: dict[str, str] = field(default_factory=dict)
     is_installed: bool = False
 
     def packed(self) -> str:
@@ -45,6 +45,5 @@ class Settings:
                 "control": None if control is None else (str(control[0]), int(control[1])),
                 "viewers": tuple(values["viewers"]),
                 "names": tuple(values["names"]),
-                "about": tuple(values["about"]),
             }
         )

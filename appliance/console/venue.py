@@ -6,6 +6,7 @@ import asyncio
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 from aiohttp import web
 
@@ -23,14 +24,14 @@ _SHOW = re.compile(r"[0-9a-f]{0,64}\+[0-9a-f]{0,64}")
 class Venue:
     """Each in a separate process, one at a time.
 
-    runtime: where the box's processes meet; options: the command's, which name the box; rehearsed: where the
-    copy of the show with its new cues lies.
+    runtime: where the box's processes meet; box: as in Settings; rehearsed: where the copy of the
+    show with its new cues lies.
     """
 
     def __init__(
-        self, guard: Guard, runtime: Path, options: tuple[str, ...], is_installed: bool, rehearsed: Path
+        self, guard: Guard, runtime: Path, box: dict[str, str], is_installed: bool, rehearsed: Path
     ) -> None:
-        self._guard, self._options, self._is_installed = guard, options, is_installed
+        self._guard, self._box, self._is_installed = guard, box, is_installed
         self._rehearsed = rehearsed
         self._anew = runtime / ANEW
         self._busy = asyncio.Lock()
@@ -46,7 +47,7 @@ class Venue:
 
     async def _file(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
-        return await self._done("box-file")
+        return await self._done("box_file")
 
     async def _change(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
@@ -57,30 +58,27 @@ class Venue:
         if not isinstance(text, str) or not switches or not _are_values(keys):
             raise web.HTTPBadRequest(text="A change is a text, values of keys, and whether it counts now.")
         wanted = {"text": text, "values": keys, "now": now and self._is_installed, "sure": sure}
-        return await self._done("box-file", "--change", said=json.dumps(wanted).encode())
+        return await self._done("change_box_file", change=wanted)
 
     async def _dance_again(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
         show = (await said(request)).get("id")
         if not self._is_installed or not isinstance(show, str) or _SHOW.fullmatch(show) is None:
             raise web.HTTPBadRequest(text="There is no such show.")
-        return await self._done("choose-show", "--", show)
+        return await self._done("dance_again", show=show)
 
     async def _dance_rehearsed(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
         await said(request)
         if not self._is_installed:
             raise web.HTTPBadRequest(text="This box keeps no shows: give bunraku play the copy, with --show.")
-        return await self._done("choose-show", "--", str(self._rehearsed))
+        return await self._done("adopt_show", folder=str(self._rehearsed))
 
-    async def _done(self, *words: str, said: bytes | None = None) -> web.Response:
+    async def _done(self, function: str, **keywords: Any) -> web.Response:
         if self._busy.locked():
             raise web.HTTPConflict(text="The box file is being checked already. Try again in a moment.")
         async with self._busy:
-            command, *rest = words
-            answer = await answer_of(
-                "console", command, *self._options, *rest, patience_s=_PATIENCE_S, said=said
-            )
+            answer = await answer_of(function, _PATIENCE_S, **keywords, **self._box)
         if json.loads(answer).get("anew"):
             asyncio.get_running_loop().call_later(_ANSWERED_S, self._anew.touch)
         return web.Response(body=answer, content_type="application/json")

@@ -44,7 +44,7 @@ class Status(NamedTuple):
     strangers: Annotated[int, "datagrams from unlisted senders"] = 0
     fallbacks: Annotated[int, "how many [fallbacks](#fallbacks) are in force now; 0 on a good night"] = 0
     liveliness: Annotated[float, "how alive the answer to a hand is, 0 to 1"] = UNKNOWN
-    seed: Annotated[int, "of the noise in the answer: the newest that was asked for"] = -1
+    seed: Annotated[int, "seed of the noise in the answer: the newest that was asked for"] = -1
     live: Annotated[str, "how much of a live dancer comes, like `17 of 17 bones`; empty: none is heard"] = ""
 
     @classmethod

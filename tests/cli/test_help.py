@@ -95,12 +95,6 @@ def test_flags_take_no_value_and_values_have_words(bunraku: Command) -> None:
     assert re.search(r"^  --name TEXT ", page, re.MULTILINE)
 
 
-def test_commands_for_processes_are_not_listed(bunraku: Command) -> None:
-    page = bunraku("console", "-h").out
-    assert "devices" in page and "box-file" not in page and "choose-show" not in page
-    assert "stretch" not in bunraku("journal", "-h").out
-
-
 def test_every_command_that_reads_recordings_takes_the_same_options() -> None:
     commands = whole().commands
     readers = {name for name, one in commands.items() if {part.name for part in one.params} >= READING}

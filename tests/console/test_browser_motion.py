@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import zipfile
 from collections.abc import Iterator
@@ -12,14 +11,16 @@ import pytest
 import yaml
 from playwright.sync_api import Browser, expect
 
+from appliance.cli.page_calls import pose_map
 from appliance.levers.table import STRINGS, find_lever
 from appliance.show.bundle import default_show_path
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
+from appliance.stage.stage_error import StageError
 from tests.console.browser import LAPTOP, PHONE, declared, press, unlocked_tab
 from tests.console.page import Page, box_with_page
 from tests.system.box import Box
-from tests.system.processes import run_bunraku, wait_until
+from tests.system.processes import wait_until
 
 pytestmark = pytest.mark.realtime
 
@@ -109,9 +110,9 @@ def test_the_map_of_a_show_without_one_is_refused_in_words(tmp_path: Path) -> No
     show = yaml.safe_load(file.read_text())
     del show["motion"]["path"]
     file.write_text(yaml.safe_dump(show))
-    refused = run_bunraku("console", "map", "--show", tmp_path / "show")
-    assert refused.returncode != 0 and "This show has no map" in refused.stderr
-    drawn = json.loads(run_bunraku("console", "map").stdout)
+    with pytest.raises(StageError, match="This show has no map"):
+        pose_map(str(tmp_path / "show"))
+    drawn = pose_map()
     places = [place for place in drawn["path"] if min(place) >= 0 and max(place) <= 1]
     assert len(places) > 0.8 * len(drawn["path"]), "nearly all of the dance lies on the map"
     assert len(drawn["figures"]) == 25 and all(len(one["bones"]) > 15 for one in drawn["figures"])

@@ -114,7 +114,7 @@ def test_the_doctor_looks_while_the_show_goes_on(tab: Tab, venue: tuple[Box, Pag
     proof = page.get(tab.get_attribute("#prove-json", "href") or "").value
     assert proof["kind"] == "doctor"
     assert proof["holds"] == all(one["verdict"] != "wrong" for one in proof["findings"])
-    wait_until(lambda: not ours(box.process.pid, "prove"))
+    wait_until(lambda: not ours(box.process.pid, "appliance.cli.proof"))
     tab.reload()
     await_box(tab)
     tab.locator("#proofs button").first.press("Enter")

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.cli import page_calls
 from appliance.recorder.export import export_stretch
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import Run, read_journal, segments_of
@@ -83,7 +84,7 @@ def test_the_command_shows_it_by_minutes(bunraku: Command, tmp_path: Path) -> No
     assert run["late"] == [0, 0]
 
 
-def test_a_stretch_of_the_journal_has_the_segments_it_lies_in(bunraku: Command, tmp_path: Path) -> None:
+def test_a_stretch_of_the_journal_has_the_segments_it_lies_in(tmp_path: Path) -> None:
     """Two starts of the stage, the first in two segments; a stretch of its end is the second of them."""
     show, journal = write_show(tmp_path / "show"), tmp_path / "journal"
     night = Night(show, tmp_path / "first")
@@ -96,8 +97,7 @@ def test_a_stretch_of_the_journal_has_the_segments_it_lies_in(bunraku: Command, 
     lasts_s = 0.02 * len(first.ticks)
     for start_s, has in ((0.0, 1), (lasts_s - 1.0, 1), (lasts_s - 10.0, 2)):
         out = tmp_path / f"{start_s:.0f}.bunraku"
-        options = ("--run", 1, "--start", start_s, "--seconds", 60 if start_s else 1, "--out", out)
-        bunraku("journal", "stretch", "--journal", journal, *options)
+        page_calls.stretch(str(journal), 1, start_s, 60.0 if start_s else 1.0, str(out))
         (part,) = read_journal(out).runs
         assert len(list(segments_of(out))) == has
         assert part.header["run"] == first.header["run"] and part.keyframes, "it can be danced again"

@@ -1,0 +1,139 @@
+"""Functions that the page calls in a process apart, because they load more than its own may: by name."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from appliance.box.parent_death import end_with_parent
+from appliance.box.realtime import prepare_environment
+
+
+def about(box: str | None = None, chosen: str | None = None) -> Any:
+    """What this box is."""
+    from appliance.release import about
+
+    return about.about(_path(chosen), _path(box))
+
+
+def pose_map(show: str | None = None) -> Any:
+    """The map of a show's poses."""
+    from appliance.generator import pose_map
+    from appliance.show.bundle import default_show_path
+    from appliance.show.show import load_show
+    from appliance.stage.stage_error import StageError
+
+    try:
+        return pose_map.pose_map(load_show(_path(show) or default_show_path()))
+    except LookupError as error:
+        raise StageError(str(error)) from None
+
+
+def keep_cue(show: str, into: str, cue: dict[str, Any]) -> Any:
+    """Write a cue into the copy of a show."""
+    from appliance.release import rehearsed
+    from appliance.stage.stage_error import StageError
+
+    try:
+        return rehearsed.keep_cue(Path(show), Path(into), cue)
+    except OSError as error:
+        raise StageError(f"{into}: the copy of the show cannot be kept ({error.strerror}).") from error
+
+
+def box_file(box: str | None = None, chosen: str | None = None) -> Any:
+    """The box file with its venue's keys."""
+    from appliance.cli import box_file
+
+    return box_file.told(_path(box), _path(chosen))
+
+
+def change_box_file(change: dict[str, Any], box: str | None = None, chosen: str | None = None) -> Any:
+    """Change the box file."""
+    from appliance.cli import box_file
+
+    return box_file.change(_path(box), _path(chosen), box_file.Change(**change))
+
+
+def dance_again(show: str, box: str | None = None, chosen: str | None = None) -> Any:
+    """Let a show that the box has kept dance from now on, by its id."""
+    from appliance.cli import box_file
+
+    return box_file.dance_again(_chosen(chosen), show)
+
+
+def adopt_show(folder: str, box: str | None = None, chosen: str | None = None) -> Any:
+    """Let the copy of a rehearsal dance from now on."""
+    from appliance.cli import box_file
+
+    return box_file.adopt_show(_chosen(chosen), Path(folder))
+
+
+def timelines(journal: str) -> Any:
+    """All runs of a journal."""
+    from appliance.recorder.reading import read_journal
+    from appliance.recorder.timeline import timeline
+
+    return [timeline(number, run) for number, run in enumerate(read_journal(Path(journal)).runs, 1)]
+
+
+def stretch(journal: str, run: int, start: float, seconds: float, out: str | None = None) -> bytes:
+    """A stretch of a run: frames for the page, or into a BVH, glTF or .bunraku file."""
+    from appliance.exchange.formats import write_recording
+    from appliance.pose.counted import counted
+    from appliance.pose.recording import Recording
+    from appliance.recorder.export import export_stretch
+    from appliance.recorder.journal_error import JournalError
+    from appliance.recorder.reading import EXPORTED, read_journal
+    from appliance.recorder.timeline import stretch
+
+    runs = read_journal(Path(journal)).runs
+    if run > len(runs):
+        raise JournalError(f"The journal has {counted(len(runs), 'run')}, and no run {run}.")
+    one = runs[run - 1]
+    if out is None:
+        return b"".join(stretch(one, start, seconds))
+    if Path(out).suffix.casefold() == EXPORTED:
+        export_stretch(Path(journal), Path(out), one, start, seconds)
+        return b""
+    whole = Recording(one.skeleton, one.ticks["pose"], one.ticks["root"], 1.0 / one.header["tick_s"])
+    write_recording(Path(out), whole.excerpt(start, start + seconds))
+    return b""
+
+
+CALLS: dict[str, Callable[..., Any]] = {
+    one.__name__: one
+    for one in (
+        *(about, pose_map, keep_cue, box_file, change_box_file, dance_again, adopt_show),
+        *(timelines, stretch),
+    )
+}
+
+
+def main() -> None:
+    """Call the function on the command line with the keywords on standard input; write what it returns."""
+    end_with_parent()
+    prepare_environment()
+    try:
+        answer = CALLS[sys.argv[1]](**json.loads(sys.stdin.buffer.read()))
+    except Exception as error:
+        from appliance.cli.app import refuse
+
+        refuse(error)
+    sys.stdout.buffer.write(answer if isinstance(answer, bytes) else json.dumps(answer).encode())
+
+
+def _path(text: str | None) -> Path | None:
+    return None if text is None else Path(text)
+
+
+def _chosen(text: str | None) -> Path:
+    from appliance.release.choice import CHOSEN, RUN
+
+    return _path(text) or RUN / CHOSEN
+
+
+if __name__ == "__main__":
+    main()
