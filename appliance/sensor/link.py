@@ -12,7 +12,7 @@ from typing import cast
 from appliance.sensor import wire
 from appliance.sensor.known_sensor import KnownSensor
 from appliance.sensor.memory import with_profile
-from appliance.sensor.pairing import NO_HAND, Pairing
+from appliance.sensor.pairing import NO_HAND, USUAL_RATE_HZ, Pairing
 from appliance.sensor.sensor_key import SensorKey
 from appliance.sensor.state import SensorReading as SensorReading
 from appliance.sensor.state import SensorState as SensorState
@@ -41,18 +41,19 @@ def open_link(
     profiles: Mapping[bytes, bytes] = MappingProxyType({}),
     hands: Sequence[str] = (),
     foreign: tuple[UdpIntake, Mapping[str, SensorKey]] | None = None,
+    rate_hz: int = USUAL_RATE_HZ,
 ) -> SensorLink:
     """A link over a UDP (host, port) and serial (device, baud) pairs.
 
     `profiles`: kept calibrations by the IMU's unique id. `hands`: sensors in the order of the show's hands.
-    `foreign`: the door of foreign sensors, and their keys.
+    `foreign`: the door of foreign sensors, and their keys. `rate_hz`: readings a second of each wearable.
     Raises PortError when the UDP port cannot be opened; an absent serial device may come later.
     """
     intakes: list[Intake] = [UdpIntake(*udp)] if udp is not None else []
     intakes += (SerialIntake(device, baud) for device, baud in serial)
     door, others = foreign or (None, {})
     intakes += [door] if door is not None else []
-    return SensorLink(keys, intakes, profiles, hands, others)
+    return SensorLink(keys, intakes, profiles, hands, others, rate_hz)
 
 
 class SensorLink:
@@ -65,7 +66,9 @@ class SensorLink:
         profiles: Mapping[bytes, bytes] = MappingProxyType({}),
         hands: Sequence[str] = (),
         foreign: Mapping[str, SensorKey] = MappingProxyType({}),
+        rate_hz: int = USUAL_RATE_HZ,
     ) -> None:
+        self.rate_hz = rate_hz
         self.intakes = tuple(intakes)
         self.wants_neutral: set[str] = set()  # sensors whose wearers should stand still: their light shows it
         self.light = True  # whether a linked sensor's light flashes now and then
@@ -125,6 +128,10 @@ class SensorLink:
         """Whether a sensor of this name has a key."""
         return sensor in self._by_name
 
+    def is_foreign(self, sensor: str) -> bool:
+        """Whether it is a phone or a program, which keeps no rate."""
+        return sensor in self._foreign
+
     def refused(self) -> dict[str, int]:
         """Readings without an orientation, of each sensor that sent some."""
         return {name: one.refused for name, one in self._by_name.items() if one.refused}
@@ -148,7 +155,8 @@ class SensorLink:
             sensor = before.get(key.device_id)
             if sensor is None or sensor.key.key != key.key:
                 phase_s = place % HEARTBEATS_APART / HEARTBEATS_APART
-                sensor = KnownSensor(key, Pairing(key, secrets.token_bytes(16), phase_s))
+                pairing = Pairing(key, secrets.token_bytes(16), phase_s, rate_hz=self.rate_hz)
+                sensor = KnownSensor(key, pairing)
             sensor.key = key
             sensor.pairing.hand = self._hands.index(key.name) if key.name in self._hands else NO_HAND
             self._by_device[key.device_id] = self._by_name[key.name] = sensor

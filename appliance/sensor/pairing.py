@@ -20,14 +20,14 @@ from appliance.sensor.sensor_key import SensorKey
 from appliance.sensor.sequence import REMEMBERED, SequenceWindow
 from appliance.sensor.transports.transport import Route
 
-RATE_HZ = 50
+USUAL_RATE_HZ = 50
 HEARTBEAT_S = 1.0
 LOST_S = 3.0  # after this silence heartbeats stop; without them the sensor sends hellos
 SILENT_S = 0.5  # while a linked sensor was heard within this, no other power-on is called
 ASSIGNMENT_INTERVAL_S = 0.1
 CALL_INTERVAL_S = 0.2
 RESTORES = 5
-MOST_AHEAD_HZ = 2 * RATE_HZ  # no sensor counts its readings faster, whatever was lost
+AHEAD = 2  # no sensor counts its readings faster than this times its rate, whatever was lost
 NO_HAND = 255
 
 
@@ -48,9 +48,16 @@ class Session:
 class Pairing:
     """State of one sensor. Time is an argument; packets come in authentic and leave by `due_packets`."""
 
-    def __init__(self, key: SensorKey, secret: bytes, phase_s: float, hand: int = NO_HAND) -> None:
+    def __init__(
+        self,
+        key: SensorKey,
+        secret: bytes,
+        phase_s: float,
+        hand: int = NO_HAND,
+        rate_hz: int = USUAL_RATE_HZ,
+    ) -> None:
         self.tagger = wire.Tagger(key.key)
-        self.hand = hand
+        self.hand, self.rate_hz = hand, rate_hz
         self.session: Session | None = None
         self.greeted_at = -inf
         self.contested_at = -inf  # an ended power-on came back: a single sensor cannot do that
@@ -77,7 +84,7 @@ class Pairing:
         if session is not None and boot_nonce == session.boot_nonce:
             if number != session.number:
                 return "old_session"
-            most = REMEMBERED + MOST_AHEAD_HZ * max(0.0, arrival - session.heard)
+            most = REMEMBERED + AHEAD * self.rate_hz * max(0.0, arrival - session.heard)
             is_ahead = sequence - session.readings.newest > most
             return "ahead" if is_ahead else session.readings.staleness(sequence)
         return None if number == self._number_for(boot_nonce) else "old_session"
@@ -149,7 +156,7 @@ class Pairing:
         """The packets to send now, and where to: assignments, calls, a heartbeat, a calibration."""
         for boot_nonce, (hello, route) in self._unanswered.take_due(now):
             head = self._head(wire.Assignment, boot_nonce, self._number_for(boot_nonce))
-            yield route, wire.Assignment(*head, hello.sequence, self.hand, RATE_HZ, led)
+            yield route, wire.Assignment(*head, hello.sequence, self.hand, self.rate_hz, led)
         for boot_nonce, route in self._uncalled.take_due(now):
             yield route, wire.Call(*self._head(wire.Call, boot_nonce, 0))
         session = self.session

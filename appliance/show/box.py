@@ -65,6 +65,11 @@ class SensorsConfig(Section):
     foreign: list[ForeignSensorConfig] = key(
         "Phones and programs in place of wearables.", [], length=(0, MOST_FOREIGN)
     )
+    rate_hz: Literal[50, 100] = key(
+        "Readings a second that each wearable is asked for. At 100 a lost or late one costs 10 ms instead of "
+        "20; it needs more battery, and Wi-Fi that carries it.",
+        50,
+    )
     light: bool = key(
         "A short flash of a sensor's lamp every 3 seconds shows that it is linked; false: it stays "
         "dark on stage. Signals that ask for something are still shown.",
@@ -175,6 +180,25 @@ class BoxConfig(Section):
         "always",
     )
     journal: JournalConfig = part(JournalConfig)
+
+    @model_validator(mode="after")
+    def _programs_are_heard(self) -> BoxConfig:
+        for place, one in enumerate(self.sensors.foreign):
+            at = ("sensors", "foreign", place)
+            if one.program is None:
+                if self.console is None:
+                    message = f"{one.name} is a phone, and this box serves no page."
+                    raise refusal(message, "Remove `console: null`.", at=at)
+                continue
+            if self.control is None:
+                message = f"Show control hears {one.from_}, and this box has none."
+                raise refusal(message, "Remove `control: null`.", at=at)
+            ports = {self.control.port: "commands"}
+            ports |= {} if self.sensors.udp is None else {self.sensors.udp.port: "wearables"}
+            if one.usual_port in ports:
+                message = f"Port {one.usual_port} hears {ports[one.usual_port]} already."
+                raise refusal(message, f"Give {one.name} another one.", at=(*at, "port"))
+        return self
 
     @model_validator(mode="after")
     def _a_port_for_each(self) -> BoxConfig:

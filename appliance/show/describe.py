@@ -38,6 +38,11 @@ def bounds(field: FieldInfo) -> str:
     return f"at most {high}" if high else f"at least {low}" if "ge" in limits else low
 
 
+def keys(model: type[Section]) -> dict[str, FieldInfo]:
+    """The keys of a section as a file has them."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
+
+
 def section(annotation: Any) -> type[Section] | None:
     """The section that a key opens: itself, in a list, or in place of null; None for a plain value."""
     for part in _flat(annotation):

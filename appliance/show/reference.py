@@ -118,10 +118,10 @@ def _tables(model: type[Section], path: str) -> list[str]:
     """This section's table and those of the sections in it."""
     parts = [f"### {path}\n\n{cleandoc(model.__doc__ or '')}\n"] if path else []
     rows = ["| key | value | default | meaning |", "|---|---|---|---|"]
-    rows += [_row(field.alias or name, field) for name, field in model.model_fields.items()]
+    rows += [_row(key, field) for key, field in describe.keys(model).items()]
     parts.append("\n".join(rows) + "\n")
-    for key, field in model.model_fields.items():
-        name, below = field.alias or key, describe.section(field.annotation)
+    for name, field in describe.keys(model).items():
+        below = describe.section(field.annotation)
         if below:
             place = f"{path}.{name}" if path else name
             if path and below is HandConfig:

@@ -49,7 +49,7 @@ def _words(model: type[Section], location: Location, error: ErrorDetails) -> tup
     if error["type"] == "extra_forbidden":
         where = f" in '{spoken(location[:-1])}'" if location[:-1] else ""
         return f"Unknown key '{shortened(location[-1])}'{where}.", did_you_mean(
-            location[-1], list(around.model_fields)
+            location[-1], list(describe.keys(around))
         )
     field, name = _field_at(model, location), spoken(location)
     if error["type"] == "missing" and isinstance(location[-1], int):
@@ -101,8 +101,8 @@ def _share_of(error: ErrorDetails) -> str:
 def _section_at(model: type[Section], location: Location) -> type[Section]:
     """The section in which a location stands."""
     for step in location:
-        if isinstance(step, str) and step in model.model_fields:
-            model = describe.section(model.model_fields[step].annotation) or model
+        if isinstance(step, str) and (field := describe.keys(model).get(step)) is not None:
+            model = describe.section(field.annotation) or model
     return model
 
 
@@ -110,7 +110,7 @@ def _field_at(model: type[Section], location: Location) -> FieldInfo | None:
     """The field of a key, or of the list or the numbers around a place in brackets."""
     while location and isinstance(location[-1], int):
         location = location[:-1]
-    return _section_at(model, location[:-1]).model_fields.get(str(location[-1])) if location else None
+    return describe.keys(_section_at(model, location[:-1])).get(str(location[-1])) if location else None
 
 
 def spoken(location: Location) -> str:

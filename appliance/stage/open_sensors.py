@@ -60,6 +60,7 @@ def _link(
             profiles,
             sensors,
             foreign,
+            box.sensors.rate_hz,
         )
     except PortError as error:
         raise StageError(str(error)) from error

@@ -104,7 +104,9 @@ class Stage:
         self.tick = Tick(self.parts, self.wearing, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
-        self.lock = PhaseLock() if box.phase_lock and self.parts.primary else None
+        primary, link = self.parts.primary, self.parts.link
+        keeps_rate = primary is not None and not link.is_foreign(primary)
+        self.lock = PhaseLock(1 / link.rate_hz) if box.phase_lock and keeps_rate else None
         self.watch = Watch(self.parts, self.admission, self.made)
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:

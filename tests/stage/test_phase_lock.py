@@ -103,6 +103,19 @@ def test_follows_a_drifting_clock(drift: float) -> None:
     assert sum(followed.periods[-1000:]) / 1000 == pytest.approx(TICK_S * (1.0 + drift), abs=1e-6)
 
 
+def test_two_readings_a_tick_are_followed_in_their_period() -> None:
+    """Ticks come just after every second arrival, whichever that is."""
+    lock = PhaseLock(TICK_S / 2)
+    for number in range(600):
+        lock.observe(5.0 + 0.0043 + number * TICK_S / 2)
+    deadline, waits = 11.0, []
+    for _ in range(200):
+        deadline += TICK_S + lock.shift_s(deadline)
+        waits.append((deadline - 5.0043) % (TICK_S / 2))
+    assert waits[-1] < 0.001
+    assert lock.locked
+
+
 def test_holds_its_place_through_a_dropout_and_is_there_when_readings_return() -> None:
     lock = PhaseLock()
     through = run(Venue(seed=7, phase_s=0.012, silent=(10.0, 13.0)), 20.0, lock)

@@ -21,11 +21,11 @@ TIMESPEC = struct.Struct("@qq")
 OLDEST_S = 1.0
 # The kernel counts about 768 bytes for one of our datagrams and doubles the size that is set.
 COMMON_BUFFER_BYTES = 192 * 1024  # some 500 datagrams: two ticks of a heavy flood
-OWN_BUFFER_BYTES = 96 * 1024  # some 250 datagrams: the burst of one sensor after a stall of 5 s
+OWN_BUFFER_BYTES = 192 * 1024  # some 500 datagrams: the burst of one sensor at 100 Hz after a stall of 5 s
 # Limits of one drain: a flood costs 0.7 to 2.5 ms of a tick, depending on the machine.
 COMMON_PER_DRAIN = 256
 OWN_PER_DRAIN = 32
-OWN_PER_SECOND = 64  # for each second without a drain: what a sensor sends, with some reserve
+OWN_PER_SECOND = 128  # for each second without a drain: what a sensor sends, with some reserve
 
 
 class PortError(OSError):
