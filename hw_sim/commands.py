@@ -41,6 +41,13 @@ class NetworkKind(StrEnum):
     bad = "bad"
 
 
+class Imu(StrEnum):
+    """Inertial unit of the simulated board, one of IMUS."""
+
+    bno055 = "bno055"
+    bno085 = "bno085"
+
+
 @app.command()
 def emulate(
     context: typer.Context,
@@ -107,6 +114,9 @@ def emulate(
         bool,
         typer.Option("--firmware", help="Each sensor runs the compiled firmware (first: make firmware)."),
     ] = False,
+    imu: Annotated[
+        Imu, typer.Option(help="With --firmware: the inertial unit that is wired to the sensors' boards.")
+    ] = Imu.bno055,
     seed: Annotated[int, typer.Option(help="The same seed gives the same dance and the same network.")] = 1,
     log: Annotated[
         Path | None, typer.Option(help="Write a CSV line for each reading as it was sent.")
@@ -135,6 +145,8 @@ def emulate(
         refuse_idle(context, ("baud",), "without --serial")
     else:
         refuse_idle(context, ("host", "port"), "with --serial")
+    if not firmware:
+        refuse_idle(context, ("imu",), "without --firmware")
     try:
         wanted = [name_and_motion(words) for words in sensor or []]
         kinds = dict(wanted)
@@ -155,7 +167,7 @@ def emulate(
             taps=tap,
             drift_ppm=drift_ppm,
             reboot_every_s=reboot_every,
-            make=firmware_maker() if firmware else EmulatedSensor,
+            make=firmware_maker(imu=imu) if firmware else EmulatedSensor,
         )
         senders: list[dict[Lane, Sender]] = [
             {Lane.NETWORK: UdpSender(host, port)}

@@ -11,7 +11,7 @@ from appliance.sensor.framing import Deframer, frame
 from appliance.sensor.keys import SensorKey
 from hw_sim.device import DeviceMaker, Lane, Outgoing, Sample
 from hw_sim.emulated_sensor import ASLEEP_S, REBOOT_S, sensor_axes
-from hw_sim.firmware_library import CompiledWearable, State
+from hw_sim.firmware_library import IMUS, CompiledWearable, State
 from hw_sim.wearer import Wearer
 
 NETWORK, PASSWORD = "bunraku", "curtain up"
@@ -72,10 +72,11 @@ def ask(wearable: CompiledWearable, line: str) -> str:
     return ""
 
 
-def firmware_maker(seed: int | None = None) -> DeviceMaker:
-    """Makes wearables for the emulator. The same seed gives the same bytes; None: each run differs.
+def firmware_maker(seed: int | None = None, imu: str = IMUS[0]) -> DeviceMaker:
+    """Makes wearables with that IMU for the emulator.
 
-    A running box rightly takes a power-on with the same bytes for a replay.
+    The same seed gives the same bytes; None: each run differs. A running box rightly takes a
+    power-on with the same bytes for a replay.
     """
 
     def make(
@@ -83,7 +84,13 @@ def firmware_maker(seed: int | None = None) -> DeviceMaker:
     ) -> FirmwareSensor:
         own = secrets.randbits(64) if seed is None else (seed << 32) + key.device_id
         return FirmwareSensor(
-            key, wearer, phase_s=phase_s, drift_ppm=drift_ppm, reboot_every_s=reboot_every_s, seed=own
+            key,
+            wearer,
+            phase_s=phase_s,
+            drift_ppm=drift_ppm,
+            reboot_every_s=reboot_every_s,
+            seed=own,
+            imu=imu,
         )
 
     return make
@@ -92,7 +99,7 @@ def firmware_maker(seed: int | None = None) -> DeviceMaker:
 class FirmwareSensor:
     """A Device around one CompiledWearable; the emulator's seconds are its virtual time.
 
-    phase_s: its delay at power-on. seed: of all randomness in its world.
+    phase_s: its delay at power-on. seed: of all randomness in its world. imu: the chip that is wired to it.
     Raises FirmwareMissingError, ProvisioningError.
     """
 
@@ -105,6 +112,7 @@ class FirmwareSensor:
         drift_ppm: float = 0.0,
         reboot_every_s: float | None = None,
         seed: int = 1,
+        imu: str = IMUS[0],
     ) -> None:
         self.name = key.name
         self.reboots = 0
@@ -113,6 +121,7 @@ class FirmwareSensor:
         self._drift_ppm = drift_ppm
         self._reboot_every_s = reboot_every_s
         self._seed = seed
+        self._imu = imu
         self._flash = provision(key, seed=seed + 1)
         self._wearable: CompiledWearable | None = None  # None before the first power-on
         self._now = 0.0
@@ -148,7 +157,7 @@ class FirmwareSensor:
         self._now = now
         self._wearer.start(now)
         self._wearable = CompiledWearable(
-            self._flash, seed=self._seed, start_us=_us(now), drift_ppm=self._drift_ppm
+            self._flash, seed=self._seed, start_us=_us(now), drift_ppm=self._drift_ppm, imu=self._imu
         )
         self._wearable.set_network(NETWORK, PASSWORD)
         for lane in self._lanes_up:

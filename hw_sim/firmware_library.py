@@ -13,6 +13,7 @@ from typing import Annotated, NamedTuple, TypeAlias, get_type_hints
 from hw_sim.motions import Quaternion
 
 LIBRARY = Path(__file__).resolve().parents[1] / "build" / "firmware" / "libwearable.so"
+IMUS = ("bno055", "bno085")  # the chips that can be wired
 TO_ALL = 0xFFFFFFFF  # the address of a broadcast
 LARGEST_DATAGRAM = 512
 U64: TypeAlias = Annotated[int, c_uint64]
@@ -96,8 +97,9 @@ class CompiledWearable:
     """One wearable with its world. Times are whole microseconds of virtual time, which never goes back.
 
     flash: an image from `flash_image`, None for a new board. first_us: what its own clock shows at power-on;
-    drift_ppm: how much too fast that clock is. It starts switched off, out of reach of any network.
-    Raises FirmwareMissingError when the firmware was not compiled, ValueError for bytes that are no image.
+    drift_ppm: how much too fast that clock is. imu: one of IMUS. It starts switched off, out of reach of any
+    network. Raises FirmwareMissingError when the firmware was not compiled, ValueError for bytes that are no
+    image, or no such IMU.
     """
 
     def __init__(
@@ -108,12 +110,18 @@ class CompiledWearable:
         start_us: int = 0,
         drift_ppm: float = 0.0,
         first_us: int = 0,
+        imu: str = "bno055",
     ) -> None:
         self._library = load_library()
         image = flash or b""
-        self._world = self._library.wearable_create(image, len(image), seed % (1 << 64), start_us)
+        self._world = self._library.wearable_create(
+            image, len(image), seed % (1 << 64), start_us, imu.encode()
+        )
         if not self._world:
-            raise ValueError("these bytes are no image of a wearable's flash")
+            known = imu in IMUS
+            raise ValueError(
+                "these bytes are no image of a wearable's flash" if known else f"no such IMU: {imu}"
+            )
         self._library.wearable_set_clock(self._world, drift_ppm, first_us)
         self._library.wearable_set_access_point(self._world, False, start_us)
         self._buffer = (c_uint8 * SERIAL_ROOM)()
@@ -232,7 +240,7 @@ def load_library(path: Path = LIBRARY) -> ctypes.CDLL:
     library = ctypes.CDLL(str(path))
     world, data = c_void_p, c_char_p
     signatures: dict[str, tuple[type | None, Sequence[type]]] = {
-        "create": (c_void_p, (data, c_uint32, c_uint64, c_uint64)),
+        "create": (c_void_p, (data, c_uint32, c_uint64, c_uint64, data)),
         "destroy": (None, (world,)),
         "power": (None, (world, c_int)),
         "set_clock": (None, (world, c_double, c_uint64)),

@@ -5,7 +5,7 @@ add_compile_options(-O1 -g ${SANITIZERS})
 add_link_options(${SANITIZERS})
 
 add_library(fuzzed_core OBJECT ${CORE})
-set_target_properties(fuzzed_core PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 13)
+set_target_properties(fuzzed_core PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 target_include_directories(fuzzed_core PUBLIC ${CORE_FOLDER})
 foreach(SOURCE ${TARGETS})
   get_filename_component(NAME ${SOURCE} NAME_WE)

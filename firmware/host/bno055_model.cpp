@@ -13,9 +13,6 @@ namespace {
 
 using namespace bno055;
 
-constexpr uint32_t kByteTenthsUs = 225;     // nine bits at 400 kHz: 22.5 us
-constexpr uint32_t kStuckUs = 1000;         // what the board's driver waits on a held line
-constexpr uint32_t kRecoverUs = 100;
 constexpr uint8_t kErrorSystem = 3;         // SYS_ERR: system initialisation
 constexpr uint8_t kLastOffset = kOffsets + kOffsetBytes - 1;
 constexpr uint8_t kTemperatureSource = 0x40;
@@ -26,10 +23,8 @@ bool is_fusion_mode(uint8_t mode) { return mode == 0x08 || mode == 0x0B || mode 
 
 }  // namespace
 
-Bno055Model::Bno055Model(VirtualClock& clock, uint64_t seed, uint8_t address)
-    : clock_(clock), random_(seed), address_(address) {
-  for (uint8_t& byte : unique_id_) byte = static_cast<uint8_t>(random_.next());
-  set_orientation({1, 0, 0, 0});
+Bno055Model::Bno055Model(VirtualClock& clock, uint64_t seed, uint8_t address) : ImuModel(clock, seed, address) {
+  stretch_us_byte = 180;
   power_on();
 }
 
@@ -38,16 +33,6 @@ void Bno055Model::power_on() {
   is_stuck_ = is_commanded_reset_ = false;
   reset_registers();
   answers_us_ = clock_.now_us() + kStartUpUs;
-}
-
-void Bno055Model::inject(ImuFault fault, uint32_t times) {
-  settle();
-  pending_[static_cast<size_t>(fault)] += times;
-  strike_states();
-}
-
-void Bno055Model::set_probability(ImuFault fault, double per_transaction) {
-  probability_[static_cast<size_t>(fault)] = per_transaction;
 }
 
 bool Bno055Model::write(uint8_t address, uint8_t reg, const uint8_t* data, uint8_t count) {
@@ -70,43 +55,14 @@ bool Bno055Model::read(uint8_t address, uint8_t reg, uint8_t* data, uint8_t coun
   return true;
 }
 
-void Bno055Model::recover() {
-  ++counts_.recovers;
-  is_stuck_ = false;
-  clock_.advance(kRecoverUs);
-}
-
 // Address, faults that keep the chip from answering, and waits that the host should have kept.
 bool Bno055Model::begin(uint8_t address, bool is_read, uint8_t reg, uint8_t count) {
-  settle();
-  ++counts_.transactions;
-  strike_states();
-  const bool is_reached = is_powered_ && address == address_;
-  if (strikes(ImuFault::kStuckBus, true)) is_stuck_ = true;
-  if (is_stuck_) {
-    clock_.advance(kStuckUs);
-    return false;
-  }
-  const bool is_off = clock_.now_us() < answers_us_;
-  if (is_reached && is_off) ++(is_commanded_reset_ ? counts_.early_accesses : counts_.start_up_accesses);
-  if (!is_reached || is_off || strikes(ImuFault::kNack, true)) {
-    spend(1);
-    return false;
-  }
+  if (!is_reached(address)) return false;
   if (clock_.now_us() < switched_us_) ++counts_.early_accesses;
   if (is_read && page_ == 0 && mode_ != kConfigMode && reg <= kLastOffset && reg + count > kOffsets) {
     ++counts_.illegal_reads;
   }
   return true;
-}
-
-bool Bno055Model::strikes(ImuFault fault, bool can_strike) {
-  const size_t at = static_cast<size_t>(fault);
-  const bool is_chance = random_.happens(probability_[at]);
-  const bool is_pending = can_strike && pending_[at] > 0;
-  if (is_pending) --pending_[at];
-  if (is_chance || is_pending) ++counts_.injected[at];
-  return is_chance || is_pending;
 }
 
 void Bno055Model::strike_states() {
@@ -117,10 +73,6 @@ void Bno055Model::strike_states() {
   }
   if (strikes(ImuFault::kFrozen, true)) is_frozen_ = true;
   if (strikes(ImuFault::kFusionError, true)) registers_[kSystemError] = kErrorSystem;
-}
-
-void Bno055Model::spend(uint32_t bytes) {
-  clock_.advance(bytes * stretch_us_byte + (bytes * kByteTenthsUs + 5) / 10);
 }
 
 void Bno055Model::corrupt(uint8_t reg, uint8_t* data, uint8_t count) {

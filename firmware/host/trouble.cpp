@@ -38,6 +38,16 @@ bool find_fault(const std::string& name, ImuFault& fault) {
 
 }  // namespace
 
+bool find_chip(const std::string& name, Wired& wired) {
+  constexpr const char* kChips[] = {"bno055", "bno085"};
+  for (size_t number = 0; number < std::size(kChips); ++number) {
+    if (name != kChips[number]) continue;
+    wired = static_cast<Wired>(number);
+    return true;
+  }
+  return false;
+}
+
 bool inject(World& world, const std::string& name, uint32_t times) {
   ImuFault fault;
   if (!find_fault(name, fault)) return false;

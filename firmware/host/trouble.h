@@ -1,4 +1,4 @@
-// Everything that can go wrong in the simulated world, by name.
+// Names of the simulated world: chips, and everything that can go wrong.
 #pragma once
 
 #include <string>
@@ -6,6 +6,9 @@
 #include "world.h"
 
 namespace bunraku {
+
+// The chip of that name. False: there is none.
+bool find_chip(const std::string& name, Wired& wired);
 
 // The next `times` accesses to the IMU fail. False: there is no such fault.
 bool inject(World& world, const std::string& fault, uint32_t times);

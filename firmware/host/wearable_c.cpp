@@ -41,8 +41,11 @@ void tell_firmware(const bunraku::Status& from, wearable_status& to) {
 
 }  // namespace
 
-wearable_world* wearable_create(const uint8_t* flash, uint32_t flash_bytes, uint64_t seed, uint64_t start_us) {
-  auto world = std::make_unique<wearable_world>(seed, start_us);
+wearable_world* wearable_create(const uint8_t* flash, uint32_t flash_bytes, uint64_t seed, uint64_t start_us,
+                                const char* imu) {
+  bunraku::Wired wired;
+  if (!bunraku::find_chip(imu, wired)) return nullptr;
+  auto world = std::make_unique<wearable_world>(seed, start_us, wired);
   if (flash != nullptr && !world->flash.use_image(flash, flash_bytes)) return nullptr;
   return world.release();
 }

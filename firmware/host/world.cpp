@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include "bno055_model.h"
+#include "bno085_model.h"
+
 namespace bunraku {
 namespace {
 
@@ -11,11 +14,17 @@ constexpr uint64_t kBootUs = 30'000;         // from power to begin(), by the bo
 
 uint64_t lot(uint64_t seed, uint64_t which) { return Random(seed * 8 + which).next(); }
 
+std::unique_ptr<ImuModel> chip_of(Wired wired, VirtualClock& clock, uint64_t seed) {
+  if (wired == Wired::kBno085) return std::make_unique<Bno085Model>(clock, seed);
+  return std::make_unique<Bno055Model>(clock, seed);
+}
+
 }  // namespace
 
-World::World(uint64_t seed, uint64_t start_us)
-    : clock(start_us), wifi(clock, lot(seed, 1)), board(clock, lot(seed, 2)), imu(clock, lot(seed, 3)),
-      loop_(lot(seed, 4)), until_us_(start_us) {
+World::World(uint64_t seed, uint64_t start_us, Wired wired)
+    : clock(start_us), wifi(clock, lot(seed, 1)), board(clock, lot(seed, 2)),
+      chip(chip_of(wired, clock, lot(seed, 3))), imu(*chip), wired_(wired), loop_(lot(seed, 4)),
+      until_us_(start_us) {
   imu.set_motion([this](uint64_t at_us) { return hand.at(at_us); });
   imu.power_off();
 }
@@ -80,8 +89,9 @@ void World::boot() {
   booted_at_us_ = clock.now_us();
   board_clock.power_on(first_micros);
   board.power_on();
-  driver_ = std::make_unique<Bno055>(imu);
-  wearable_ = std::make_unique<Wearable>(Ports{board_clock, *driver_, wifi, serial, flash, led, board});
+  drivers_ = std::make_unique<Drivers>(imu);
+  Imu& driver = wired_ == Wired::kBno055 ? static_cast<Imu&>(drivers_->bno055) : drivers_->search;
+  wearable_ = std::make_unique<Wearable>(Ports{board_clock, driver, wifi, serial, flash, led, board});
   wearable_->begin();
   before_ = wearable_->status();
 }

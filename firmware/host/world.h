@@ -4,9 +4,11 @@
 #include <memory>
 
 #include "bno055.h"
-#include "bno055_model.h"
+#include "bno085.h"
 #include "board_model.h"
 #include "flash_model.h"
+#include "imu_model.h"
+#include "imu_search.h"
 #include "path.h"
 #include "serial_model.h"
 #include "virtual_clock.h"
@@ -22,9 +24,12 @@ struct WorldCounts {
   uint64_t longest_linked_step_us = 0;  // the longest turn of the loop that began and ended linked
 };
 
+// Which chip is wired. The firmware of the MKR boards drives a BNO055; that of the ESP32 boards searches for its chip.
+enum class Wired : uint8_t { kBno055, kBno085 };
+
 class World {
  public:
-  World(uint64_t seed, uint64_t start_us);
+  World(uint64_t seed, uint64_t start_us, Wired wired = Wired::kBno055);
 
   void power(bool is_on);        // the switch: only the flash is kept
   void step_until(uint64_t us);  // runs on; a call that blocks may end later than asked for
@@ -39,7 +44,8 @@ class World {
   FlashModel flash{clock};
   LedTrace led{clock};
   BoardModel board;
-  Bno055Model imu;
+  std::unique_ptr<ImuModel> chip;
+  ImuModel& imu;
   Path hand;  // orientation of the chip in a world with z up
   uint64_t first_micros = 0;  // what the board's clock shows at each power-on
   WorldCounts counts;
@@ -49,11 +55,19 @@ class World {
   void forget_what_was_ahead();
   void turn();
 
+  Wired wired_;
   Random loop_;
   uint64_t until_us_;
   Status before_;  // the turn that is over, or that blocks
   uint64_t booted_at_us_ = 0;
-  std::unique_ptr<Bno055> driver_;
+  struct Drivers {
+    explicit Drivers(I2cBus& bus) : bno055(bus), bno085(bus) {}
+    Bno055 bno055;
+    Bno085 bno085;
+    Imu* all[2] = {&bno055, &bno085};
+    ImuSearch search{all};
+  };
+  std::unique_ptr<Drivers> drivers_;
   std::unique_ptr<Wearable> wearable_;
 };
 

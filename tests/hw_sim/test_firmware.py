@@ -17,7 +17,7 @@ from appliance.sensor.link import open_link
 from hw_sim import motions
 from hw_sim.device import Lane, Outgoing
 from hw_sim.firmware import BOX, NETWORK, PASSWORD, FirmwareSensor, ask, provision
-from hw_sim.firmware_library import CompiledWearable, FirmwareMissingError, State, load_library
+from hw_sim.firmware_library import IMUS, CompiledWearable, FirmwareMissingError, State, load_library
 from hw_sim.network import VENUE, VenueNetwork
 from hw_sim.wearer import Wearer
 from tests.hw_sim.conftest import Emulate
@@ -33,8 +33,8 @@ def keys_of(*names: str) -> dict[str, SensorKey]:
     return {name: SensorKey(name, 100 + place, bytes([place] * 16)) for place, name in enumerate(names)}
 
 
-def device(key: SensorKey = KEY, seed: int = 1, **options: float) -> FirmwareSensor:
-    return FirmwareSensor(key, Wearer(motions.dance(seed)), seed=seed, **options)
+def device(key: SensorKey = KEY, seed: int = 1, imu: str = IMUS[0], **options: float) -> FirmwareSensor:
+    return FirmwareSensor(key, Wearer(motions.dance(seed)), seed=seed, imu=imu, **options)
 
 
 @pytest.fixture
@@ -74,9 +74,10 @@ def test_the_simulation_imports_and_the_other_sensors_work_without_the_library(t
     assert len(ended.stderr.splitlines()) == 1
 
 
-def test_its_readings_are_believed_and_say_how_the_hand_stands() -> None:
+@pytest.mark.parametrize("imu", IMUS)
+def test_its_readings_are_believed_and_say_how_the_hand_stands(imu: str) -> None:
     keys = keys_of("left-wrist", "head")
-    devices = [device(key, seed) for seed, key in enumerate(keys.values(), start=1)]
+    devices = [device(key, seed, imu) for seed, key in enumerate(keys.values(), start=1)]
     show = Show(devices, VenueNetwork(VENUE, 1), keys)
     show.run(5.0)  # joins its network, starts its IMU
     readings = show.run(10.0)
@@ -254,6 +255,8 @@ def test_unknown_trouble_is_refused(wearable: CompiledWearable) -> None:
         wearable.set_trouble("rain", 1.0)
     with pytest.raises(ValueError, match="no image"):
         CompiledWearable(b"\x01\xff\xff")
+    with pytest.raises(ValueError, match="no such IMU"):
+        CompiledWearable(imu="bno999")
 
 
 def test_hellos_go_to_all_each_half_second_until_a_box_answers(wearable: CompiledWearable) -> None:

@@ -22,6 +22,7 @@ class I2cBus {
  public:
   virtual bool write(uint8_t address, uint8_t reg, const uint8_t* data, uint8_t count) = 0;
   virtual bool read(uint8_t address, uint8_t reg, uint8_t* data, uint8_t count) = 0;
+  virtual bool receive(uint8_t, uint8_t*, uint8_t) { return false; }  // read(), of a chip without registers
   virtual void recover() = 0;  // nine clocks and a stop for a slave that holds the data line
 
  protected:
