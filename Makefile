@@ -4,6 +4,7 @@ SHELL := /bin/bash
 VENV := .venv
 BIN := $(VENV)/bin
 PICTURE := out/dance.png
+DISTRIBUTIONS := . distributions/sim distributions/studio
 ARGS ?= --seconds 30
 TEST_ARGS ?=
 # Empty, or --long: every count of the tests at its full length.
@@ -152,7 +153,8 @@ node_modules/.ready: package.json package-lock.json
 bench: $(VENV)/.ready-to-test ## the speed of everything that a tick does, as ratios in one run
 	@$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-only $(TEST_ARGS)
 
-# One environment for both: `make run` installs the box and pictures, `make test` adds torch and the checks.
+# One environment for both: `make run` installs box, simulation and pictures, `make test` adds torch and the checks. The
+# studio is there too: without torch, its commands say what they need.
 $(VENV)/bin/python:
 	@for python in $(or $(PYTHON),python3.11 python3.12 python3.13 python3); do \
 	    if $$python -c 'import sys, ensurepip, venv; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null; \
@@ -161,7 +163,7 @@ $(VENV)/bin/python:
 	echo "Bunraku needs Python 3.11, 3.12 or 3.13 with venv. On Debian: sudo apt-get install -y python3 python3-venv" >&2; \
 	exit 1
 
-$(VENV)/.ready-to-run: requirements.txt pyproject.toml | $(VENV)/bin/python
+$(VENV)/.ready-to-run: requirements.txt pyproject.toml $(wildcard distributions/*/pyproject.toml) | $(VENV)/bin/python
 	@$(call install,requirements.txt)
 	@touch $@
 
@@ -178,7 +180,7 @@ $(VENV)/.ready-to-test-quickly: requirements-test.txt $(VENV)/.ready-to-run
 define install
 echo "Installing what $(1) names$(if $(2), without $(2)) (the first time takes minutes)" && \
 $(BIN)/python -m pip install --quiet --disable-pip-version-check -r <(grep -v '^$(or $(2),#)==' $(1)) && \
-$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation $(DISTRIBUTIONS:%=-e ./%)
 endef
 
 debian-for-tests:
@@ -213,12 +215,13 @@ endef
 release: ## everything for a box, on a stick: out/bunraku-VERSION-ARCH (ARCH=arm64: Pi; KEY=FILE signs it)
 	@deploy/release/make-release --arch $(or $(ARCH),amd64) $(SIGNING)
 
-dist: $(VENV)/.ready-to-run ## wheel and source distribution of the last commit, out/dist
+dist: $(VENV)/.ready-to-run ## wheels and source distributions of the last commit: box, simulation, studio; out/dist
 	@rm -rf out/dist build/dist && mkdir -p out/dist build/dist
 	@set -o pipefail; git archive HEAD | tar -C build/dist -xf -
-	@cd build/dist && for kind in sdist wheel; do \
-	    ../../$(BIN)/python -c "from setuptools import build_meta as b; b.build_$$kind('../../out/dist')" \
-	        >../dist.log 2>&1 || { cat ../dist.log; exit 1; }; done
+	@for each in $(DISTRIBUTIONS); do for kind in sdist wheel; do \
+	    (cd build/dist/$$each && $(CURDIR)/$(BIN)/python -c \
+	        "from setuptools import build_meta as b; b.build_$$kind('$(CURDIR)/out/dist')") \
+	        >build/dist.log 2>&1 || { cat build/dist.log; exit 1; }; done; done
 	@ls out/dist/*
 
 sbom: $(VENV)/.ready-to-run ## bills of materials (CycloneDX) of the releases, and of the image that was built: out/*.cdx.json
@@ -233,15 +236,17 @@ downloads: ## pack what was built into out/downloads, with signed sums (KEY=FILE
 
 lock: | $(VENV)/bin/python ## choose the newest versions that pyproject.toml allows and pin them
 	@rm -rf build && $(BIN)/python -m venv build/lock
-	@$(call pin,pictures,requirements.txt,make run: the box and pictures)
-	@$(call pin,pictures$(comma)studio$(comma)test,requirements-test.txt,make test and make bench: everything)
+	@$(call pin,pictures,requirements.txt,make run: the box and pictures,./distributions/sim)
+	@$(call pin,pictures$(comma)test,requirements-test.txt,make test and make bench: everything,$(DISTRIBUTIONS:%=./%))
 	@rm -rf build
 
 comma := ,
+PINNED_BY_US := --exclude bunraku --exclude bunraku-sim --exclude bunraku-studio
+# $(1) extras of the box, $(2) the lock file, $(3) its title, $(4) other distributions.
 define pin
-build/lock/bin/python -m pip install --quiet --disable-pip-version-check --upgrade setuptools '.[$(1)]' && \
+build/lock/bin/python -m pip install --quiet --disable-pip-version-check --upgrade setuptools '.[$(1)]' $(4) && \
 { echo "# $(strip $(3)). Pinned by 'make lock'; change pyproject.toml instead."; \
-  build/lock/bin/python -m pip freeze --all --exclude pip --exclude bunraku | sed 's/+cpu$$//'; } > $(2)
+  build/lock/bin/python -m pip freeze --all --exclude pip $(PINNED_BY_US) | sed 's/+cpu$$//'; } > $(2)
 endef
 
 clean: ## remove the environment and everything built, keep what was trained

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -65,6 +66,11 @@ def measure(
     limits hold, else 1.
     """
     try:
+        if report is not None and find_spec("matplotlib") is None:
+            raise ProbeError(
+                "The picture of --report needs matplotlib, which is missing here: nothing was measured. "
+                "Leave --report out (--json FILE writes the figures), or: pip install 'bunraku[pictures]'"
+            )
         with scratch_folder("bunraku-measure-") as scratch:
             setting, page = _setting(show, box, scratch, firmware), Progress(progress)
             print(f"Measuring {seconds:g} s in phase with the sensor ...", flush=True)

@@ -18,7 +18,18 @@ BIN = Path(sys.executable).parent
 PACKAGES = ("appliance", "hw_sim", "tools")
 LOCKS = ("requirements.txt", "requirements-test.txt")
 TOP_LEVEL = {
-    *("appliance", "firmware", "hw_sim", "tools", "deploy", "tests", "docs", ".ci", ".github"),
+    *(
+        "appliance",
+        "firmware",
+        "hw_sim",
+        "tools",
+        "deploy",
+        "distributions",
+        "tests",
+        "docs",
+        ".ci",
+        ".github",
+    ),
     *("pyproject.toml", "README.md", "Makefile", "LICENSE", "CHANGELOG.md", ".gitignore", *LOCKS),
     *("CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", ".pre-commit-config.yaml"),
     *(".clang-format", ".clang-format-ignore"),
@@ -116,14 +127,18 @@ def test_locks_pin_exactly_and_name_no_host(lock: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lock", "extras"), [("requirements.txt", ["pictures"]), (LOCKS[1], ["pictures", "studio", "test"])]
+    ("lock", "extras", "others"),
+    [("requirements.txt", ["pictures"], ["sim"]), (LOCKS[1], ["pictures", "test"], ["sim", "studio"])],
 )
-def test_locks_hold_the_project_s_requirements(lock: str, extras: list[str]) -> None:
+def test_locks_hold_the_project_s_requirements(lock: str, extras: list[str], others: list[str]) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wanted = [
         *project["dependencies"],
         *(r for extra in extras for r in project["optional-dependencies"][extra]),
     ]
+    for other in others:
+        file = ROOT / "distributions" / other / "pyproject.toml"
+        wanted += tomllib.loads(file.read_text())["tool"]["bunraku"]["dependencies"]
     pinned = pins(lock)
     for requirement in map(Requirement, wanted):
         name = canonicalize_name(requirement.name)

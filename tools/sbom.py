@@ -29,6 +29,7 @@ PIN = re.compile(r"(?P<name>[\w.-]+)==(?P<version>\S+) --hash=sha256:(?P<sha256>
 PLATFORM = re.compile(r"(?P<name>\S+) \((?P<version>[\d.]+)\)")
 
 Component = dict[str, Any]
+_OWN: Component = {"licenses": [{"license": {"id": "MIT"}}]}  # licence of everything that this checkout makes
 
 
 def main() -> None:
@@ -49,6 +50,7 @@ def bill(arch: str, debian: str = "", root: Path = ROOT) -> str:
     release = root / "deploy" / "release"
     locks = [release / f"requirements-{arch}.lock", release / f"sources-{arch}.lock"]
     components = [one for lock in locks if lock.is_file() for one in python_packages(lock.read_text("utf-8"))]
+    components.append(_component("bunraku-sim", project["version"], "pkg:pypi/bunraku-sim", **_OWN))
     components += firmware_parts((root / "firmware" / "wearable" / "sketch.yaml").read_text("utf-8"))
     components += debian_packages(debian, arch)
     components.sort(key=lambda one: str(one["purl"]))
@@ -57,8 +59,8 @@ def bill(arch: str, debian: str = "", root: Path = ROOT) -> str:
         "bom-ref": f"pkg:pypi/{project['name']}@{project['version']}",
         "name": project["name"],
         "version": project["version"],
-        "licenses": [{"license": {"id": "MIT"}}],
         "purl": f"pkg:pypi/{project['name']}@{project['version']}",
+        **_OWN,
     }
     content = json.dumps([own, components], sort_keys=True)
     document = {

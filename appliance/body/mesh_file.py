@@ -27,7 +27,7 @@ MESH_FILE = "body.npz"
 MODEL = 1  # another number where sculpture, surface or weights change: files of before are made again
 LARGEST_BYTES = 4_000_000
 _LARGEST_UNPACKED = 16_000_000
-_DIGITS = 6  # of metres and quaternions in the key: a skeleton read from text is the same
+_DIGITS = 6  # decimals in the key: a skeleton that was written as text has the same
 _PAIR = [0, 1, 2, 0, 2, 3]  # two triangles as corners of the quad that they are halves of
 
 _UNREADABLE = (
@@ -88,7 +88,7 @@ def _rounded(values: Any) -> list[Any]:
 
 
 def _packed(mesh: BodyMesh) -> Arrays:
-    """The arrays of the file: the longer ones by columns, and in bytes, for they compress better."""
+    """The arrays of the file: the longer ones by columns, and in bytes, which compress better."""
     low = mesh.vertices.min(axis=0)
     step = np.float32((mesh.vertices.max(axis=0) - low).max() / 65535)
     places = np.round((mesh.vertices - low) / step).astype(np.uint16).T
@@ -122,7 +122,7 @@ def _numbers(planes: NDArray[np.uint8]) -> NDArray[np.int32]:
 
 
 def _unpacked(arrays: Arrays, joint_count: int) -> BodyMesh | None:
-    """The surface of these arrays; None where they are none. Raises ValueError, LookupError, TypeError."""
+    """The surface of these arrays; None if they do not fit. Raises ValueError, LookupError, TypeError."""
     low, high = arrays["vertices"].astype(np.float32)
     vertices = np.ascontiguousarray((arrays["step"] * (low + 256.0 * high)).T + arrays["low"], np.float32)
     quads = _numbers(arrays["quads"]).T.copy()

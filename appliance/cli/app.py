@@ -9,7 +9,6 @@ from functools import wraps
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from importlib.metadata import version as distribution_version
-from keyword import iskeyword
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -21,6 +20,7 @@ prepare_environment()
 
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
+from appliance.cli.distributions import PLUG_INS, absent, absent_commands  # noqa: E402
 from appliance.cli.examples import ORDER, OTHER_WORDS  # noqa: E402
 from appliance.cli.help_page import complete_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
@@ -28,7 +28,6 @@ from appliance.options.idle_options import refuse_idle  # noqa: E402
 from appliance.pose.file_trouble import sentence  # noqa: E402
 from appliance.show.config_error import ConfigError, nearest  # noqa: E402
 
-PLUG_INS = "bunraku.commands"
 REFUSED = 2
 _HERE = __name__
 _MODULES = {  # in each a function or a group of the command's name
@@ -45,9 +44,6 @@ _MODULES = {  # in each a function or a group of the command's name
     "journal": "appliance.cli.journal",
     "replay": "appliance.cli.replay",
     "filmstrip": "appliance.cli.pictures",
-    "convert": "appliance.cli.exchange",
-    "retarget": "appliance.cli.exchange",
-    "import": "appliance.cli.exchange",
     "provision": "appliance.cli.sensors.commands",
     "sensors": "appliance.cli.sensors.commands",
     "lights": "appliance.cli.lights_commands",
@@ -71,7 +67,7 @@ def command_line(name: str | None = None) -> typer.Typer:
     app.callback()(_bunraku)  # a parser of one command expects its name too
     for command, module in _MODULES.items():
         if name in (None, command):
-            found = getattr(import_module(module), f"{command}_" if iskeyword(command) else command)
+            found = getattr(import_module(module), command)
             if isinstance(found, typer.Typer):
                 app.add_typer(found, name=command)
             elif command == "preflight":  # it parses its own options: at power-on it runs without this parser
@@ -159,6 +155,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if word not in command.commands:  # help and mistakes need all
         command = parser(None, plugged)
     complete_help(command, order=ORDER)
+    if word not in command.commands:
+        command.epilog += "".join(
+            f"\n\nNot installed here: {one.name} ({', '.join(one.commands)})." for one in absent()
+        )
     _require_known(given, list(command.commands))
     gc.enable()  # spare_the_collector has put it off until the command is loaded
     try:
@@ -180,7 +180,11 @@ def _require_known(given: Sequence[str], commands: Sequence[str]) -> None:
     word = given[0] if given else ""
     if not word or word.startswith("-") or word in commands:
         return
-    known = {name: name for name in commands}
+    missing = absent_commands()
+    if word in missing:
+        print(f"bunraku: {missing[word]}", file=sys.stderr)
+        sys.exit(REFUSED)
+    known = {name: name for name in (*commands, *missing)}
     meant = {other: name for name, others in OTHER_WORDS.items() if name in known for other in others}
     near = nearest(word, list(known | meant)) if word.casefold() not in meant else word.casefold()
     found = known.get(near or "") or meant.get(near or "")

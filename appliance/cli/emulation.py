@@ -11,6 +11,7 @@ from pathlib import Path
 
 from appliance.box.child import end_child, start_child
 from appliance.box.own_command import BUNRAKU
+from appliance.cli.distributions import absent_commands
 from appliance.sensor.keys import create_keys
 from appliance.show.box import BoxConfig, UdpConfig
 from appliance.show.show import Show
@@ -33,6 +34,8 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     names = list(dict.fromkeys(hand.sensor for _, hand in show.config.hands_at if hand.sensor))
     if not names:
         raise StageError("This show has no sensors to emulate. Leave --emulate out.")
+    if missing := absent_commands().get("emulate"):
+        raise StageError(f"No sensor can be emulated: {missing}. Or leave --emulate out.")
     keys, words = scratch / "sensors.keys", scratch / _WORDS
     create_keys(keys, names)
     udp = box.sensors.udp or UdpConfig()

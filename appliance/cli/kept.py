@@ -32,7 +32,7 @@ def kept(
     a show may list it under `phrases`, and `bunraku retarget`, `vary` and `filmstrip` take it.
     """
     from appliance.exchange.exchange_error import ExchangeError
-    from appliance.exchange.formats import require_known_ending, write_recording
+    from appliance.exchange.formats import known_ending, write_recording
     from appliance.release.installed_box import pair_here
     from appliance.show.box import load_box
     from appliance.show.bundle import default_show_path
@@ -59,7 +59,7 @@ def kept(
         cure = did_you_mean(name, names) if names else "Nothing was kept yet: /motion/keep NAME does."
         raise ExchangeError(folder, f"No motion '{name}' is kept here. {cure}")
     out = out or Path(f"{name}.bvh")
-    require_known_ending(out)
+    known_ending(out)
     try:
         recording = _recording(folder / f"{name}{SUFFIX}", skeleton)
     except ValueError as error:

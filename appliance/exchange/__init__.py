@@ -1,1 +1,1 @@
-"""Recordings of other programs in and out: BVH, glTF, tables, points that cameras tracked."""
+"""Recordings out, for other programs: BVH, glTF, tables. The studio reads them (`studio/exchange`)."""

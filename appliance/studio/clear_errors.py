@@ -24,7 +24,7 @@ def clear_errors(command: str) -> Iterator[None]:
             raise
         _refuse(
             f"bunraku {command} needs {error.name}, which is not installed here. The box dances without it. "
-            "Install the studio with: pip install 'bunraku[studio]'"
+            "Install the studio with: pip install bunraku-studio (in a checkout: make studio)"
         )
     except (ValueError, RuntimeError, OSError) as error:
         words = (

@@ -16,6 +16,7 @@ from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.show.bundle import named_show
 from appliance.studio import (
+    exchange_command,
     experiment_command,
     granular_command,
     improvise_command,
@@ -279,6 +280,7 @@ def export(
         export_command.run(checkpoint, out, recordings, phrase, name, hand, reading)
 
 
+app.add_typer(exchange_command.app)
 app.add_typer(inspect_command.app)
 app.add_typer(experiment_command.app)
 app.add_typer(granular_command.app)

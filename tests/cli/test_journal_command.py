@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from appliance.cli import journal, pictures
-from appliance.exchange.formats import read_as_told
 from appliance.pose import quaternion
 from appliance.recorder.reading import read_journal
 from appliance.release import choice
+from appliance.studio.exchange.reading import read_as_told
 from tests.bundles import write_show
 from tests.command import Command
 from tests.recorder.night import Night

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.exchange.formats import ENDINGS, read_as_told, write_recording
+from appliance.exchange.formats import ENDINGS, write_recording
 from appliance.exchange.glb_file import GlbBuffer, GlbFile
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
@@ -24,6 +24,7 @@ from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.stage_frame import in_stage_frame
+from appliance.studio.exchange.reading import read_as_told
 from tests.bundles import swaying_phrase
 from tests.command import Command
 from tests.pose.conventions import dance_of

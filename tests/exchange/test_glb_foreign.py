@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.exchange.formats import read_as_told
 from appliance.exchange.glb_file import GlbBuffer
-from appliance.exchange.glb_reading import Choice, read_glb
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
+from appliance.studio.exchange.glb_reading import Choice, read_glb
+from appliance.studio.exchange.reading import read_as_told
 from tests.command import Command
 
 TURNS = np.array([[0, 0, 0, 1], [0, 0, 0.6, 0.8], [0.36, 0.48, 0, 0.8]])  # x, y, z, w at 0, 0.5 and 1 s

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.exchange.fitting import fit_skeleton, pose_frames
 from appliance.exchange.formats import write_recording
-from appliance.exchange.importing import PointsOptions, import_points
-from appliance.exchange.points_file import read_names, read_points
-from appliance.exchange.topology import directions_at_rest, parents_by_name
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.studio.exchange.fitting import fit_skeleton, pose_frames
+from appliance.studio.exchange.importing import PointsOptions, import_points
+from appliance.studio.exchange.points_file import read_names, read_points
+from appliance.studio.exchange.topology import directions_at_rest, parents_by_name
 from tests.command import Command
 from tests.pose.conventions import as_the_system_writes, dance_of
 from tests.studio.bodies import NAMINGS, body, moved

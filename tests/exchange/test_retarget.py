@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from appliance.cli.pictures import load_dance
-from appliance.exchange.formats import read_as_told
-from appliance.exchange.retargeting import leg_m, lowest_m, retarget
 from appliance.pose import quaternion
 from appliance.pose.body_facts import fronts
 from appliance.pose.bvh import read_bvh, write_bvh
@@ -18,6 +16,8 @@ from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.stage_frame import in_stage_frame
+from appliance.studio.exchange.reading import read_as_told
+from appliance.studio.exchange.retargeting import leg_m, lowest_m, retarget
 from tests.command import Command
 from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of
 

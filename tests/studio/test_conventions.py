@@ -10,7 +10,6 @@ import pytest
 import yaml
 from PIL import Image
 
-from appliance.exchange.retargeting import lowest_m
 from appliance.lights.beams import beams_of
 from appliance.lights.patch import Patch
 from appliance.lights.phrase_run import passes
@@ -24,6 +23,7 @@ from appliance.projector.strip import COLUMNS, ROWS
 from appliance.recorder.reading import JournalRecording, read_journal
 from appliance.recorder.record import holds_of
 from appliance.show.show import load_show
+from appliance.studio.exchange.retargeting import lowest_m
 from hw_sim.osc_receiver import OscReceiver
 from tests.cli.test_cli import write_box
 from tests.command import Command

@@ -52,7 +52,7 @@ def _of_svg(file: Path) -> Array:
         from svgelements import Path as Curve
     except ImportError:
         raise StudioError(
-            "Drawings need svgelements, which is not installed here: pip install 'bunraku[studio]'. Or write "
+            "Drawings need svgelements, which is not installed here: pip install bunraku-studio. Or write "
             "the line as a CSV of points."
         ) from None
     try:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.exchange.figure_facts import MAX_VALUES, checked_recording, checked_skeleton
 from appliance.exchange.glb_file import GlbFile
 from appliance.pose import quaternion
 from appliance.pose.bvh import STRETCH_M
@@ -18,6 +17,7 @@ from appliance.pose.counted import counted
 from appliance.pose.plain_names import changed_names, plain_names
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.studio.exchange.figure_facts import MAX_VALUES, checked_recording, checked_skeleton
 
 _DAMAGED = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError)
 _STILL_SCALE = 1e-3  # a joint that is scaled by less is not scaled

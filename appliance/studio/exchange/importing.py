@@ -9,16 +9,23 @@ from pathlib import Path
 import numpy as np
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.exchange.fitting import Gap, fit_skeleton, gaps_of, like, pose_frames
-from appliance.exchange.formats import read_as_told
-from appliance.exchange.points_file import UNITS, figure_size, guess_unit, read_names, read_points, with_y_up
-from appliance.exchange.topology import directions_at_rest, parents_by_name
 from appliance.pose.kept_rows import place_words
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.roles import places_of
 from appliance.pose.skeleton import Skeleton
+from appliance.studio.exchange.fitting import Gap, fit_skeleton, gaps_of, like, pose_frames
+from appliance.studio.exchange.points_file import (
+    UNITS,
+    figure_size,
+    guess_unit,
+    read_names,
+    read_points,
+    with_y_up,
+)
+from appliance.studio.exchange.reading import read_as_told
+from appliance.studio.exchange.topology import directions_at_rest, parents_by_name
 
 USUAL_FPS = 50.0
 _SHOWN_GAPS = 10

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.exchange.figure_facts import MAX_VALUES
-from appliance.exchange.tables import read_rows, separator_of
 from appliance.pose.foreign_file import content, encoding_of, opened, opened_text
 from appliance.pose.quaternion import Array
+from appliance.studio.exchange.figure_facts import MAX_VALUES
+from appliance.studio.exchange.table_reading import read_rows, separator_of
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _LARGEST_NAMES = 1 << 20

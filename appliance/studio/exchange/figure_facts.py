@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -107,14 +106,3 @@ def checked_recording(
     said = (*notes, *rows.notes())
     kept = Recording(skeleton, turned, roots[sound].astype(np.float64), fps, moved, said)
     return kept.spread(np.array(rows.numbers))
-
-
-def facts_of(skeleton: Skeleton, fps: float) -> dict[str, Any]:
-    """A skeleton and a rate as plain values, for JSON."""
-    return {
-        "fps": fps,
-        "names": list(skeleton.names),
-        "parents": [int(parent) for parent in skeleton.parents],
-        "offsets": np.asarray(skeleton.offsets, float).tolist(),
-        "ends": [[int(joint), [float(part) for part in offset]] for joint, offset in skeleton.ends],
-    }

@@ -10,14 +10,17 @@ from typing import Annotated
 import typer
 
 from appliance.options.reading import reading_options
+from appliance.pose.file_trouble import sentence
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.stage_frame import Guess
 from appliance.show.bundle import named_show
 
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
 
 class Unit(StrEnum):
-    """Of the points in a file."""
+    """Unit of the points in a file."""
 
     m = "m"
     cm = "cm"
@@ -41,6 +44,7 @@ class Up(StrEnum):
     z = "z"
 
 
+@app.command()
 @reading_options
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A recording: .bvh, .glb, .npz or .csv.")],
@@ -57,10 +61,11 @@ def convert(
     units, with Z up or with the dancer's back to the audience come out in metres, Y up and to the front, and
     a message says so. A .glb has a body around the skeleton, so that it can be looked at as it is.
     """
-    from appliance.exchange.formats import read_as_told, require_known_ending
-    from appliance.exchange.glb_reading import Choice
+    from appliance.exchange.formats import known_ending
+    from appliance.studio.exchange.glb_reading import Choice
+    from appliance.studio.exchange.reading import read_as_told
 
-    require_known_ending(out)
+    known_ending(out)
     recording = _told(source, *read_as_told(source, reading, Choice(skin, animation)))
     if fps is not None:
         recording = recording.resampled(fps)
@@ -69,6 +74,7 @@ def convert(
     print(f"{out}: {recording.seconds:.1f} s, {len(recording)} poses at {rate:g} a second, {joints} joints.")
 
 
+@app.command()
 @reading_options
 def retarget(
     phrase: Annotated[Path, typer.Argument(help="A recording: .bvh, .glb, .npz or .csv.")],
@@ -88,13 +94,14 @@ def retarget(
     over the floor follows the legs' length, and the soles are on the floor.
     """
     from appliance.exchange.exchange_error import ExchangeError
-    from appliance.exchange.formats import read_as_told, require_known_ending
-    from appliance.exchange.glb_reading import Choice
-    from appliance.exchange.retargeting import retarget as put_on
+    from appliance.exchange.formats import known_ending
     from appliance.pose.body_facts import with_stance
     from appliance.pose.bvh import read_bvh
+    from appliance.studio.exchange.glb_reading import Choice
+    from appliance.studio.exchange.reading import read_as_told
+    from appliance.studio.exchange.retargeting import retarget as put_on
 
-    require_known_ending(out)
+    known_ending(out)
     dance = _told(phrase, *read_as_told(phrase, reading, Choice(skin, animation)))
     if to.is_dir():  # a show's skeleton is in the stage's frame already
         other = with_stance(read_bvh(to / "skeleton.bvh"))
@@ -127,6 +134,7 @@ def _told(file: Path, recording: Recording, guesses: list[Guess]) -> Recording:
     return recording
 
 
+@app.command("import")
 def import_(
     points: Annotated[Path, typer.Argument(help="Points: .npy (frames, points, 3), or .csv.")],
     out: Annotated[Path, typer.Option(help="The recording: .bvh, .glb, .npz or .csv.")],
@@ -158,21 +166,21 @@ def import_(
     l_wrist, RightKnee ...), from parents in --names, or from --like. A missing point is NaN, an empty field,
     or 0, 0, 0 for a while. At the end it says how far the figure is from the points, in centimetres.
     """
-    from appliance.cli.pictures import RecordedDance, draw_dance
-    from appliance.exchange.formats import require_known_ending
-    from appliance.exchange.importing import PointsOptions, import_points
-    from appliance.stage.stage_error import StageError
+    from appliance.exchange.formats import known_ending
+    from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
+    from appliance.studio.exchange.importing import PointsOptions, import_points
 
-    require_known_ending(out)
+    known_ending(out)
     options = PointsOptions(names, like, fps, unit.value if unit else None, up.value, gap)
     imported = import_points(points, options, print)
-    _write(out, imported.recording)
+    dance = imported.recording
+    _write(out, dance)
     for line in imported.report():
         print(line)
-    print(f"{out}: {imported.recording.seconds:.1f} s, {len(imported.recording.skeleton)} joints.")
+    print(f"{out}: {dance.seconds:.1f} s, {len(dance.skeleton)} joints.")
+    picture = picture or out.with_suffix(".png")
     try:
-        print(
-            draw_dance(RecordedDance(imported.recording, None, out.stem), picture or out.with_suffix(".png"))
-        )
-    except StageError as error:  # the recording is written: only its picture is missing
-        print(f"There is no picture: {error}", file=sys.stderr)
+        print(draw_filmstrip(picture, dance.skeleton, dance.poses, dance.roots, dance.fps, title=out.stem))
+    except (MissingPicturesError, OSError) as error:  # the recording is written: only its picture is missing
+        words = sentence(error, picture) if isinstance(error, OSError) else None
+        print(f"There is no picture: {words or error}", file=sys.stderr)

@@ -1,0 +1,1 @@
+"""Recordings of other programs in: glTF, tables, points that cameras tracked; and onto other skeletons."""
