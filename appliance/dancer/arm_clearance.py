@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any, cast
+from typing import cast
 
 from appliance.dancer import two_bones
 from appliance.dancer.forward_kinematics import Figure
@@ -42,6 +42,8 @@ class ArmClearance:
     body bends around it instead of jumping to the other side.
     """
 
+    SNAPSHOT = ("_ways", "_turns")
+
     def __init__(self, skeleton: Skeleton) -> None:
         self._trunk = Trunk.of(skeleton)
         bones = 2 * len(self._trunk.arms) if self._trunk else 0
@@ -69,15 +71,6 @@ class ArmClearance:
         """Forget the ticks before: no arm is turned."""
         self._ways = [None] * len(self._ways)
         self._turns = [_NO_TURN] * len(self._turns)
-
-    def state(self) -> dict[str, Any]:
-        """The state that later poses depend on, for `restore`: plain values."""
-        return {"ways": list(self._ways), "turns": list(self._turns)}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self._ways = [None if way is None else two_bones.vector(way) for way in state["ways"]]
-        self._turns = [two_bones.vector(turn) for turn in state["turns"]]
 
     def _clear(
         self,

@@ -21,7 +21,7 @@ From hop 5 on some poses are seen by one window only, and at hop 8 all of them: 
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -34,6 +34,8 @@ _ROWS = 256  # poses of running motion in memory; at its end they move back to t
 
 class Blending:
     """A running buffer of the next `window` poses of `joints` joints; a window arrives every `hop` ticks."""
+
+    SNAPSHOT = ("_running", "_gathered_here", "hop", "_ticks_since_window", "_fresh")
 
     def __init__(self, joints: int, window: int = 8, hop: int = 1, shape: Shape = "prompt") -> None:
         self._window, self._joints, self._shape = window, joints, shape
@@ -79,9 +81,7 @@ class Blending:
 
     def add(self, poses: FloatArray) -> None:
         """Blend a generated window (window, joints, 4) of unit quaternions into the motion from now on."""
-        rows = slice(self._first, self._first + self._window)
-        running = self._poses[rows].reshape(-1, 4)
-        gathered = self._gathered[rows].reshape(-1)
+        running, gathered = self._running.reshape(-1, 4), self._gathered_here.reshape(-1)
         np.add(gathered, self._weights, out=gathered)
         np.divide(self._weights, gathered, out=self._share)
         self._slerp(running, poses.reshape(-1, 4), self._share, out=running)
@@ -106,24 +106,18 @@ class Blending:
         self._gathered[last] = 0.0
         return pose
 
-    def state(self) -> dict[str, Any]:
-        """The state that later poses depend on, for `restore`: plain values and copies of arrays."""
-        rows = slice(self._first, self._first + self._window)
-        return {
-            "poses": self._poses[rows].copy(),
-            "gathered": self._gathered[rows].copy(),
-            "hop": self._hop,
-            "ticks_since_window": self._ticks_since_window,
-            "fresh": self._fresh,
-        }
+    @property
+    def _rows(self) -> slice:
+        return slice(self._first, self._first + self._window)
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self._first = 0
-        self._poses[: self._window] = state["poses"]
-        self._gathered[: self._window] = state["gathered"]
-        self.hop = state["hop"]
-        self._ticks_since_window, self._fresh = state["ticks_since_window"], state["fresh"]
+    @property
+    def _running(self) -> FloatArray:
+        """The running motion from this tick on, in place."""
+        return self._poses[self._rows]
+
+    @property
+    def _gathered_here(self) -> FloatArray:
+        return self._gathered[self._rows]
 
     def _move_to_start(self) -> None:
         kept = self._window - 1

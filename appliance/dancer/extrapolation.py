@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +33,8 @@ class Extrapolation:
     0.12 while it rests. FADE 0.8 gives 3.9 and 20 ms, but 7.3 degrees of overshoot and 0.36 of noise; SPAN 1
     gives 4.2 degrees, 0.51 of noise and 1.2 times the phrase's roughness.
     """
+
+    SNAPSHOT = ("_past", "_oldest")
 
     def __init__(self, joints: int, window: int) -> None:
         self._past = np.zeros((2 * SPAN, joints, 4), dtype=np.float32)
@@ -81,11 +82,3 @@ class Extrapolation:
         np.matmul(self._squares, _SUM, out=self._lengths)
         np.sqrt(self._lengths, out=self._lengths)
         np.divide(out, self._lengths, out=out)
-
-    def state(self) -> dict[str, Any]:
-        """The state that later targets depend on, for `restore`: plain values and copies of arrays."""
-        return {"past": self._past.copy(), "oldest": self._oldest}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self._past[:], self._oldest = state["past"], state["oldest"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 from appliance.dancer import two_bones
 from appliance.dancer.forward_kinematics import Figure, soles_of
@@ -32,6 +31,8 @@ class _Leg:
     among the soles.
     """
 
+    SNAPSHOT = ("x", "z", "step")
+
     hip: int
     thigh: int
     shin: int
@@ -50,6 +51,8 @@ class FootLock:
     the floor and falls with its speed, so nothing pops. The offset returns quickly in the air and, the
     farther the faster, on the floor. Feet keep their orientation. Legs that a hand holds are left alone.
     """
+
+    SNAPSHOT = ("_before", "_legs")
 
     def __init__(self, skeleton: Skeleton, tick_s: float = 0.02) -> None:
         self._tick_s = tick_s
@@ -100,16 +103,6 @@ class FootLock:
         self._before = None
         for leg in self._legs:
             leg.x, leg.z, leg.step = 0.0, 0.0, [0.0, 0.0]
-
-    def state(self) -> dict[str, Any]:
-        """The state that later poses depend on, for `restore`: plain values."""
-        return {"before": self._before, "legs": [[leg.x, leg.z, *leg.step] for leg in self._legs]}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self._before = state["before"]
-        for leg, (x, z, *step) in zip(self._legs, state["legs"], strict=True):
-            leg.x, leg.z, leg.step = x, z, step
 
     def _offset(
         self,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +23,8 @@ class Figure:
     and the turned bones are added up along the chains by one matrix product.
     soles (S, 3): world positions of each foot's joint, of the joints below it, and of where these end.
     """
+
+    SNAPSHOT = ("world", "_points", "soles")
 
     def __init__(self, skeleton: Skeleton) -> None:
         joints = len(skeleton)
@@ -80,14 +80,6 @@ class Figure:
         """Move the whole figure by (3,) metres."""
         np.add(self._points, offset, out=self._points)
         np.take(self._points, self._sole_rows, axis=0, out=self.soles, mode="clip")
-
-    def state(self) -> dict[str, Any]:
-        """The figure's pose, for `restore`: copies of arrays."""
-        return {"world": self.world.copy(), "points": self._points.copy(), "soles": self.soles.copy()}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Stand as the one did that gave this state."""
-        self.world[:], self._points[:], self.soles[:] = state["world"], state["points"], state["soles"]
 
 
 def soles_of(skeleton: Skeleton) -> tuple[tuple[int, ...], ...]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 TICK_S = 0.02
 
@@ -15,6 +14,8 @@ class Glide:
 
     They start and end gently; at the end a value is exactly what was asked for.
     """
+
+    SNAPSHOT = ("values", "_start", "_end", "_ticks", "_left")
 
     def __init__(self, count: int, roots: int = 0) -> None:
         self.values, self._start, self._end, self._ticks, self._left = np.zeros((5, count))
@@ -42,11 +43,3 @@ class Glide:
         here[roots] = (start + part[roots] * (np.sqrt(self._end[roots]) - start)) ** 2
         self.values[going] = np.where(self._left > 0.0, here, self._end)[going]
         return True
-
-    def state(self) -> NDArray[np.float64]:
-        """All of it, (5, n), for `restore`."""
-        return np.stack([self.values, self._start, self._end, self._ticks, self._left])
-
-    def restore(self, state: NDArray[np.float64]) -> None:
-        """Continue from a state."""
-        self.values[:], self._start[:], self._end[:], self._ticks[:], self._left[:] = state

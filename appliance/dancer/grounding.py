@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -76,6 +75,11 @@ class Grounding:
     still while the phrase's root travels, the feet finally slide after it: the stage has an edge. One root
     cannot hold two feet that the puppet moves against each other: the legs make up for the rest (FootLock).
     """
+
+    SNAPSHOT = (
+        *("figure", "root", "pose", "_foot_lock", "_arms", "_rest", "_offset_x", "_offset_z", "_step_x"),
+        *("_step_z", "_height", "_before"),
+    )
 
     def __init__(self, skeleton: Skeleton, floor: Floor | None, tick_s: float = 0.02) -> None:
         """floor None: figures stay where the phrase has them."""
@@ -171,31 +175,6 @@ class Grounding:
         self._shift[:] = self._offset_x + drawn_x, height, self._offset_z + drawn_z
         self.figure.move(self._shift)
         np.add(self.root, self._shift, out=self.root)
-
-    def state(self) -> dict[str, Any]:
-        """The state that later positions depend on, for `restore`: plain values and copies of arrays."""
-        return {
-            "figure": self.figure.state(),
-            "root": self.root.copy(),
-            "pose": self.pose.copy(),
-            "foot_lock": self._foot_lock.state(),
-            "arms": self._arms.state(),
-            "rest": self._rest,
-            "offset": [self._offset_x, self._offset_z],
-            "step": [self._step_x, self._step_z],
-            "height": self._height,
-            "before": self._before,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self.figure.restore(state["figure"])
-        self.root[:], self.pose[:] = state["root"], state["pose"]
-        self._foot_lock.restore(state["foot_lock"])
-        self._arms.restore(state["arms"])
-        self._rest, self._height, self._before = state["rest"], state["height"], state["before"]
-        self._offset_x, self._offset_z = state["offset"]
-        self._step_x, self._step_z = state["step"]
 
     def _pin(
         self,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +31,11 @@ class Hands:
     and has no weight. by_place: whether each puppeteer gives a place. Two of them may hold one joint, one in
     each way. holds (M,): how firmly each joint is held, in either way.
     """
+
+    SNAPSHOT = (
+        *("puppeteers", "mask", "_present", "targets", "weights", "places", "place_weights", "holds"),
+        "_extrapolation",
+    )
 
     def __init__(
         self,
@@ -169,27 +173,6 @@ class Hands:
                 place = self._places[rows.start]
                 np.multiply(window[:, place], self._signs[rows.start], out=self.targets[:, place])
         np.greater(self.weights, 0.0, out=self.mask)
-
-    def state(self) -> dict[str, Any]:
-        """The state that later targets depend on, for `restore`: plain values and copies of arrays."""
-        return {
-            "puppeteers": [puppeteer.state() for puppeteer in self.puppeteers],
-            "mask": self.mask.copy(),
-            "present": self._present.copy(),
-            "targets": self.targets[:, self._places].copy(),
-            "weights": self.weights.copy(),
-            "places": [self.places.copy(), self.place_weights.copy(), self.holds.copy()],
-            "extrapolation": self._extrapolation.state(),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state of the same show's hands."""
-        for puppeteer, kept in zip(self.puppeteers, state["puppeteers"], strict=True):
-            puppeteer.restore(kept)
-        self.mask[:], self._present[:], self.weights[:] = state["mask"], state["present"], state["weights"]
-        self.targets[:, self._places] = state["targets"]
-        self.places[:], self.place_weights[:], self.holds[:] = state["places"]
-        self._extrapolation.restore(state["extrapolation"])
 
 
 def _place(joint: str, joints: Sequence[str]) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -69,6 +69,8 @@ class HeldPlace(Puppeteer):
     `reach` of the root. habitual: where this dancer's joint goes at all, if known.
     """
 
+    SNAPSHOT: tuple[str, ...] = ("_place", "_speed", "_told")
+
     habitual: Reach | None = None
 
     def __init__(self, joint: str, skeleton: Skeleton, weight: float = 1.0) -> None:
@@ -101,18 +103,6 @@ class HeldPlace(Puppeteer):
         """Where the last pull held the joint, or will hold it ahead_s later; in the frame of `stand`."""
         x, y, z = (at + ahead_s * speed for at, speed in zip(self._place, self._speed, strict=True))
         return self._bounded((x, y, z))
-
-    def state(self) -> dict[str, Any]:
-        return super().state() | {
-            "place": [*self._place, *self._speed],
-            "told_place": None if self._told is None else list(self._told),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        super().restore(state)
-        x, y, z, *speed = state["place"]
-        self._place, self._speed = (x, y, z), _three(speed)
-        self._told = None if state["told_place"] is None else _three(state["told_place"])
 
     def _holds(self, now: float) -> bool:
         return self._told is not None
@@ -155,6 +145,8 @@ class FixedPlace(HeldPlace):
 class RemotePlace(HeldPlace):
     """A joint whose place remote control gives (OSC, a finger on the page, a tracker); free until then."""
 
+    SNAPSHOT = ("_left_s",)
+
     def __init__(self, joint: str, skeleton: Skeleton, weight: float = 1.0) -> None:
         super().__init__(joint, skeleton, weight)
         self._left_s = math.inf
@@ -174,13 +166,6 @@ class RemotePlace(HeldPlace):
     def release(self) -> None:
         """Give the joint back to the puppet."""
         self._told = None
-
-    def state(self) -> dict[str, Any]:
-        return super().state() | {"left_s": self._left_s}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        super().restore(state)
-        self._left_s = state["left_s"]
 
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
         self._left_s -= elapsed

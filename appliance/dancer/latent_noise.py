@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,8 @@ class LatentNoise:
     noise: of the newest tick. seed: the newest that was asked for. begins_at: the absolute tick of this
     stage's tick 0.
     """
+
+    SNAPSHOT = ("_seeds", "begins_at", "_newest", "_since")
 
     def __init__(self, seed: int, puppets: int, latents: int) -> None:
         self.seed, self.begins_at = seed, 0
@@ -69,20 +70,15 @@ class LatentNoise:
             np.add(noise, other, out=noise)
         return noise
 
-    def state(self) -> dict[str, Any]:
-        """The state that future noise depends on, for `restore`: plain values."""
-        return {
-            "seeds": [self._before.seed, self._waves.seed, self._next.seed],
-            "ticks": [self.begins_at, self._newest, self._since],
-        }
+    @property
+    def _seeds(self) -> tuple[int, int, int]:
+        return self._before.seed, self._waves.seed, self._next.seed
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the noise did that gave this state."""
-        before, now, following = state["seeds"]
+    @_seeds.setter
+    def _seeds(self, seeds: tuple[int, int, int]) -> None:
+        before, now, self.seed = seeds
         self._before, self._waves = _Waves(before, *self._shape), _Waves(now, *self._shape)
-        self._next = self._waves if following == now else _Waves(following, *self._shape)
-        self.seed = following
-        self.begins_at, self._newest, self._since = state["ticks"]
+        self._next = self._waves if self.seed == now else _Waves(self.seed, *self._shape)
 
     def _sum(self, waves: _Waves, tick: int, out: FloatArray) -> FloatArray:
         phases, sines = self._phases, self._sines

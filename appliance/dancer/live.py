@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -33,6 +32,11 @@ class Live:
 
     jumps: how often its root jumped.
     """
+
+    SNAPSHOT = (
+        *("_before", "_newest", "_present", "_root", "_offset", "_has_root", "_is_new", "_comes", "_came"),
+        *("_is_whole", "_arrival", "_interval_s", "_chosen", "_share", "_step", "_extrapolation"),
+    )
 
     jumps = 0
 
@@ -170,28 +174,3 @@ class Live:
             self.jumps += 1
             self._root += jump
             self._offset -= jump
-
-    def state(self) -> dict[str, Any]:
-        """The state that later windows depend on, for `restore`: plain values and copies of arrays."""
-        return {
-            "poses": np.stack([self._before, self._newest, self._present]),
-            "roots": self._root.copy(),
-            "offset": self._offset.copy(),
-            "has_root": self._has_root,
-            "is_new": self._is_new.copy(),
-            "comes": [self._comes.copy(), self._came.copy()],
-            "times": [self._arrival, self._interval_s],
-            "chosen": [self._chosen, self._share, self._step],
-            "extrapolation": self._extrapolation.state(),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self._before[:], self._newest[:], self._present[:] = state["poses"]
-        self._root[:], self._offset[:] = state["roots"], state["offset"]
-        self._has_root, self._is_new[:] = state["has_root"], state["is_new"]
-        self._comes[:], self._came[:] = state.get("comes", (True, 1.0))  # an older checkpoint: all came
-        self._is_whole = bool(self._comes.all() and self._came.min() == 1.0)
-        self._arrival, self._interval_s = state["times"]
-        self._chosen, self._share, self._step = state["chosen"]
-        self._extrapolation.restore(state["extrapolation"])

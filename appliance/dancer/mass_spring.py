@@ -43,6 +43,8 @@ class MassSpring:
     positions, velocities (N, 3): metres, metres a second, world frame. rest (N, 3): rest vectors, metres.
     """
 
+    SNAPSHOT = ("positions", "velocities")
+
     def __init__(self, parents: Sequence[int], anchored: bool = True) -> None:
         """parents: of each node, before it in order; the first has none. anchored False: it moves freely."""
         count = len(parents)

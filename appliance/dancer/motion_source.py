@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from appliance.box.snapshot import restored
 from appliance.dancer.crossfade import Crossfade
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
@@ -96,11 +97,11 @@ class Playback:
 
     def window(self) -> FloatArray:
         """The next poses (window, J, 4) of the motion, without sign jumps; valid until advance()."""
-        return self._stream.poses()
+        return self._stream.poses
 
     def roots(self) -> FloatArray:
         """The root's position (window, 3) in metres at the poses of the window."""
-        return self._stream.roots()
+        return self._stream.roots
 
     @property
     def lift(self) -> float:
@@ -277,7 +278,7 @@ class Playback:
             "entered": [self._on_the_way, float(self._entered_at)],
             "request": None if request is None else [repertoire.named(request[0]), *request[1:]],
             "jumped": self.jumped,
-            **self._stream.state(),
+            "stream": self._stream,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -293,7 +294,7 @@ class Playback:
         self._request = None if request is None else (repertoire.loop(request[0]), *request[1:])
         self._on_the_way, self._entered_at = state["entered"]
         self.jumped = state["jumped"]
-        self._stream.restore(state)
+        restored(self._stream, state["stream"])
 
     def _clear_memory(self, joints: int, columns: int) -> None:
         self._reader, self._between_heads = Reader(joints), Slerp(joints, short=False)

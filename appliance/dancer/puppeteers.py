@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,8 @@ LONGEST_STEP_S = 0.12  # six ticks; after a longer stall the targets continue fr
 class Target:
     """One joint, one orientation ((4,) unit, local to the parent), one weight 0..1; reused at each tick."""
 
+    SNAPSHOT = ("orientation", "weight")
+
     joint: str
     orientation: FloatArray
     weight: float = 0.0
@@ -33,6 +34,8 @@ class Puppeteer:
     when it releases it; a new `weight` is approached at the pace of taking. A disabled puppeteer releases the
     joint, whatever its source, and takes it again when enabled.
     """
+
+    SNAPSHOT: tuple[str, ...] = ("weight", "enabled", "_target", "_presence", "_level", "_pulled_at")
 
     def __init__(self, joint: str, weight: float = 1.0) -> None:
         self.joint = joint
@@ -75,25 +78,6 @@ class Puppeteer:
         self._target.weight = self._level * self._presence * self._presence * (3 - 2 * self._presence)
         return self._target
 
-    def state(self) -> dict[str, Any]:
-        """The state that later targets depend on, for `restore`: plain values and copies of arrays."""
-        return {
-            "weight": self.weight,
-            "enabled": self.enabled,
-            "orientation": self._target.orientation.copy(),
-            "held": self._target.weight,
-            "presence": self._presence,
-            "level": self._level,
-            "pulled_at": self._pulled_at,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self.weight, self.enabled = state["weight"], state["enabled"]
-        self._target.orientation[:], self._target.weight = state["orientation"], state["held"]
-        self._presence, self._level = state["presence"], state["level"]
-        self._pulled_at = state["pulled_at"]
-
     def _holds(self, now: float) -> bool:
         """Whether the joint should be held at the time `now`."""
         return True
@@ -110,6 +94,8 @@ class WornSensor(Puppeteer):
     joint_from_reading: the matrix (4, 4) from a reading (w, x, y, z; sensor axes) to the joint's local
     orientation; it preserves length. None: the readings are local orientations already.
     """
+
+    SNAPSHOT = ("_joint_from_reading", "_reading", "_local", "_heard_at", "_leading_s", "_led_s", "_apart")
 
     def __init__(
         self, joint: str, weight: float = 1.0, joint_from_reading: NDArray[np.float32] | None = None
@@ -137,23 +123,6 @@ class WornSensor(Puppeteer):
         if self._heard_at is not None and arrival - self._heard_at > HOLD_S:
             self._lead(max(self._leading_s, min(arrival - self._heard_at, TAKE_S)))
         self._heard_at = arrival
-
-    def state(self) -> dict[str, Any]:
-        return super().state() | {
-            "joint_from_reading": np.array(self._joint_from_reading, dtype=np.float32),
-            "reading": self._reading.copy(),
-            "local": self._local.copy(),
-            "heard_at": self._heard_at,
-            "leading": [self._leading_s, self._led_s, *self._apart],
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        super().restore(state)
-        self._joint_from_reading = np.array(state["joint_from_reading"], dtype=np.float32)
-        self._reading[:], self._local[:] = state["reading"], state["local"]
-        self._heard_at = state["heard_at"]
-        self._leading_s, self._led_s, *apart = state["leading"]
-        self._apart = _four(apart)
 
     def silent_s(self, now: float) -> float:
         """Seconds since the last reading; infinite before the first one."""
@@ -189,12 +158,21 @@ class WornSensor(Puppeteer):
 
 
 class TurningAxis(Puppeteer):
-    """Turns its joint about an axis at a constant rate, from the rest pose at the first pull."""
+    """Turns its joint about an axis at a constant rate."""
+
+    SNAPSHOT = ("_half_angle",)
 
     def __init__(
-        self, joint: str, axis: Sequence[float], seconds_per_turn: float, weight: float = 1.0
+        self,
+        joint: str,
+        axis: Sequence[float],
+        seconds_per_turn: float,
+        weight: float = 1.0,
+        turned: float = 0.0,
     ) -> None:
-        """Raises ValueError for an axis of no length or a turn that takes no time."""
+        """turned: radians, at the first pull. Raises ValueError for an axis of no length or a turn that takes no
+        time.
+        """
         super().__init__(joint, weight)
         length = math.hypot(*axis)
         if len(axis) != 3 or not 0 < length < math.inf:
@@ -203,14 +181,7 @@ class TurningAxis(Puppeteer):
             raise ValueError("A turn cannot take 0 seconds. A negative number turns the other way.")
         self._x, self._y, self._z = (value / length for value in axis)
         self.seconds_per_turn = seconds_per_turn
-        self._half_angle = 0.0
-
-    def state(self) -> dict[str, Any]:
-        return super().state() | {"half_angle": self._half_angle}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        super().restore(state)
-        self._half_angle = state["half_angle"]
+        self._half_angle = turned / 2
 
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
         self._half_angle = math.fmod(self._half_angle + math.pi * elapsed / self.seconds_per_turn, math.tau)
@@ -240,6 +211,8 @@ class Kept(Puppeteer):
 class Remote(Puppeteer):
     """A joint held by remote control (OSC, a slider), set by another thread; free until the first message."""
 
+    SNAPSHOT = ("_held",)
+
     def __init__(self, joint: str, weight: float = 1.0) -> None:
         super().__init__(joint, weight)
         # One tuple, replaced as a whole: the tick sees the old one or the new one, never a mixture.
@@ -265,13 +238,6 @@ class Remote(Puppeteer):
     def release(self) -> None:
         """Give the joint back to the puppet."""
         self._held = None
-
-    def state(self) -> dict[str, Any]:
-        return super().state() | {"told": self._held}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        super().restore(state)
-        self._held = None if state["told"] is None else _four(state["told"])
 
     def _holds(self, now: float) -> bool:
         return self._held is not None

@@ -29,6 +29,8 @@ class SlowStrings:
     was driven to ten times its energy.
     """
 
+    SNAPSHOT = ("modes",)
+
     def __init__(
         self, skeleton: Skeleton, nodes: Sequence[int], config: StringsConfig, step_s: float
     ) -> None:

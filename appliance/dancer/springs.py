@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +43,8 @@ class Springs(Puppeteer):
     (len(joints), 4): local, written by each pull. setting: the name in force; what `turn` turns stays until
     another setting is called up. With feedback, strings that the bones draw pull them back.
     """
+
+    SNAPSHOT = ("setting", "_is", "_strings", "_body", "_before", "_turned", "_pulls", "_begun")
 
     def __init__(
         self,
@@ -117,7 +118,7 @@ class Springs(Puppeteer):
         """Go over to a setting in these seconds. Raises KeyError for one that there is not."""
         self.setting = name
         self._is.call(self.settings[name], seconds)
-        self._apply()
+        self.settle()
         if kicks:
             self.kick(self.settings[name].kick)
 
@@ -125,7 +126,7 @@ class Springs(Puppeteer):
         """Turn one of springs_parameters.KNOBS: wind (x, y, z m/s), gravity (m/s^2), stiffness (a factor),
         feedback, storm and gate (0..1)."""
         self._is.turn(knob, values, seconds)
-        self._apply()
+        self.settle()
 
     def kick(self, velocity: Sequence[float]) -> None:
         """Add a velocity (x, y, z), metres a second, to every mass."""
@@ -134,26 +135,6 @@ class Springs(Puppeteer):
     def follow_phrase(self, pose: FloatArray, root: FloatArray) -> None:
         """Take the phrase's pose (J, 4) of this tick and its root (3,), metres."""
         self._pose, self._root = pose, root
-
-    def state(self) -> dict[str, Any]:
-        return super().state() | {
-            "setting": self.setting,
-            "parameters": self._is.state(),
-            "strings": self._strings.modes.view(np.float64).copy(),
-            "masses": np.stack([self._body.positions, self._body.velocities, self._before]),
-            "turned": self._turned.copy(),
-            "pulls": [self._pulls, self._begun],
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        super().restore(state)
-        self.setting = state["setting"]
-        self._is.restore(state["parameters"])
-        self._apply()
-        self._strings.modes.view(np.float64)[:] = state["strings"]
-        self._body.positions[:], self._body.velocities[:], self._before[:] = state["masses"]
-        self._turned[:] = state["turned"]
-        self._pulls, self._begun = state["pulls"]
 
     def energy(self) -> float:
         """Joules in motion, springs and strings."""
@@ -164,7 +145,7 @@ class Springs(Puppeteer):
             self._begun = False  # at rest, and at no cost, until it is to hold again
             return
         if self._is.step():
-            self._apply()
+            self.settle()
         self._phrase.set_pose(self._pose, self._root)
         stands = self._phrase.positions[self._nodes].astype(np.float64)
         body = self._body
@@ -195,7 +176,7 @@ class Springs(Puppeteer):
         rest += follow * (self._bones_of @ (self._puppet.positions[self._nodes] - stands))
         rest *= lengths / np.maximum(np.sqrt((rest * rest) @ _SUM), _SMALLEST)
 
-    def _apply(self) -> None:
+    def settle(self) -> None:
         """Give masses and strings the numbers of this moment."""
         is_now = self._is
         self._damping = is_now.damping[:, None]

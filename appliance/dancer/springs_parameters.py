@@ -33,6 +33,8 @@ class SpringsParameters:
     wind (3,), gravity: as they were set; blow (3,): the wind with the storm.
     """
 
+    SNAPSHOT = ("_glide",)
+
     def __init__(self, regions: Sequence[tuple[Region, Region]]) -> None:
         """regions: of each node's mass, and of the bone that leads to it."""
         self._own = np.array([REGIONS.index(own) for own, _ in regions])
@@ -68,30 +70,22 @@ class SpringsParameters:
         }
         for name, numbers_of in values.items():
             self._glide.aim(_PARTS[name], numbers_of, seconds)
-        self._work_out()
+        self.settle()
 
     def turn(self, knob: str, values: Sequence[float], seconds: float) -> None:
         """Turn one of KNOBS."""
         self._glide.aim(_PARTS[knob], values, seconds)
-        self._work_out()
+        self.settle()
 
     def step(self) -> bool:
         """One tick; whether anything has changed."""
         changed = self._glide.step()
         if changed:
-            self._work_out()
+            self.settle()
         return changed
 
-    def state(self) -> NDArray[np.float64]:
-        """For `restore`."""
-        return self._glide.state()
-
-    def restore(self, state: NDArray[np.float64]) -> None:
-        """Continue from a state."""
-        self._glide.restore(state)
-        self._work_out()
-
-    def _work_out(self) -> None:
+    def settle(self) -> None:
+        """Work out what follows from the values."""
         values = self._glide.values
         regions = values[_PARTS["regions"]].reshape(len(REGIONS), 4)
         self.follow, gusts, air, self.stir = values[_PARTS["air_and_hand"]].tolist()

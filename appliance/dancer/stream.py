@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,8 @@ _ROWS = 256  # poses before it moves back to the start of its memory
 
 class Stream:
     """Poses (J, 4) and tracks (C,) of the next `window` ticks, this tick first."""
+
+    SNAPSHOT = ("poses", "tracks")
 
     def __init__(self, joints: int, columns: int, window: int) -> None:
         self._window, self._end = window, 0
@@ -36,13 +37,20 @@ class Stream:
         """Append what was written into next_row."""
         self._end += 1
 
+    @property
     def poses(self) -> FloatArray:
         """The window's poses (window, J, 4); valid until the next row is appended."""
         return self._poses[self._end - self._window : self._end]
 
+    @property
+    def tracks(self) -> FloatArray:
+        """The window's tracks (window, C); valid as long."""
+        return self._tracks[self._end - self._window : self._end]
+
+    @property
     def roots(self) -> FloatArray:
         """The window's roots (window, 3) in metres."""
-        return self._tracks[self._end - self._window : self._end, :3]
+        return self.tracks[:, :3]
 
     @property
     def lift(self) -> float:
@@ -72,17 +80,6 @@ class Stream:
         x, z = self._tracks[first, [X, Z]].tolist()
         w, _, y, _ = self._poses[first, 0].tolist()
         return x, z, 2 * math.atan2(y, w)
-
-    def state(self) -> dict[str, Any]:
-        """The window, for `restore`: copies of arrays."""
-        shown = slice(self._end - self._window, self._end)
-        return {"played": self._poses[shown].copy(), "played_track": self._tracks[shown].copy()}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self._end = self._window
-        self._poses[: self._end] = state["played"]
-        self._tracks[: self._end] = state["played_track"]
 
     def _move_to_start(self) -> None:
         kept = self._window

@@ -13,7 +13,6 @@ from appliance.keeper.mirror import RETRY_S
 from appliance.keeper.run_memory import Piece, RunMemory
 from appliance.recorder import chunks, log
 from appliance.recorder.environment import environment, fingerprints
-from appliance.recorder.keyframe import POSITION
 from appliance.recorder.reading import last_kept
 from appliance.recorder.segments import Segments
 from appliance.show.bundle import default_show_path
@@ -85,7 +84,7 @@ class MirroredJournal:
             self._segments.begin()
             data.append(chunks.chunk(chunks.HEADER, self._header(memory)))
         if piece.keyframe is not None:
-            frame = POSITION.pack(piece.keyframe.position) + piece.keyframe.data
+            frame = log.POSITION.pack(piece.keyframe.position) + piece.keyframe.data
             data.append(chunks.chunk(chunks.KEYFRAME, frame))
         if piece.entries:
             data.append(chunks.chunk(chunks.LOG, log.packed(piece.entries), piece.ticks))

@@ -11,8 +11,7 @@ from typing import Any
 from appliance.box.ring_file import RingFileReader
 from appliance.pose.foreign_file import plain_json
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.keyframe import POSITION
-from appliance.recorder.log import Entry
+from appliance.recorder.log import POSITION, Entry
 from appliance.recorder.record import DAMAGED, TICK, layout_of, require_sound
 from appliance.stage.recorder import (
     ENTRY,

@@ -15,6 +15,8 @@ class JointFrame:
     Write into the arrays (`frame.pose[:] = ...`); outputs read them while they publish and keep nothing.
     """
 
+    SNAPSHOT = ("pose", "world", "positions", "root", "sensor_sequence", "sensor_arrival")
+
     joints: int
     tick: int = 0
     frame_time: float = 0.0  # seconds on the monotonic clock

@@ -6,6 +6,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+POSITION = struct.Struct("<Q")  # before a keyframe: how many entries of the log came before it
 _HEAD = struct.Struct("<QII")  # number, kind, bytes
 _PIECE = struct.Struct("<HH")  # which piece of a long event, of how many; they follow each other
 

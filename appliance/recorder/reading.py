@@ -18,7 +18,6 @@ from appliance.pose.foreign_file import content, opened
 from appliance.pose.skeleton import Skeleton
 from appliance.recorder import chunks, log
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.keyframe import POSITION
 from appliance.recorder.record import DAMAGED, EVENT, PIECE, TICK, layout_of, require_sound, skeleton_of
 from appliance.recorder.segments import SUFFIX, segment_paths
 
@@ -165,7 +164,7 @@ def last_kept(folder: Path, run: str) -> tuple[int, int]:
                 continue
             for one in chunks.chunks(data):
                 if one.kind == chunks.KEYFRAME:
-                    keyframe = max(keyframe, *POSITION.unpack_from(one.data))
+                    keyframe = max(keyframe, *log.POSITION.unpack_from(one.data))
                 elif one.kind == chunks.LOG:
                     entries = max(entries, *(entry.number for entry in log.unpacked(one.data)))
     return max(entries, keyframe), keyframe
@@ -268,8 +267,8 @@ def _add(parts: dict[str, _Part], data: bytes, room: _Room) -> None:
     for one in chunks.chunks(data):
         room.take(len(one.data))
         if one.kind == chunks.KEYFRAME:
-            (position,) = POSITION.unpack_from(one.data)
-            part.keyframes[position] = one.data[POSITION.size :]
+            (position,) = log.POSITION.unpack_from(one.data)
+            part.keyframes[position] = one.data[log.POSITION.size :]
         elif one.kind == chunks.LOG:
             for entry in log.unpacked(one.data):
                 room.take(_OF_AN_ENTRY)

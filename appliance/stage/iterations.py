@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from appliance.dancer.phrase import FPS
 
@@ -14,6 +13,8 @@ class Iterations:
 
     wished: what the show or the newest order asked for, though fewer may fit.
     """
+
+    SNAPSHOT = ("coding", "interaction", "most", "wished", "_before", "_wanted", "_tick", "_ticks")
 
     coding: int
     interaction: int
@@ -53,25 +54,6 @@ class Iterations:
     def asked(self) -> tuple[int, int]:
         """Coding and interaction iterations at the end of the way that they are on."""
         return (self.coding, self.interaction) if self._tick == self._ticks else self._wanted
-
-    def state(self) -> dict[str, Any]:
-        """Where they are and where they go, for `restore`."""
-        return {
-            "now": [self.coding, self.interaction, self.most],
-            "before": self._before,
-            "wanted": self._wanted,
-            "ticks": [self._tick, self._ticks],
-            "wished": self.wished,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state."""
-        self.coding, self.interaction, self.most = state["now"]
-        (coding, interaction), (wanted_coding, wanted_interaction) = state["before"], state["wanted"]
-        self._before, self._wanted = (coding, interaction), (wanted_coding, wanted_interaction)
-        self._tick, self._ticks = state["ticks"]
-        coding, interaction = state.get("wished", state["wanted"])
-        self.wished = coding, interaction
 
     def advance(self) -> None:
         """One tick further on the way to what was asked for, in whole iterations: each is a small step."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Sequence
-from typing import Any
 
 from appliance.dancer.latent_noise import LatentNoise
 from appliance.dancer.phrase import FPS
@@ -19,6 +18,8 @@ class Liveliness:
 
     level: at this tick; asked: at the end of its fade.
     """
+
+    SNAPSHOT = ("level", "asked", "_before", "_tick", "_ticks", "_has_danced", "_noise")
 
     def __init__(self, level: float, seed: int | None, puppets: Sequence[StagePuppet]) -> None:
         """seed None: drawn anew."""
@@ -72,21 +73,3 @@ class Liveliness:
             self._tick += 1
             share = self._tick / self._ticks
             self.level = self._before + share * (self.asked - self._before)
-
-    def state(self) -> dict[str, Any]:
-        """The state that later ticks depend on, for `restore`: plain values."""
-        return {
-            "levels": [self.level, self.asked, self._before],
-            "ticks": [self._tick, self._ticks],
-            "has_danced": self._has_danced,
-            "noise": self._noise.state(),
-        }
-
-    def restore(self, state: dict[str, Any] | None) -> None:
-        """Go on as the one did that gave this state; None: in a journal of a release that had none."""
-        if state is None:
-            return
-        self.level, self.asked, self._before = state["levels"]
-        self._tick, self._ticks = state["ticks"]
-        self._has_danced = state["has_danced"]
-        self._noise.restore(state["noise"])

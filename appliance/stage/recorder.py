@@ -12,8 +12,8 @@ import numpy as np
 
 from appliance.box.live_pose import LivePose
 from appliance.box.ring_file import RingFileWriter
-from appliance.recorder.keyframe import POSITION, packed
-from appliance.recorder.log import pieces_of
+from appliance.box.snapshot import packed
+from appliance.recorder.log import POSITION, pieces_of
 from appliance.recorder.record import EVENT, NOT_FINITE, PIECE, TICK, layout_of
 
 if TYPE_CHECKING:
@@ -110,11 +110,11 @@ class Recorder:
         except (TypeError, ValueError):
             self.lost += 1
 
-    def keyframe(self, state: dict[str, Any]) -> None:
-        """The whole state of the dance, from which a replay may start: plain values and arrays."""
+    def keyframe(self, tick: Tick) -> None:
+        """The whole state of the dance, from which a replay may start."""
         self._ticks = 0
         try:
-            self._file.rings[KEYFRAMES].write(POSITION.pack(self._entries) + packed(state))
+            self._file.rings[KEYFRAMES].write(POSITION.pack(self._entries) + packed(tick))
         except (TypeError, ValueError):
             self.lost += 1
 

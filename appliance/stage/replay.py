@@ -12,9 +12,9 @@ import numpy as np
 from appliance.box.clock import Slot
 from appliance.box.live_pose import LivePose, LivePoseReader
 from appliance.box.orders import Order
+from appliance.box.snapshot import restore
 from appliance.dancer.puppet import PuppetNetwork
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.keyframe import unpacked
 from appliance.recorder.reading import Run
 from appliance.recorder.record import DAMAGED, NOT_FINITE, ORDER, puppets_of
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
@@ -90,7 +90,7 @@ class Replay:
 
     def _restore(self, keyframe: bytes) -> None:
         with _refused("A keyframe"):
-            self.tick.restore(unpacked(keyframe))
+            restore(self.tick, keyframe)
 
     def _rows(self) -> dict[int, int]:
         return {int(number): row for row, number in enumerate(self._run.tick_numbers)}

@@ -139,7 +139,7 @@ class Stage:
         self._publish_health(begun)
         self.resuming.write_start(self.reconciler)
         if self.recorder is not None:
-            self.recorder.keyframe(self.tick.state())
+            self.recorder.keyframe(self.tick)
         if self.show.config.dancer.seed is None:
             self._say_and_note(f"The answer's noise has the seed {self.parts.liveliness.seed}.")
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
@@ -153,7 +153,7 @@ class Stage:
             self._reconcile(slot.started)
             self._take_orders(slot.started, clock.now)
             if self.recorder is not None and self.recorder.wants_keyframe:
-                self.recorder.keyframe(self.tick.state())
+                self.recorder.keyframe(self.tick)
             shift_s = self._follow_sensor(slot)
             if self.health.is_due(slot.started) and not self._comes_from_stop:
                 self._report(slot.started)

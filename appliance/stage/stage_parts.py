@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -53,6 +52,8 @@ class StageParts:
     which joints a sensor holds, of any puppet; `mountings`: how it is worn for each of these; `complaints`:
     why sensors are not let in.
     """
+
+    SNAPSHOT = ("puppets", "liveliness", "newest_primary")
 
     skeleton: Skeleton
     network: PuppetNetwork
@@ -138,16 +139,9 @@ class StageParts:
         for one in self.puppets:
             one.motion.make_by(make)
 
-    def state(self) -> dict[str, Any]:
-        """The state of the first puppet's dance, for `restore`: plain values, copies of arrays."""
-        first = self.first.parts_state() | {"liveliness": self.liveliness.state()}
-        return {**first, "newest_primary": self.newest_primary}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a state that parts of the same show gave."""
-        self.first.restore_parts(state)
-        self.liveliness.restore(state.get("liveliness"))
-        self.newest_primary = restored_reading(state["newest_primary"])
+    def settle(self) -> None:
+        """A restored reading is one again."""
+        self.newest_primary = restored_reading(self.newest_primary)
 
     def close(self) -> None:
         """Free ports and sockets."""

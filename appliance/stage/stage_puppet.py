@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +65,11 @@ class StagePuppet:
     network: liveliness, how much of the phrase's own stays while a hand holds (1: all of it), and noise (Z,),
     added to the latent.
     """
+
+    SNAPSHOT = (
+        *("motion", "blending", "grounding", "hands", "live", "iterations", "network_failed", "_danced"),
+        "frame",
+    )
 
     puppet: Puppet
     motion: Playback
@@ -214,45 +218,6 @@ class StagePuppet:
         self.iterations.ask(noted.coding, noted.interaction)
         for puppeteer in self.hands.puppeteers:
             puppeteer.enabled = puppeteer.joint not in noted.let_go
-
-    def parts_state(self) -> dict[str, Any]:
-        """The state that the dance depends on, for `restore_parts`: plain values and copies of arrays."""
-        return {
-            "motion": self.motion.state(),
-            "blending": self.blending.state(),
-            "grounding": self.grounding.state(),
-            "hands": self.hands.state(),
-            "live": None if self.live is None else self.live.state(),
-        }
-
-    def restore_parts(self, state: dict[str, Any]) -> None:
-        """Go on from a state that the same puppet of the same show gave."""
-        self.motion.restore(state["motion"])
-        self.blending.restore(state["blending"])
-        self.grounding.restore(state["grounding"])
-        self.hands.restore(state["hands"])
-        if self.live is not None:
-            self.live.restore(state["live"])
-
-    def frame_state(self) -> dict[str, Any]:
-        """The state that the next frame repeats if it has nothing newer, and the iterations: for
-        `restore_frame`.
-        """
-        frame = self.frame
-        return {
-            "iterations": self.iterations.state(),
-            "network_failed": self.network_failed,
-            "danced": self._danced.copy(),
-            "frame": {name: getattr(frame, name).copy() for name in _STANDING},
-        }
-
-    def restore_frame(self, state: dict[str, Any]) -> None:
-        """Go on from a `frame_state`."""
-        self.iterations.restore(state["iterations"])
-        self.network_failed = state["network_failed"]
-        self._danced[:] = state["danced"]
-        for name in _STANDING:
-            getattr(self.frame, name)[:] = state["frame"][name]
 
 
 def _is_possible(figure: Figure) -> bool:

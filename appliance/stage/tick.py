@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,8 @@ class Tick:
     again, marked late. The phrase stands still meanwhile, so nothing is jumped over and nothing is replayed.
     Where the network gives no sound poses, the last good pose stays.
     """
+
+    SNAPSHOT = ("parts", "wearing", "latest_start_s")
 
     def __init__(
         self,
@@ -117,33 +118,6 @@ class Tick:
             self.sections_ms[section] = 1000.0 * (end - begin)
             begin = end
         return 1000.0 * (begin - slot.started)
-
-    def state(self) -> dict[str, Any]:
-        """All that the frames to come depend on, beside readings and slots, for `restore`: plain values and
-        copies of arrays.
-        """
-        frame, (first, *others) = self.frame, self.parts.puppets
-        more = {"puppets": [one.parts_state() | one.frame_state() for one in others]} if others else {}
-        return {
-            "parts": self.parts.state(),
-            "wearing": self.wearing.state(),
-            "latest_start_s": self.latest_start_s,
-            "sensor": [frame.sensor_sequence, frame.sensor_arrival],
-            **first.frame_state(),
-            **more,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the tick of the same show did that gave this state."""
-        frame, (first, *others) = self.frame, self.parts.puppets
-        self.parts.restore(state["parts"])
-        self.wearing.restore(state["wearing"])
-        self.latest_start_s = state["latest_start_s"]
-        first.restore_frame(state)
-        for one, kept in zip(others, state.get("puppets", ()), strict=True):
-            one.restore_parts(kept)
-            one.restore_frame(kept)
-        frame.sensor_sequence, frame.sensor_arrival = state["sensor"]
 
     def _name_reading(self) -> None:
         """The frame names the reading that went into it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from appliance.box.snapshot import packed, restore
 from appliance.dancer.arm_clearance import ArmClearance
 from appliance.dancer.forward_kinematics import Figure
 from appliance.dancer.trunk import Trunk
@@ -121,7 +122,7 @@ def test_it_continues_from_a_state() -> None:
     for tick, pose in enumerate(poses.astype(np.float32)):
         figure.set_pose(pose, np.zeros(3, dtype=np.float32))
         if tick == 40:
-            second.restore(first.state())
+            restore(second, packed(first))
         (first if tick < 40 else second).clear(pose, figure)
         assert np.array_equal(pose, whole[tick])
 

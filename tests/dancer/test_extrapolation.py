@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from appliance.box.snapshot import packed, restore
 from appliance.dancer.blending import Blending
 from appliance.dancer.extrapolation import MOST_RADIANS, Extrapolation
 from appliance.pose import quaternion
@@ -122,7 +123,7 @@ def test_one_that_was_restored_goes_on_bit_for_bit() -> None:
     known = np.array([[False]])
     for tick in range(60):
         if tick == 31:
-            other.restore(one.state())
+            restore(other, packed(one))
         made = np.empty((2, WINDOW, 1, 4), dtype=np.float32)
         one(course[tick][None], known, made[0])
         other(course[tick if tick > 30 else 0][None], known, made[1])

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from appliance.box.snapshot import packed, restore, unpacked
 from appliance.dancer import two_bones
 from appliance.dancer.foot_lock import FootLock
 from appliance.dancer.grounding import Grounding, sole_positions, survey
@@ -159,7 +160,7 @@ def test_it_continues_from_a_state(crouching: Recording) -> None:
     first, second = Grounding(crouching.skeleton, floor), Grounding(crouching.skeleton, floor)
     for tick in range(60):
         first.ground_pose(poses[tick], roots[tick], 0.0, held=held)
-    second.restore(first.state())
+    restore(second, packed(first))
     for tick in range(60, 120):
         for grounding in (first, second):
             grounding.ground_pose(poses[tick], roots[tick], 0.0, held=held)
@@ -175,4 +176,4 @@ def test_a_figure_without_legs_of_two_bones_is_not_locked(crouching: Recording) 
     poses[:, 1] = quaternion.from_axis_angle([1, 0, 0], np.sin(np.arange(50) / 5))
     phrase = Recording(stumps, poses, crouching.roots[:50], 50.0)
     assert np.array_equal(stand(phrase, poses, nobody(stumps)).poses, poses.astype(np.float32))
-    assert FootLock(stumps).state()["legs"] == []
+    assert unpacked(packed(FootLock(stumps)))["_legs"] == []

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from appliance.box.snapshot import packed, restore
 from appliance.dancer.grounding import Grounding, survey
 from appliance.dancer.hands import HandError, Hands
 from appliance.dancer.held_places import (
@@ -238,7 +239,7 @@ def test_hands_by_place_go_on_from_their_state(skeleton: Skeleton) -> None:
     for tick in range(10):
         hands.pull(tick * TICK_S, WINDOW, root, positions)
     other, _ = made()
-    other.restore(hands.state())
+    restore(other, packed(hands))
     for tick in range(10, 60):
         for each in (hands, other):
             each.pull(tick * TICK_S, WINDOW, root, positions)

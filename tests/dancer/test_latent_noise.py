@@ -7,6 +7,7 @@ import gc
 import numpy as np
 import pytest
 
+from appliance.box.snapshot import packed, restore
 from appliance.dancer.latent_noise import CROSSFADE_TICKS, FASTEST_HZ, SLOWEST_HZ, LatentNoise
 
 LATENTS = 24
@@ -123,7 +124,7 @@ def test_it_goes_on_from_a_state_in_the_middle_of_crossfades(ticks: int) -> None
     course(noise, 10, 11)
     noise.change(3)
     course(noise, 11, 11 + ticks)
-    other.restore(noise.state())
+    restore(other, packed(noise))
     assert (other.seed, other.begins_at) == (3, 77)
     np.testing.assert_array_equal(course(noise, 11 + ticks, 500), course(other, 11 + ticks, 500))
 

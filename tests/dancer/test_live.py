@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from appliance.box.snapshot import packed, restore
 from appliance.dancer.live import SILENT_S, Live
 from appliance.pose import quaternion
 from tests.dancer.conftest import random_quaternions
@@ -212,7 +213,7 @@ def test_it_continues_from_a_state() -> None:
     first, second = chosen(0.5), Live(JOINTS, WINDOW)
     for tick in range(60):
         if tick == 30:
-            second.restore(first.state())
+            restore(second, packed(first))
         heard = random_quaternions(rng, JOINTS).astype(np.float32)
         heard[1, :] = math.nan if tick % 9 > 5 or 28 < tick < 33 else heard[1]
         for live in (first, second)[: 1 + (tick >= 30)]:

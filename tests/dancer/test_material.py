@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from appliance.box.snapshot import packed, restore
 from appliance.dancer.grounding import survey
 from appliance.dancer.loop import Loop, Placement, yaws
 from appliance.dancer.material.cyclic import Cycle, bridged, even_starts, hann_mean
@@ -191,10 +192,10 @@ def test_playback_goes_over_to_what_was_made_in_step_and_back(maker: Maker, phra
         largest, before = max(largest, float(quaternion.angle_between(now, before).max())), now
     assert motion.phrase == "vary" and abs(motion.position_s - at_s - 0.5) < 0.03
     assert np.degrees(largest) < 25
-    state = motion.state()
+    state = packed(motion)
     other = Playback(recording, floor=survey(recording))
     other.make_by(lambda text: maker.make(VARY))
-    other.restore(state)
+    restore(other, state)
     for _ in range(100):
         motion.advance()
         other.advance()

@@ -7,6 +7,7 @@ from random import Random
 import numpy as np
 import pytest
 
+from appliance.box.snapshot import packed, restore
 from appliance.dancer.forward_kinematics import Figure
 from appliance.dancer.hands import Hands
 from appliance.dancer.puppeteers import FixedOrientation, Puppeteer, WornSensor
@@ -109,9 +110,9 @@ def test_a_setting_brings_its_kick_once() -> None:
     still = dance.springs.energy()
     dance.springs.call("kicked")
     assert dance.springs.energy() > still + 1.0
-    dance.springs.restore(dance.springs.state())
+    restore(dance.springs, packed(dance.springs))
     kicked = dance.springs.energy()
-    dance.springs.restore(dance.springs.state())
+    restore(dance.springs, packed(dance.springs))
     assert dance.springs.energy() == kicked
 
 
@@ -171,7 +172,7 @@ def test_they_go_on_from_their_state_bit_for_bit() -> None:
     one.tick(30)
     one.springs.turn("wind", (1.0, 2.0, 3.0), 1.0)
     one.springs.turn("feedback", (1.0,))
-    other.hands.restore(one.hands.state())
+    restore(other.hands, packed(one.hands))
     other.now = one.now
     assert np.array_equal(one.tick(50), other.tick(50))
 

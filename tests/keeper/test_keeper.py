@@ -53,7 +53,7 @@ def note(night: Night, ticks: int) -> None:
         night.slot.started = night.slot.deadline
         night.recorder.note_tick(night.slot, night.tick, 0)
         if night.recorder.wants_keyframe:
-            night.recorder.keyframe(night.tick.state())
+            night.recorder.keyframe(night.tick)
 
 
 def test_a_full_disk_is_said_once_and_the_newest_follows_when_there_is_room(night: Night, disk: Path) -> None:

@@ -45,7 +45,7 @@ class Night:
         self.reconciler = Reconciler(name, self.parts, iterations, self._declared)
         self.recorder = Recorder(runtime, facts_of_run(self.show, list(self.parts.worn)))
         self.slot = Slot(-1, begins_at, begins_at)
-        self.recorder.keyframe(self.tick.state())
+        self.recorder.keyframe(self.tick)
 
     def dance(self, ticks: int, reading: SensorReading | None = None, late_s: float = 0.0) -> None:
         """So many ticks, each with this reading, anew."""
@@ -61,7 +61,7 @@ class Night:
             self.tick.after(self.slot)
             self.recorder.note_tick(self.slot, self.tick, self._flags())
             if self.recorder.wants_keyframe:
-                self.recorder.keyframe(self.tick.state())
+                self.recorder.keyframe(self.tick)
 
     def order(self, name: str, *values: float, text: str = "") -> tuple[bool, str]:
         """What show control asks for, after the last tick."""

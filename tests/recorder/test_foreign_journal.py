@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.box.snapshot import packed, unpacked
 from appliance.cli.app import main
 from appliance.cli.replay import replay as replay_journal
 from appliance.cli.run_with_timeout import run_with_timeout
@@ -19,7 +20,6 @@ from appliance.recorder import chunks, log
 from appliance.recorder.environment import fingerprints
 from appliance.recorder.export import export
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.keyframe import POSITION, packed, unpacked
 from appliance.recorder.reading import last_kept, read_journal
 from appliance.recorder.record import EVENT, TICK
 from appliance.recorder.segments import segment_paths
@@ -234,7 +234,7 @@ def test_a_keyframe_of_another_release_is_refused_in_words(
 ) -> None:
     path = tmp_path / "odd.segment"
     facts, _, entries = chunks.chunks(whole)
-    odd = chunks.chunk(chunks.KEYFRAME, POSITION.pack(0) + state)
+    odd = chunks.chunk(chunks.KEYFRAME, log.POSITION.pack(0) + state)
     path.write_bytes(
         b"".join([chunks.chunk(chunks.HEADER, facts.data), odd, chunks.chunk(chunks.LOG, entries.data, 25)])
     )
@@ -249,11 +249,11 @@ def test_a_keyframe_with_a_value_that_nobody_looks_at_before_the_first_tick_is_r
 ) -> None:
     """A text as the latest start of a tick ended a replay in a traceback."""
     path, (facts, keyframe, entries) = tmp_path / "odd.segment", chunks.chunks(whole)
-    state = unpacked(keyframe.data[POSITION.size :])
+    state = unpacked(keyframe.data[log.POSITION.size :])
     changes = [state | {name: odd} for name in state]
     changes += [state | {"parts": state["parts"] | {name: odd}} for name in state["parts"]]
     for changed in changes:
-        odd_keyframe = chunks.chunk(chunks.KEYFRAME, POSITION.pack(0) + packed(changed))
+        odd_keyframe = chunks.chunk(chunks.KEYFRAME, log.POSITION.pack(0) + packed(changed))
         header, log_ = (chunks.chunk(one.kind, one.data, one.ticks) for one in (facts, entries))
         path.write_bytes(header + odd_keyframe + log_)
         (run,) = read_journal(path).runs

@@ -12,8 +12,8 @@ import pytest
 
 from appliance.box.clock import Slot
 from appliance.box.orders import Order
+from appliance.box.snapshot import packed, restore
 from appliance.dancer.latent_noise import LatentNoise
-from appliance.recorder.keyframe import packed, unpacked
 from appliance.show.show import Show, load_show
 from appliance.stage.carry_out import obey
 from appliance.stage.liveliness import LEAST_FADE_S
@@ -152,7 +152,7 @@ def test_it_goes_on_from_a_keyframe_in_the_middle_of_its_fades(show: Show, parts
         obey(order, parts, parts.first.iterations)
     danced(parts, 30, 20)
     again = assemble(show, BOX)
-    again.restore(unpacked(packed(parts.state())))
+    restore(again, packed(parts))
     for one, other in zip(danced(parts, 300, 50), danced(again, 300, 50), strict=True):
         np.testing.assert_array_equal(one, other)
     again.close()

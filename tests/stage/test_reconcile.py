@@ -57,7 +57,7 @@ def test_a_part_is_applied_once_so_that_what_came_after_it_stays(
     assert isinstance(chest, Remote)
     chest.release()
     command("/hold", 0.0, text="lShldr")
-    assert not chest.state()["told"]  # an order gave it back since
+    assert chest._held is None  # an order gave it back since
 
 
 def test_a_phrase_that_the_show_lost_changes_nothing_and_is_told(

@@ -9,10 +9,10 @@ import pytest
 import yaml
 
 from appliance.box.clock import TICK_S
+from appliance.box.snapshot import packed, unpacked
 from appliance.cli.replay import replay as replay_journal
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.keyframe import packed, unpacked
 from appliance.recorder.reading import Run, read_journal
 from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show
@@ -131,11 +131,11 @@ def test_it_begins_in_the_middle_of_the_show(run: Run, show: Path, keyframe: int
 def test_the_whole_state_is_as_it_was_at_every_keyframe(run: Run, show: Path) -> None:
     """Nothing is forgotten in a state that only shows later."""
     replay = Replay(run, load_show(show))
-    states = {0: replay.tick.state()}
+    states = {0: unpacked(packed(replay.tick))}
     comparison = Comparison(0.0, 0.0)
     for count in replay.dance(comparison):
         if count in (500, 1000):
-            states[count] = unpacked(packed(replay.tick.state()))
+            states[count] = unpacked(packed(replay.tick))
     for (_, data), count in zip(run.keyframes[1:], (500, 1000), strict=True):
         assert same(unpacked(data), states[count]) == []
 
@@ -146,7 +146,7 @@ def same(one: object, other: object, path: str = "") -> list[str]:
         return [words for key in one | other for words in same(one.get(key), other.get(key), f"{path}.{key}")]
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         return [] if one.tobytes() == other.tobytes() else [path]
-    if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple) and len(one) == len(other):
         pairs = enumerate(zip(one, other, strict=True))
         return [words for place, (a, b) in pairs for words in same(a, b, f"{path}[{place}]")]
     return [] if one == other else [f"{path}: {one} and {other}"]

@@ -119,8 +119,7 @@ class Trial:
 
     def nudged(self, seconds: float, iterations: Iterations) -> Poses:
         """The dance with a turning hand that is NUDGE_DEGREES ahead of the usual one all the time."""
-        ahead = TurningAxis(self.joint, AXIS, seconds)
-        ahead.restore(ahead.state() | {"half_angle": np.radians(NUDGE_DEGREES) / 2})
+        ahead = TurningAxis(self.joint, AXIS, seconds, turned=np.radians(NUDGE_DEGREES))
         return self.looped.held(*iterations, ahead)[0]
 
     def _dance(self, condition: Condition) -> Dance:

@@ -1,0 +1,112 @@
+"""Snapshots: the state that later ticks depend on, as bytes, of objects that name their fields once.
+
+A class names them in SNAPSHOT, after those of its base class. A field is a number, text, None, an array,
+an object with a snapshot, or a list, tuple or dictionary of these. Arrays and objects are restored in place.
+`settle` works out what follows from restored fields. Where fields do not say enough, a class has `state` and
+`restore`.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+
+_HEAD = struct.Struct("<I")  # bytes of the JSON; the arrays follow it
+_ARRAY, _TUPLE = "\0array", "\0tuple"  # keys that no state has
+_known: dict[type, tuple[str, ...]] = {}  # all fields of a class
+_PLAIN = frozenset((int, float, str, bool, type(None)))
+
+
+def packed(one: Any) -> bytes:
+    """The state of an object. Raises TypeError for a field that has none."""
+    arrays: list[bytes] = []
+    words = json.dumps(_plain(one, arrays)).encode()
+    return b"".join((_HEAD.pack(len(words)), words, *arrays))
+
+
+def restore(one: Any, data: bytes) -> None:
+    """Let an object go on as the one did whose state this is. Raises what DAMAGED lists for invalid bytes."""
+    restored(one, unpacked(data))
+
+
+def _plain(value: Any, arrays: list[bytes]) -> Any:
+    kind = type(value)
+    if kind in _PLAIN:
+        return value
+    if kind is np.ndarray:
+        arrays.append(value.tobytes())
+        return {_ARRAY: [value.dtype.str, value.shape]}
+    if kind is list:
+        return [_plain(each, arrays) for each in value]
+    if kind is tuple:
+        return {_TUPLE: [_plain(each, arrays) for each in value]}
+    if kind is dict:
+        return {name: _plain(each, arrays) for name, each in value.items()}
+    if fields := _fields(kind):
+        return {name: _plain(getattr(value, name), arrays) for name in fields}
+    if hasattr(kind, "state"):
+        return _plain(value.state(), arrays)
+    if isinstance(value, tuple):  # a named one
+        return _plain(tuple(value), arrays)
+    if isinstance(value, float):  # numpy's
+        return float(value)
+    raise TypeError(f"A snapshot cannot hold a {kind.__name__}")
+
+
+def unpacked(data: bytes) -> Any:
+    """The plain values and arrays of a state. Raises as `restore` does."""
+    (length,) = _HEAD.unpack_from(data)
+    at = _HEAD.size + length
+
+    def whole(found: dict[str, Any]) -> Any:
+        nonlocal at
+        if _TUPLE in found:
+            return tuple(found[_TUPLE])
+        if _ARRAY not in found:
+            return found
+        form, shape = found[_ARRAY]
+        array = np.frombuffer(data, form, int(np.prod(shape)), at).reshape(shape)
+        at += array.nbytes
+        return array
+
+    return json.loads(data[_HEAD.size : at], object_hook=whole)
+
+
+def restored(now: Any, value: Any) -> Any:
+    """The value to set where `now` stands; `now` itself where it was restored in place.
+
+    For a `restore` whose `state` has objects among its values.
+    """
+    kind = type(now)
+    if kind is np.ndarray:
+        now[...] = value
+    elif fields := _fields(kind):
+        for name in fields:
+            field = getattr(now, name)
+            if (new := restored(field, value[name])) is not field:
+                setattr(now, name, new)
+        if hasattr(kind, "settle"):
+            now.settle()
+    elif hasattr(kind, "state"):
+        now.restore(value)
+    elif kind in (list, tuple) and now and _has_state(now[0]):
+        for one, state in zip(now, value, strict=True):
+            restored(one, state)
+    else:
+        return value
+    return now
+
+
+def _has_state(one: Any) -> bool:
+    return bool(_fields(type(one))) or hasattr(type(one), "state")
+
+
+def _fields(kind: type) -> tuple[str, ...]:
+    fields = _known.get(kind)
+    if fields is None:
+        named = (vars(one).get("SNAPSHOT", ()) for one in reversed(kind.__mro__))
+        fields = _known[kind] = tuple(name for names in named for name in names)
+    return fields
