@@ -237,7 +237,7 @@ downloads: ## pack what was built into out/downloads, with signed sums (KEY=FILE
 lock: | $(VENV)/bin/python ## choose the newest versions that pyproject.toml allows and pin them
 	@rm -rf build && $(BIN)/python -m venv build/lock
 	@$(call pin,pictures,requirements.txt,make run: the box and pictures,./distributions/sim)
-	@$(call pin,pictures$(comma)test,requirements-test.txt,make test and make bench: everything,$(DISTRIBUTIONS:%=./%))
+	@$(call pin,pictures$(comma)test,requirements-test.txt,make test and make bench: everything,$(filter-out .,$(DISTRIBUTIONS)))
 	@rm -rf build
 
 comma := ,
