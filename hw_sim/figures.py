@@ -138,6 +138,7 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
     light = figures.get("hand_to_light_ms")
     return [
         Limit("transport, median", figures["transport_ms"]["p50"], 3.0, "ms"),
+        Limit("transport, p99", figures["transport_ms"]["p99"], 12.0, "ms"),
         Limit(
             "transport, median, against free running / 4",
             figures["transport_ms"]["p50"],

@@ -59,11 +59,11 @@ def measure(
 ) -> None:
     """Measure the whole way, datagram in to datagram out, with an emulated sensor on a venue's network.
 
-    Two runs: the tick in phase with the sensor, then running free while the sensor's clock drifts through one
-    whole beat, so that every offset between the two counts alike. Then how soon a reading is used after the
-    sensor's power-on, and after the box was killed and restarted. --light adds the projector: each picture
-    says in a corner when its dance left the stage, and is read back from the screen. Exit status 0 when all
-    limits hold, else 1.
+    Two runs: the tick in phase with the sensor, then running free, with no wait for late readings, while the
+    sensor's clock drifts through one whole beat, so that every offset between the two counts alike. Then how
+    soon a reading is used after the sensor's power-on, and after the box was killed and restarted. --light
+    adds the projector: each picture says in a corner when its dance left the stage, and is read back from the
+    screen. Exit status 0 when all limits hold, else 1.
     """
     try:
         if report is not None and find_spec("matplotlib") is None:

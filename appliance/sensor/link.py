@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from types import MappingProxyType
 from typing import cast
@@ -22,6 +22,7 @@ from appliance.sensor.transports.udp import UdpIntake
 
 FOREIGN = frozenset(("length", "magic", "version", "kind", "device", "tag", "old_session", "old_hello"))
 RESERVE_EACH_S = 1.0
+LATE_LOOKS = 8  # of others' packets that come first, while one is awaited
 HEARTBEATS_APART = 8  # sensors get their heartbeats at different eighths of a second, in key file order
 REASONS = (
     "accepted",
@@ -86,10 +87,31 @@ class SensorLink:
 
     def drain(self, now: float) -> Sequence[SensorReading]:
         """The newest accepted reading of each sensor since the last drain."""
-        newest = self._newest
-        newest.clear()
+        self._newest.clear()
         for sensor in self._by_device.values():
             sensor.arrivals.clear()
+        self._receive(now)
+        return tuple(self._newest.values())
+
+    def drain_late(
+        self, sensor: str, until: float, monotonic: Callable[[], float]
+    ) -> Sequence[SensorReading]:
+        """The same after waiting for this sensor's reading, which the last drain did not have.
+
+        It counts as part of that drain: all readings since the one before are returned.
+        """
+        known = self._by_name.get(sensor)
+        for _ in range(LATE_LOOKS):
+            now = monotonic()
+            route = None if known is None else known.pairing.route(now)
+            if known is None or route is None or known.arrivals or now >= until:
+                break
+            intake, origin = route
+            intake.await_packet(origin, until - now)
+            self._receive(monotonic())
+        return tuple(self._newest.values())
+
+    def _receive(self, now: float) -> None:
         counts = self._counts
         for intake in self.intakes:
             for packet, arrival, origin in intake.receive_packets(now):
@@ -98,7 +120,6 @@ class SensorLink:
                 counts[fate] += 1
                 if fate in FOREIGN:
                     self._stranger = route
-        return tuple(newest.values())
 
     def send_due(self, now: float) -> None:
         """Send assignments, calls, heartbeats and calibrations that are due. Once a tick, after the frame.

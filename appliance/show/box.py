@@ -129,6 +129,12 @@ class LimitsConfig(Section):
         10.0,
         within=(0.5, 18),
     )
+    wait_ms: float = key(
+        "How long a tick waits for a reading of the primary sensor that is late; 0: it takes the one before, "
+        "which is a tick old. No tick waits so long that its frame counts as late.",
+        10.0,
+        within=(0, 15),
+    )
     late_ms: float = key(
         "A frame that leaves later than this after its slot began counts as late.", 15.0, within=(1, 20)
     )

@@ -101,7 +101,8 @@ class Stage:
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
         self.wearing = SensorFit(self.parts, self.memory, self._say_and_note)
         self._resume(TickClock().now())
-        self.tick = Tick(self.parts, self.wearing, self.iterations, latest_start_s)
+        late_look_s = box.limits.wait_ms / 1000.0
+        self.tick = Tick(self.parts, self.wearing, self.iterations, latest_start_s, late_look_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         primary, link = self.parts.primary, self.parts.link
@@ -164,7 +165,8 @@ class Stage:
         """Count the tick and write it into the journal; the frame has left already."""
         tick, health = self.tick, self.health
         cost_ms = tick.after(slot)
-        late = tick.frame.late or 1000.0 * slot.lateness_s + cost_ms > self.box.limits.late_ms
+        left_ms = 1000.0 * (slot.lateness_s + tick.waited_s) + cost_ms
+        late = tick.frame.late or left_ms > self.box.limits.late_ms
         health.tick(cost_ms, self.box.limits.tick_budget_ms)
         health.late += late
         health.skipped += slot.skipped

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from appliance.box.clock import Slot
 from appliance.box.live_pose import LivePose
+from appliance.dancer.puppeteers import HOLD_S
 from appliance.recorder.record import SECTIONS
 from appliance.sensor.link import SensorReading
 from appliance.stage.iterations import Iterations
@@ -35,13 +36,17 @@ class Tick:
         wearing: SensorFit,
         iterations: Iterations,
         latest_start_s: float,
+        late_look_s: float = 0.0,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
-        """iterations: of the first puppet; the others have theirs."""
+        """iterations: of the first puppet; the others have theirs. late_look_s: how long a tick waits for a
+        reading of the primary sensor that is late; 0: not at all.
+        """
         self.parts = parts
         self.wearing = wearing
         self.iterations = parts.first.iterations = iterations
-        self.latest_start_s = latest_start_s
+        self.latest_start_s, self.late_look_s = latest_start_s, late_look_s
+        self.waited_s = 0.0  # for a late reading, in this tick
         self.frame, *others = (one.frame for one in parts.puppets)
         self._others = tuple(others)
         self.readings: Sequence[SensorReading] = ()
@@ -66,9 +71,7 @@ class Tick:
             other.tick, other.frame_time, other.late = frame.tick, frame.frame_time, frame.late
 
         self.readings = parts.link.drain(slot.started)
-        for reading in self.readings:
-            self.wearing.hear(reading)
-            parts.hear(reading)
+        self.waited_s = 0.0
         self.live_heard = parts.hear_live()
         ends[DRAIN] = ends[MOTION] = ends[HANDS] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
 
@@ -77,6 +80,11 @@ class Tick:
                 puppet.start(slot.started)
             ends[MOTION] = now()
             parts.liveliness.dance(slot.tick)
+            self._look_again(slot)
+        for reading in self.readings:
+            self.wearing.hear(reading)
+            parts.hear(reading)
+        if not frame.late:
             for puppet in parts.puppets:
                 puppet.pull(slot.started)
             ends[HANDS] = now()
@@ -105,7 +113,7 @@ class Tick:
 
     def after(self, slot: Slot) -> float:
         """Work that can wait until the frame has left: the motion moves on, sensors are answered and looked
-        at, times are noted. The cost of what came before, in ms.
+        at, times are noted. The cost of what came before, in ms, without the wait for a late reading.
         """
         if not self.frame.late:
             for puppet in self.parts.puppets:
@@ -117,7 +125,27 @@ class Tick:
         for section, end in enumerate(self._section_ends):
             self.sections_ms[section] = 1000.0 * (end - begin)
             begin = end
-        return 1000.0 * (begin - slot.started)
+        self.sections_ms[HANDS] -= 1000.0 * self.waited_s
+        return 1000.0 * (begin - slot.started - self.waited_s)
+
+    def _look_again(self, slot: Slot) -> None:
+        """Wait for the primary sensor's reading where it is late: without it the hand would be a tick old.
+
+        Only for a sensor that still holds its joint, and never so long that the frame would count as late.
+        """
+        link, newest = self.parts.link, self.parts.newest_primary
+        if (
+            newest is None
+            or not self.late_look_s
+            or any(one.sensor == newest.sensor for one in self.readings)
+        ):
+            return
+        if slot.started - newest.arrival > HOLD_S:
+            return
+        before = self._monotonic()
+        until = min(slot.started + self.late_look_s, slot.deadline + self.latest_start_s)
+        self.readings = link.drain_late(newest.sensor, until, self._monotonic)
+        self.waited_s = self._monotonic() - before
 
     def _name_reading(self) -> None:
         """The frame names the reading that went into it."""

@@ -97,6 +97,9 @@ class Wires:
     def send_packet(self, packet: bytes, origin: Origin) -> None:
         self.sent.append((packet, origin))
 
+    def await_packet(self, origin: Origin, seconds: float) -> None:
+        """Nothing comes while it waits."""
+
     def reserve_sockets(self, origins: Collection[Origin]) -> None:
         self.attended = set(origins)
 

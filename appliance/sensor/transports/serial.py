@@ -42,7 +42,7 @@ class SerialIntake:
         self._unsent: deque[bytes] = deque(maxlen=UNSENT_PACKETS)
         self._waker, self._woken = socket.socketpair()
         self._waker.setblocking(False)
-        self._stop = threading.Event()
+        self._stop, self._received = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"sensor {device}", daemon=True)
         self._thread.start()
 
@@ -51,6 +51,12 @@ class SerialIntake:
         for _ in range(len(self._packets)):
             packet, arrival = self._packets.popleft()
             yield packet, arrival if arrival < now + LONGEST_STOP_S else now, self._origin
+
+    def await_packet(self, origin: Origin, seconds: float) -> None:
+        """Wait for the thread to receive a packet."""
+        if not self._packets:
+            self._received.wait(seconds)
+        self._received.clear()
 
     def send_packet(self, packet: bytes, origin: Origin) -> None:
         """Hand one packet to the thread. Without a cable, or with a full queue, it is dropped and counted."""
@@ -109,6 +115,7 @@ class SerialIntake:
                     if len(self._packets) == WAITING_PACKETS:
                         self.counts["serial_overrun"] += 1
                     self._packets.append((packet, arrival))
+                    self._received.set()
             while self._unsent:
                 self._write(port, self._unsent.popleft())
 

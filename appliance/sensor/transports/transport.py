@@ -14,7 +14,7 @@ Origin: TypeAlias = tuple[Any, ...]  # origin of a packet: (host, port) of a dat
 
 
 class Intake(Protocol):
-    """UdpIntake, SerialIntake. Never waits, never raises; errors are counted."""
+    """UdpIntake, SerialIntake. Waits only where it says so, never raises; errors are counted."""
 
     name: str  # in messages: host and port, or the device
     counts: Counter[str]
@@ -25,6 +25,10 @@ class Intake(Protocol):
         An arrival may be after `now` when the box was held up since it read the clock.
         A packet's bytes are valid until the next packet.
         """
+        ...
+
+    def await_packet(self, origin: Origin, seconds: float) -> None:
+        """Wait until a packet from this origin waits to be received, for so long at most; any may end it."""
         ...
 
     def send_packet(self, packet: bytes, origin: Origin) -> None: ...

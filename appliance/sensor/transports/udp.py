@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import select
 import socket
 import struct
 import sys
@@ -96,6 +97,12 @@ class UdpIntake:
             if received[2] in self._own:
                 self._astray.add(received[2])
             yield received
+
+    def await_packet(self, origin: Origin, seconds: float) -> None:
+        """Wait for a datagram from this sender, in the kernel."""
+        waiting = select.poll()
+        waiting.register(self._own.get(origin, self._socket), select.POLLIN)
+        waiting.poll(1000.0 * seconds)
 
     def send_packet(self, packet: bytes, origin: Origin) -> None:
         """Send one datagram from the listening port. Datagrams that cannot be sent at once are dropped and
