@@ -2,8 +2,8 @@
 
 A class names them in SNAPSHOT, after those of its base class. A field is a number, text, None, an array,
 an object with a snapshot, or a list, tuple or dictionary of these. Arrays and objects are restored in place.
-`settle` works out what follows from restored fields. Where fields do not say enough, a class has `state` and
-`restore`.
+Where fields do not say enough, a class has `state`, which gives the rest as plain values, and `restore`,
+which takes it after the fields. `settle` works out what follows from all of that.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 _HEAD = struct.Struct("<I")  # bytes of the JSON; the arrays follow it
-_ARRAY, _TUPLE = "\0array", "\0tuple"  # keys that no state has
+_ARRAY, _TUPLE, _REST = "\0array", "\0tuple", "\0rest"  # keys that no state has
 _known: dict[type, tuple[str, ...]] = {}  # all fields of a class
 _PLAIN = frozenset((int, float, str, bool, type(None)))
 
@@ -29,7 +29,7 @@ def packed(one: Any) -> bytes:
 
 def restore(one: Any, data: bytes) -> None:
     """Let an object go on as the one did whose state this is. Raises what DAMAGED lists for invalid bytes."""
-    restored(one, unpacked(data))
+    _restored(one, unpacked(data))
 
 
 def _plain(value: Any, arrays: list[bytes]) -> Any:
@@ -45,14 +45,13 @@ def _plain(value: Any, arrays: list[bytes]) -> Any:
         return {_TUPLE: [_plain(each, arrays) for each in value]}
     if kind is dict:
         return {name: _plain(each, arrays) for name, each in value.items()}
-    if fields := _fields(kind):
-        return {name: _plain(getattr(value, name), arrays) for name in fields}
-    if hasattr(kind, "state"):
-        return _plain(value.state(), arrays)
+    if _has_state(kind):
+        state = {name: _plain(getattr(value, name), arrays) for name in _fields(kind)}
+        return state | {_REST: _plain(value.state(), arrays)} if hasattr(kind, "state") else state
     if isinstance(value, tuple):  # a named one
         return _plain(tuple(value), arrays)
-    if isinstance(value, float):  # numpy's
-        return float(value)
+    if isinstance(value, np.generic):
+        return value.item()
     raise TypeError(f"A snapshot cannot hold a {kind.__name__}")
 
 
@@ -75,33 +74,30 @@ def unpacked(data: bytes) -> Any:
     return json.loads(data[_HEAD.size : at], object_hook=whole)
 
 
-def restored(now: Any, value: Any) -> Any:
-    """The value to set where `now` stands; `now` itself where it was restored in place.
-
-    For a `restore` whose `state` has objects among its values.
-    """
+def _restored(now: Any, value: Any) -> Any:
+    """The value to set where `now` stands; `now` itself where it was restored in place."""
     kind = type(now)
     if kind is np.ndarray:
         now[...] = value
-    elif fields := _fields(kind):
-        for name in fields:
+    elif _has_state(kind):
+        for name in _fields(kind):
             field = getattr(now, name)
-            if (new := restored(field, value[name])) is not field:
+            if (new := _restored(field, value[name])) is not field:
                 setattr(now, name, new)
+        if hasattr(kind, "state"):
+            now.restore(value[_REST])
         if hasattr(kind, "settle"):
             now.settle()
-    elif hasattr(kind, "state"):
-        now.restore(value)
-    elif kind in (list, tuple) and now and _has_state(now[0]):
+    elif kind in (list, tuple) and now and _has_state(type(now[0])):
         for one, state in zip(now, value, strict=True):
-            restored(one, state)
+            _restored(one, state)
     else:
         return value
     return now
 
 
-def _has_state(one: Any) -> bool:
-    return bool(_fields(type(one))) or hasattr(type(one), "state")
+def _has_state(kind: type) -> bool:
+    return bool(_fields(kind)) or hasattr(kind, "state")
 
 
 def _fields(kind: type) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from appliance.box.realtime import prepare_environment
 
 
 def about(box: str | None = None, chosen: str | None = None) -> Any:
-    """What this box is."""
+    """Facts about this box."""
     from appliance.release import about
 
     return about.about(_path(chosen), _path(box))

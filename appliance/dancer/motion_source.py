@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from appliance.box.snapshot import restored
 from appliance.dancer.crossfade import Crossfade
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
@@ -35,6 +34,8 @@ class Playback:
     phrase that plays. Only the thread that advances it may call the control methods: a change sets several
     fields.
     """
+
+    SNAPSHOT = ("_rate", "_wanted_rate", "_on_the_way", "_entered_at", "jumped", "_stream")
 
     def __init__(
         self,
@@ -265,25 +266,19 @@ class Playback:
         self._push()
 
     def state(self) -> dict[str, Any]:
-        """The state that later poses depend on, for `restore`: plain values and copies of arrays."""
+        """The loops and heads that later poses depend on, as plain values and arrays."""
         repertoire, request, leaving = self._repertoire, self._request, self._crossfade.leaving
         return {
-            "rate": self._rate,
-            "wanted_rate": self._wanted_rate,
             "asked": self._asked.name,
             "excerpt": repertoire.named(self._excerpt),
             "head": repertoire.head_state(self._head),
             "leaving": None if leaving is None else repertoire.head_state(leaving),
             "fade": self._crossfade.times,
-            "entered": [self._on_the_way, float(self._entered_at)],
             "request": None if request is None else [repertoire.named(request[0]), *request[1:]],
-            "jumped": self.jumped,
-            "stream": self._stream,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a state, with the same phrases. Raises KeyError, ValueError."""
-        self._rate, self._wanted_rate = state["rate"], state["wanted_rate"]
         repertoire = self._repertoire
         self._asked, _ = repertoire.find(state["asked"])
         self._excerpt = repertoire.loop(state["excerpt"])
@@ -292,9 +287,6 @@ class Playback:
         left = repertoire.head(leaving) if leaving is not None else None
         self._crossfade = Crossfade.restored(left, state["fade"])
         self._request = None if request is None else (repertoire.loop(request[0]), *request[1:])
-        self._on_the_way, self._entered_at = state["entered"]
-        self.jumped = state["jumped"]
-        restored(self._stream, state["stream"])
 
     def _clear_memory(self, joints: int, columns: int) -> None:
         self._reader, self._between_heads = Reader(joints), Slerp(joints, short=False)

@@ -170,8 +170,9 @@ class TurningAxis(Puppeteer):
         weight: float = 1.0,
         turned: float = 0.0,
     ) -> None:
-        """turned: radians, at the first pull. Raises ValueError for an axis of no length or a turn that takes no
-        time.
+        """turned: radians, at the first pull.
+
+        Raises ValueError for an axis of no length or a turn that takes no time.
         """
         super().__init__(joint, weight)
         length = math.hypot(*axis)
