@@ -82,10 +82,17 @@ beside:  # while tests wait: with what they leave of the processors
 test-long: ## the same with every count at its full length: power cuts, fuzzing, random files, property tests
 	@$(MAKE) --no-print-directory test LENGTH=--long
 
-firmware-bin: ## the wearable's image for its board, out/firmware/wearable.ino.bin (needs arduino-cli)
+PROFILES ?= mkr1000 mkrwifi1010 xiao_esp32s3 nano_esp32
+
+firmware-bin: ## the wearable's images, out/firmware/wearable-BOARD.bin (needs arduino-cli; PROFILES="mkr1000 ...")
 	@command -v arduino-cli >/dev/null || { echo "arduino-cli 1.0 or newer is missing: docs/firmware.md" >&2; exit 1; }
-	@arduino-cli compile --profile mkr1000 --output-dir out/firmware \
-	    --build-property "compiler.cpp.extra_flags=-std=gnu++17 -fno-sized-deallocation" firmware/wearable
+	@for profile in $(PROFILES); do \
+	    case $$profile in mkr*) flags="-std=gnu++17 -fno-sized-deallocation" ;; *) flags= ;; esac; \
+	    arduino-cli compile --profile $$profile --output-dir build/firmware-bin/$$profile \
+	        --build-property "compiler.cpp.extra_flags=$$flags" firmware/wearable \
+	    && install -D -m 644 build/firmware-bin/$$profile/wearable.ino.bin out/firmware/wearable-$$profile.bin \
+	    || exit 1; \
+	done
 
 firmware-test: firmware-check fuzz ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
 
@@ -95,7 +102,8 @@ firmware-check: debian-for-tests firmware
 	@build/firmware/core_tests --no-intro
 	@echo "Wearable: static analysis"
 	@cppcheck --std=c++17 --language=c++ --enable=warning,performance,portability --inline-suppr --quiet \
-	    --error-exitcode=1 -I firmware/stubs firmware/wearable/src firmware/host firmware/qemu firmware/fuzz
+	    --error-exitcode=1 -I firmware/stubs/samd -I firmware/stubs/wifi101 \
+	    firmware/wearable/src firmware/host firmware/qemu firmware/fuzz
 	@echo "Wearable: for its processor; the sketch against the stubs"
 	@$(call build,firmware-m0,sketch budget,-DCMAKE_TOOLCHAIN_FILE=cmake/cortex-m0plus.cmake)
 	@echo "Wearable: on an emulated Cortex-M0"

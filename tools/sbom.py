@@ -90,15 +90,17 @@ def python_packages(lock: str) -> list[Component]:
 
 
 def firmware_parts(sketch: str) -> list[Component]:
-    """Arduino core and libraries of every profile. Raises ValueError for one without a version."""
-    found = []
+    """Arduino cores and libraries of all profiles, each once. Raises ValueError for one without a version."""
+    found: list[Component] = []
     for profile in yaml.safe_load(sketch)["profiles"].values():
         named = [one["platform"] for one in profile["platforms"]] + profile.get("libraries", [])
         for text in named:
             part = PLATFORM.fullmatch(text)
             if part is None:
                 raise ValueError(f"'{text}' in sketch.yaml has no version.")
-            found.append(_component(part["name"], part["version"], f"pkg:generic/{part['name']}"))
+            component = _component(part["name"], part["version"], f"pkg:generic/{part['name']}")
+            if component not in found:
+                found.append(component)
     return found
 
 

@@ -19,12 +19,22 @@ add_custom_target(budget
           ${CMAKE_BINARY_DIR}/CMakeFiles/for_the_board.dir
   DEPENDS core VERBATIM)
 
-# The sketch's own code against the stubs: nothing is linked.
-file(GLOB GLUE CONFIGURE_DEPENDS wearable/src/arduino/*.cpp)
+# The sketch's own code against the stubs, once for each board: nothing is linked.
+file(GLOB GLUE CONFIGURE_DEPENDS wearable/src/arduino/*/*.cpp)
 set(SKETCH ${CMAKE_BINARY_DIR}/sketch.cpp)
 file(GENERATE OUTPUT ${SKETCH} CONTENT "#include <Arduino.h>\n#include \"wearable.ino\"\n")
-add_library(sketch OBJECT ${SKETCH} ${GLUE})
-target_include_directories(sketch PRIVATE stubs wearable)
+add_custom_target(sketch)
+function(add_sketch BOARD)
+  add_library(sketch_${BOARD} OBJECT EXCLUDE_FROM_ALL ${SKETCH} ${GLUE})
+  list(TRANSFORM ARGN PREPEND stubs/ OUTPUT_VARIABLE STUBS)
+  target_include_directories(sketch_${BOARD} PRIVATE ${STUBS} wearable)
+  target_compile_definitions(sketch_${BOARD} PRIVATE ARDUINO_${BOARD})
+  add_dependencies(sketch sketch_${BOARD})
+endfunction()
+add_sketch(SAMD_MKR1000 samd wifi101)
+add_sketch(SAMD_MKRWIFI1010 samd nina)
+add_sketch(XIAO_ESP32S3 esp32)
+add_sketch(NANO_ESP32 esp32)
 
 # The same objects on an emulated Cortex-M0 (QEMU's micro:bit), which has the same instructions, with a small IMU and a
 # small box around them.

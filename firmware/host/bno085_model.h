@@ -8,7 +8,7 @@
 
 namespace bunraku {
 
-// What the faults are to it: a zero read is a header or cargo of zeros; a torn read changes a byte, which no
+// Its faults: a zero read is a header or cargo of zeros; a torn read changes a byte, which no
 // checksum of the bus would show; a silent config is a hub that has forgotten its reports; a frozen one reports no
 // more but answers; one with a fusion error answers nothing until it is reset.
 class Bno085Model final : public ImuModel {
@@ -35,7 +35,7 @@ class Bno085Model final : public ImuModel {
   struct Cargo {
     uint8_t channel;
     std::vector<uint8_t> payload;
-    uint64_t base_us = 0;  // of reports: filled in when the cargo leaves; 0: none
+    uint64_t base_us = 0;  // time of its reports, written when the cargo leaves; 0: it has none
   };
   struct Feature {
     uint32_t interval_us = 0;
@@ -58,7 +58,7 @@ class Bno085Model final : public ImuModel {
   std::array<Feature, kReports> features_{};
   std::deque<Cargo> waiting_;  // to be fetched by the host
   std::array<uint8_t, 6> sequence_{};
-  size_t fetched_ = 0;  // of the first
+  size_t fetched_ = 0;  // bytes of the first cargo
   bool is_announced_ = false;  // its header was read
   bool is_up_ = false;
   bool is_frozen_ = false, is_dumb_ = false, has_forgotten_ = false;

@@ -89,8 +89,9 @@ void World::boot() {
   booted_at_us_ = clock.now_us();
   board_clock.power_on(first_micros);
   board.power_on();
-  drivers_ = std::make_unique<Drivers>(imu);
-  Imu& driver = wired_ == Wired::kBno055 ? static_cast<Imu&>(drivers_->bno055) : drivers_->search;
+  bno055_ = std::make_unique<Bno055>(imu);
+  any_imu_ = std::make_unique<AnyImu>(imu);
+  Imu& driver = wired_ == Wired::kBno055 ? static_cast<Imu&>(*bno055_) : *any_imu_;
   wearable_ = std::make_unique<Wearable>(Ports{board_clock, driver, wifi, serial, flash, led, board});
   wearable_->begin();
   before_ = wearable_->status();

@@ -3,12 +3,10 @@
 
 #include <memory>
 
-#include "bno055.h"
-#include "bno085.h"
+#include "any_imu.h"
 #include "board_model.h"
 #include "flash_model.h"
 #include "imu_model.h"
-#include "imu_search.h"
 #include "path.h"
 #include "serial_model.h"
 #include "virtual_clock.h"
@@ -60,14 +58,8 @@ class World {
   uint64_t until_us_;
   Status before_;  // the turn that is over, or that blocks
   uint64_t booted_at_us_ = 0;
-  struct Drivers {
-    explicit Drivers(I2cBus& bus) : bno055(bus), bno085(bus) {}
-    Bno055 bno055;
-    Bno085 bno085;
-    Imu* all[2] = {&bno055, &bno085};
-    ImuSearch search{all};
-  };
-  std::unique_ptr<Drivers> drivers_;
+  std::unique_ptr<Bno055> bno055_;
+  std::unique_ptr<AnyImu> any_imu_;
   std::unique_ptr<Wearable> wearable_;
 };
 

@@ -67,7 +67,7 @@ struct ReportRig {
     recoveries = imu.recoveries();
   }
 
-  // What must hold whatever the faults; `slack_degrees` is what a damaged byte weighs.
+  // Rules that every fault must leave intact; `slack_degrees`: the error that a damaged byte may cause.
   void check_manners(double slack_degrees = 0.5) const {
     CHECK(most_transactions <= 1);
     CHECK(longest_step_us < 3000);

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
 import yaml
 
 from appliance.sensor import wire
@@ -14,22 +15,45 @@ SKETCH = REPOSITORY / "firmware" / "wearable"
 PAGE = (REPOSITORY / "docs" / "firmware.md").read_text()
 
 
-def pinned() -> tuple[str, str, str]:
-    """Board, core and Wi-Fi library of the build profile."""
-    profile = yaml.safe_load((SKETCH / "sketch.yaml").read_text())["profiles"]["mkr1000"]
-    [platform], [library] = profile["platforms"], profile["libraries"]
-    return profile["fqbn"], platform["platform"], library
+PROFILES = yaml.safe_load((SKETCH / "sketch.yaml").read_text())["profiles"]
+BOARDS = {
+    "mkr1000": ("arduino:samd:mkr1000", "SAMD core 1.8.14", "WiFi101 0.16.1"),
+    "mkrwifi1010": ("arduino:samd:mkrwifi1010", "SAMD core 1.8.14", "WiFiNINA 1.9.1"),
+    "xiao_esp32s3": ("esp32:esp32:XIAO_ESP32S3", "esp32 core 3.3.3"),
+    "nano_esp32": ("esp32:esp32:nano_nora", "esp32 core 3.3.3"),
+}
 
 
-def test_the_profile_pins_board_core_and_library() -> None:
-    assert pinned() == ("arduino:samd:mkr1000", "arduino:samd (1.8.14)", "WiFi101 (0.16.1)")
+def version_of(text: str) -> str:
+    [version] = re.findall(r"\((.+)\)", text)
+    return str(version)
 
 
-def test_stubs_and_page_are_of_the_pinned_versions() -> None:
-    core, library = (re.findall(r"\((.+)\)", version)[0] for version in pinned()[1:])
+@pytest.mark.parametrize("profile", BOARDS)
+def test_each_profile_stubs_and_page_name_the_same_versions(profile: str) -> None:
+    board, *parts = BOARDS[profile]
+    pinned = PROFILES[profile]
+    assert pinned["fqbn"] == board
+    [platform] = pinned["platforms"]
+    versions = [version_of(one) for one in (platform["platform"], *pinned.get("libraries", []))]
+    assert versions == [part.rsplit(" ", 1)[1] for part in parts]
     for text in (PAGE, (REPOSITORY / "firmware" / "stubs" / "README.md").read_text()):
-        assert f"SAMD core {core}" in text
-        assert f"WiFi101 {library}" in text
+        assert all(part in " ".join(text.split()) for part in parts)
+
+
+def test_every_profile_is_built_and_every_board_of_the_sketch_has_one() -> None:
+    assert set(BOARDS) == set(PROFILES)
+    built = re.search(r"^PROFILES \?= (.+)$", (REPOSITORY / "Makefile").read_text(), re.MULTILINE)
+    assert built is not None
+    assert set(built[1].split()) == set(PROFILES)
+    known = re.findall(r"defined\(ARDUINO_(\w+)\)", (SKETCH / "src" / "arduino" / "board.h").read_text())
+    checked = re.findall(
+        r"^add_sketch\((\w+)",
+        (REPOSITORY / "firmware/cmake/on-the-processor.cmake").read_text(),
+        re.MULTILINE,
+    )
+    assert sorted(known) == sorted(checked)
+    assert len(known) == len(PROFILES)
 
 
 def test_the_firmware_speaks_this_wire_under_one_version_number() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from appliance.sensor.provisioning import serial_ports
@@ -29,13 +31,24 @@ def test_no_wearable_or_several_are_told(ports: list[FoundPort], message: str) -
         only_wearable(ports)
 
 
-def test_the_usb_ids_of_the_board_are_known(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("vendor", "product"), serial_ports.BOARDS)
+def test_the_usb_ids_of_the_boards_are_known(
+    monkeypatch: pytest.MonkeyPatch, vendor: int, product: int
+) -> None:
     class Port:
-        device, description, vid, pid = "/dev/ttyACM0", "n/a", 0x2341, 0x804E
+        device, description, vid, pid = "/dev/ttyACM0", "n/a", vendor, product
 
     class Bootloader(Port):
-        device, pid = "/dev/ttyACM1", 0x004E
+        device, vid, pid = "/dev/ttyACM1", 0x2341, 0x004E
 
     monkeypatch.setattr(serial_ports.list_ports, "comports", lambda: [Bootloader, Port])
     first, second = serial_ports.found_ports()
     assert (first.is_wearable, second.is_wearable, second.is_bootloader) == (True, False, True)
+    assert serial_ports.BOARDS[vendor, product] in str(first)
+
+
+def test_the_box_lets_the_service_open_every_board_that_it_knows() -> None:
+    rules = (Path(__file__).parents[2] / "deploy/system/usr/lib/udev/rules.d/60-bunraku.rules").read_text()
+    for vendor, product in serial_ports.BOARDS:
+        line = next(line for line in rules.splitlines() if f'idVendor}}=="{vendor:04x}"' in line)
+        assert f"{product:04x}" in line

@@ -164,6 +164,6 @@ def _hints(
         )
     if not done.identity.imu_id:
         hints.append(
-            "It finds no IMU: look at the wires between the board and the BNO055 (docs/firmware.md)."
+            "It finds no IMU: look at the wires between the board and the IMU (docs/firmware.md)."
         )
     return hints

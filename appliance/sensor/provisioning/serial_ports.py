@@ -6,9 +6,17 @@ from dataclasses import dataclass
 
 from serial.tools import list_ports
 
-# USB vendor and product of the MKR1000 (boards.txt of the Arduino SAMD core): running, and in its bootloader.
-_VENDOR = 0x2341
-_RUNNING, _BOOTLOADER = {0x804E, 0x824E}, {0x004E, 0x024E}
+# USB vendor and product of the boards, from the Arduino cores' boards.txt: running, and in their bootloader.
+# An ESP32-S3's own USB unit has the last ids, on a XIAO and on many other boards.
+BOARDS = {
+    (0x2341, 0x804E): "MKR1000",
+    (0x2341, 0x824E): "MKR1000",
+    (0x2341, 0x8054): "MKR WiFi 1010",
+    (0x2341, 0x0070): "Nano ESP32",
+    (0x2886, 0x0056): "XIAO ESP32-S3",
+    (0x303A, 0x1001): "XIAO ESP32-S3",
+}
+_BOOTLOADERS = {(0x2341, 0x004E): "MKR1000", (0x2341, 0x024E): "MKR1000", (0x2341, 0x0054): "MKR WiFi 1010"}
 
 
 class NoWearableError(Exception):
@@ -17,17 +25,19 @@ class NoWearableError(Exception):
 
 @dataclass(frozen=True)
 class FoundPort:
-    """A serial port of this machine, and whether a wearable's board is on it."""
+    """A serial port of this machine, and whether a wearable's board is on it, and which."""
 
     device: str
     description: str
     is_wearable: bool
     is_bootloader: bool = False
+    board: str = ""
 
     def __str__(self) -> str:
-        hint = "a wearable's board" if self.is_wearable else self.description
+        board = f"a wearable's board, {self.board}" if self.board else "a wearable's board"
+        hint = board if self.is_wearable else self.description
         if self.is_bootloader:
-            hint = "a wearable's board that waits for firmware: press its reset button once"
+            hint = f"{board} that waits for firmware: press its reset button once"
         return f"{self.device} ({hint})" if hint else self.device
 
 
@@ -37,8 +47,9 @@ def found_ports() -> list[FoundPort]:
         FoundPort(
             port.device,
             "" if port.description in ("n/a", None) else port.description,
-            port.vid == _VENDOR and port.pid in _RUNNING,
-            port.vid == _VENDOR and port.pid in _BOOTLOADER,
+            (port.vid, port.pid) in BOARDS,
+            (port.vid, port.pid) in _BOOTLOADERS,
+            BOARDS.get((port.vid, port.pid), _BOOTLOADERS.get((port.vid, port.pid), "")),
         )
         for port in sorted(list_ports.comports(), key=lambda port: port.device)
     ]

@@ -54,7 +54,7 @@ void Bno085::next_question(uint32_t now_us) {
   }
 }
 
-// What is due to be said now. A question without an answer is repeated; one about the hub's flash is given up.
+// Says what is due now. A question without an answer is repeated; one about the hub's flash is given up.
 bool Bno085::ask(uint32_t now_us) {
   if (state_ == State::kConfigure) return configure(now_us);
   if (state_ == State::kAwaitData && now_us - asked_us_ > kDataUs) return repair(counts_.silences, now_us), false;
@@ -95,8 +95,8 @@ bool Bno085::ask_for_record(uint16_t record) {
   return say(request, sizeof request);
 }
 
-// Each a message: what it reports, how often; which calibrations go on. What is not wanted is switched off, for
-// the hub may have been told otherwise before the board was restarted.
+// A message for each report and its interval, and one for the calibrations that go on. Other reports are switched
+// off: the hub may have been configured otherwise before the board was restarted.
 bool Bno085::configure(uint32_t now_us) {
   const bool has_field = settings_.fusion == Fusion::kNdof;
   const struct {

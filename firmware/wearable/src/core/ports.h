@@ -33,6 +33,7 @@ class I2cBus {
 struct Radio {
   uint8_t firmware[3] = {};  // its own firmware's version; zeros: unknown
   int8_t rssi_dbm = 0;       // how strong the access point was when it was joined; 0: unknown
+  bool is_winc1500 = true;   // the MKR1000's, whose old firmware is known to hang
 
   bool is_known() const { return (firmware[0] | firmware[1] | firmware[2]) != 0; }
 };

@@ -44,7 +44,7 @@ constexpr uint8_t kFeatureRequestBytes = 2, kTimeBaseBytes = 5, kVectorBytes = 1
 constexpr uint8_t kGameRotationBytes = 12, kRotationBytes = 14;
 constexpr uint16_t kContinued = 0x8000;  // in a header's length: the rest of a cargo
 constexpr uint8_t kAccuracyBits = 0x03;  // in a report's third byte; above it the upper bits of its delay
-constexpr uint32_t kTickUs = 100;  // of time bases and delays
+constexpr uint32_t kTickUs = 100;  // the unit of time bases and delays
 
 constexpr uint8_t kAddress = 0x4A, kOtherAddress = 0x4B;  // the pin SA0 chooses
 constexpr uint32_t kStartUpUs = 150000;  // datasheet 6.5.3: 94 ms from reset to the first cargo

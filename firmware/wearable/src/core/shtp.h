@@ -14,7 +14,7 @@ class Shtp {
   explicit Shtp(I2cBus& bus) : bus_(bus) {}
 
   void use(uint8_t address) { address_ = address, forget(); }
-  void forget() { left_ = got_ = 0; }  // of a cargo that was half read
+  void forget() { left_ = got_ = 0; }  // drops a cargo that was half read
 
   // kCargo: channel() and cargo() are whole. kPart: there is more, ask again at once.
   Heard listen();
@@ -24,7 +24,7 @@ class Shtp {
   uint8_t address() const { return address_; }
   uint8_t channel() const { return channel_; }
   const uint8_t* cargo() const { return cargo_; }
-  uint8_t count() const { return got_; }  // of a longer cargo only the first are kept
+  uint8_t count() const { return got_; }  // at most kRoom: the rest of a longer cargo is dropped
 
  private:
   static constexpr uint8_t kPiece = 64;   // with its header: 1.5 ms at 400 kHz

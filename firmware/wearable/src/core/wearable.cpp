@@ -13,7 +13,7 @@ constexpr uint32_t kSecondUs = 1'000'000;
 constexpr uint32_t kImuStartsUs = 10'000;  // its wait for the chip begins, and passes during the first join
 constexpr uint32_t kImuFirstMs = 2'000;
 constexpr uint32_t kConsoleFirstUs = 10'000'000;  // after a hang: time to open the port, before the next one
-constexpr uint8_t kSoundFirmware[] = {19, 5, 4};  // an older radio hangs at an empty datagram from anyone
+constexpr uint8_t kSoundFirmware[] = {19, 5, 4};  // an older WINC1500 hangs at an empty datagram from anyone
 constexpr uint32_t kUnlinkedForSavingUs = 30'000'000;  // then no dance is running: the heading may be lost
 
 bool is_older(const uint8_t (&version)[3], const uint8_t (&other)[3]) {
@@ -23,7 +23,8 @@ bool is_older(const uint8_t (&version)[3], const uint8_t (&other)[3]) {
 // The part that fits into a packet's flags: old firmware, and the strength of the access point, 4 dB a step.
 uint8_t radio_flags(const Radio& radio) {
   if (!radio.is_known()) return 0;
-  const uint8_t old = is_older(radio.firmware, kSoundFirmware) ? wire::kRadioIsOld : uint8_t{0};
+  const bool is_old = radio.is_winc1500 && is_older(radio.firmware, kSoundFirmware);
+  const uint8_t old = is_old ? wire::kRadioIsOld : uint8_t{0};
   if (radio.rssi_dbm == 0) return old;
   int steps = (radio.rssi_dbm - wire::kWeakestDbm + 2) / wire::kDbmAStep;
   if (steps < 1) steps = 1;

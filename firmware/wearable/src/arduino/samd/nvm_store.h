@@ -1,7 +1,7 @@
 // The flash store in the SAM D21's own flash: each slot a record that wanders over four rows.
 #pragma once
 
-#include "../core/ports.h"
+#include "../../core/ports.h"
 #include "page_log.h"
 
 namespace bunraku {

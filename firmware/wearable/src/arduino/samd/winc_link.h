@@ -1,16 +1,16 @@
-// Wi-Fi and one UDP socket over WiFi101. Which of its calls stop everything, and for how long: ports.h.
+// Wi-Fi and one UDP socket of the MKR1000, over WiFi101. Which of its calls stop everything, and for how long: ports.h.
 #pragma once
 
 #include <WiFi101.h>
 #include <WiFiUdp.h>
 
-#include "../core/ports.h"
+#include "../../core/ports.h"
 
 namespace bunraku {
 
-class WifiLink final : public DatagramLink {
+class WincLink final : public DatagramLink {
  public:
-  explicit WifiLink(Board& board) : board_(board) {}
+  explicit WincLink(Board& board) : board_(board) {}
   bool is_up() override;
   bool join(const char* network, const char* password) override;
   void leave() override;

@@ -1,6 +1,9 @@
-// The I2C bus of the BNO055 over Wire. Wire itself waits without end for a line that never rises, so: no
+// The I2C bus of an MKR board over Wire. Wire itself waits without end for a line that never rises, so: no
 // transaction starts while a line is held, the SERCOM gives up on a clock held for 25 ms (its SMBus time-out),
 // and what is left after that the watchdog ends.
+#include "../board.h"
+#ifdef BUNRAKU_SAMD
+
 #include "wire_bus.h"
 
 #include <Wire.h>
@@ -8,7 +11,7 @@
 namespace bunraku {
 namespace {
 
-constexpr uint32_t kBusHz = 400000;     // the BNO055's fastest; it stretches the clock as it needs
+constexpr uint32_t kBusHz = 400000;     // the chips' fastest; a BNO055 stretches the clock as it needs
 constexpr uint8_t kRecoveryClocks = 9;  // a byte and its acknowledge: whatever a slave was saying, it ends
 constexpr unsigned kHalfClockUs = 5;
 constexpr unsigned kStretchUs = 1000;  // the longest that a released clock is waited for
@@ -45,6 +48,13 @@ bool WireBus::read(uint8_t address, uint8_t reg, uint8_t* data, uint8_t count) {
   if (Wire.endTransmission(false) != 0) return false;
   const size_t asked = count < 2 ? 2 : count;
   if (Wire.requestFrom(address, asked, true) != asked) return false;
+  for (uint8_t i = 0; i < count; ++i) data[i] = static_cast<uint8_t>(Wire.read());
+  return true;
+}
+
+bool WireBus::receive(uint8_t address, uint8_t* data, uint8_t count) {
+  if (count < 2 || !is_free()) return false;
+  if (Wire.requestFrom(address, size_t{count}, true) != count) return false;
   for (uint8_t i = 0; i < count; ++i) data[i] = static_cast<uint8_t>(Wire.read());
   return true;
 }
@@ -109,3 +119,5 @@ void WireBus::pull(pin_size_t line, bool is_low) {
 }
 
 }  // namespace bunraku
+
+#endif

@@ -1,5 +1,5 @@
-// The part of Arduino.h that the sketch uses, SAMD core 1.8.14 with API 1.5, variant mkr1000. Only
-// signatures.
+// The part of Arduino.h that the sketch uses, SAMD core 1.8.14 with API 1.5, variants mkr1000 and
+// mkrwifi1010. Only signatures.
 #pragma once
 
 #include <stddef.h>
@@ -32,6 +32,9 @@ extern SERCOM sercom0, sercom2;
 #define PERIPH_WIRE sercom0
 
 static const uint8_t A1 = 16, A3 = 18;
+#ifdef ARDUINO_SAMD_MKRWIFI1010
+static const uint8_t ADC_BATTERY = 32;
+#endif
 
 extern "C" {
 void pinMode(pin_size_t pin, PinMode mode);
@@ -41,6 +44,7 @@ int analogRead(pin_size_t pin);
 void analogReadResolution(int bits);
 unsigned long micros();
 unsigned long millis();
+void delay(unsigned long milliseconds);
 void delayMicroseconds(unsigned int microseconds);
 }
 

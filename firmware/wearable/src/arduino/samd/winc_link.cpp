@@ -1,9 +1,12 @@
-// Wi-Fi and one UDP socket over WiFi101.
-#include "wifi_link.h"
+// Wi-Fi and one UDP socket of the MKR1000, over WiFi101.
+#include "../board.h"
+#ifdef BUNRAKU_WINC
+
+#include "winc_link.h"
 
 #include <Arduino.h>
 
-#include "../core/line_parsing.h"
+#include "../../core/line_parsing.h"
 
 namespace bunraku {
 namespace {
@@ -15,9 +18,9 @@ constexpr uint8_t kUnsentBeforeReopening = 5;
 
 }  // namespace
 
-bool WifiLink::is_up() { return is_started_ && !is_socket_lost_ && WiFi.status() == WL_CONNECTED; }
+bool WincLink::is_up() { return is_started_ && !is_socket_lost_ && WiFi.status() == WL_CONNECTED; }
 
-bool WifiLink::join(const char* network, const char* password) {
+bool WincLink::join(const char* network, const char* password) {
   board_.feed_watchdog();
   const uint8_t before = WiFi.status();
   is_started_ = before != WL_NO_SHIELD;
@@ -46,7 +49,7 @@ bool WifiLink::join(const char* network, const char* password) {
 }
 
 // RSSI() waits for the module, up to a second: only while joining, which blocks anyway.
-void WifiLink::ask_radio() {
+void WincLink::ask_radio() {
   radio_ = Radio();
   const char* version = WiFi.firmwareVersion();
   if (version == nullptr || !parse_version(version, radio_.firmware)) return;
@@ -55,12 +58,12 @@ void WifiLink::ask_radio() {
   if (rssi_dbm >= INT8_MIN && rssi_dbm < 0) radio_.rssi_dbm = static_cast<int8_t>(rssi_dbm);
 }
 
-void WifiLink::leave() {
+void WincLink::leave() {
   if (is_started_) disconnect();
 }
 
 // The module tells later that it has left. A begin() before that would take it for its own failure.
-void WifiLink::disconnect() {
+void WincLink::disconnect() {
   udp_.stop();
   WiFi.disconnect();
   const unsigned long asked_ms = millis();
@@ -68,7 +71,7 @@ void WifiLink::disconnect() {
   }
 }
 
-bool WifiLink::open(uint16_t port) {
+bool WincLink::open(uint16_t port) {
   port_ = port;
   unsent_ = 0;
   udp_.stop();
@@ -76,7 +79,7 @@ bool WifiLink::open(uint16_t port) {
 }
 
 // WiFi101 silently closes the socket when an empty packet comes in.
-bool WifiLink::send(const Address& to, const uint8_t* data, uint16_t count) {
+bool WincLink::send(const Address& to, const uint8_t* data, uint16_t count) {
   if (is_socket_lost_) return false;  // without one, endPacket() reads beside its table
   if (udp_.beginPacket(IPAddress(to.ip), to.port) != 1) return false;
   const bool is_sent = udp_.write(data, count) == count && udp_.endPacket() == 1;
@@ -86,13 +89,13 @@ bool WifiLink::send(const Address& to, const uint8_t* data, uint16_t count) {
 }
 
 // To the network's own broadcast address: the limited one (255.255.255.255) names no network.
-bool WifiLink::broadcast(uint16_t port, const uint8_t* data, uint16_t count) {
+bool WincLink::broadcast(uint16_t port, const uint8_t* data, uint16_t count) {
   const Address everyone{WiFi.localIP() | ~WiFi.subnetMask(), port};
   return send(everyone, data, count);
 }
 
 // The sender is asked before the bytes are read: reading them lets the next packet overwrite it.
-uint16_t WifiLink::receive(uint8_t* data, uint16_t room, Address& from) {
+uint16_t WincLink::receive(uint8_t* data, uint16_t room, Address& from) {
   const int size = udp_.parsePacket();
   if (size <= 0) return 0;
   const uint32_t ip = udp_.remoteIP();
@@ -104,3 +107,5 @@ uint16_t WifiLink::receive(uint8_t* data, uint16_t room, Address& from) {
 }
 
 }  // namespace bunraku
+
+#endif

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "../core/framing.h"
+#include "../../core/framing.h"
 
 namespace bunraku {
 namespace {

@@ -1,9 +1,9 @@
-// The I2C bus of the BNO055 over Wire, guarded against a chip that holds a line.
+// The I2C bus of an MKR board over Wire, guarded against a chip that holds a line.
 #pragma once
 
 #include <Arduino.h>
 
-#include "../core/ports.h"
+#include "../../core/ports.h"
 
 namespace bunraku {
 
@@ -12,6 +12,7 @@ class WireBus final : public I2cBus {
   void begin();
   bool write(uint8_t address, uint8_t reg, const uint8_t* data, uint8_t count) override;
   bool read(uint8_t address, uint8_t reg, uint8_t* data, uint8_t count) override;
+  bool receive(uint8_t address, uint8_t* data, uint8_t count) override;
   void recover() override;
 
  private:

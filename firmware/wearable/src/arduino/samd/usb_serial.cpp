@@ -1,5 +1,8 @@
 // USB serial that never waits. Serial.write() would, for up to 70 ms, and availableForWrite() always returns 63,
 // so the endpoint's own flags are asked; so are the bus frames, because the core keeps DTR after an unplug.
+#include "../board.h"
+#ifdef BUNRAKU_SAMD
+
 #include "usb_serial.h"
 
 #include <Arduino.h>
@@ -50,3 +53,5 @@ uint16_t UsbSerial::write(const uint8_t* data, uint16_t count) {
 }
 
 }  // namespace bunraku
+
+#endif

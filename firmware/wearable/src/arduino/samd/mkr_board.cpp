@@ -1,4 +1,7 @@
-// The rest of the MKR1000: lamp, battery, watchdog, noise.
+// The rest of an MKR board: lamp, battery, watchdog, noise.
+#include "../board.h"
+#ifdef BUNRAKU_SAMD
+
 #include "mkr_board.h"
 
 #include <Arduino.h>
@@ -6,11 +9,17 @@
 namespace bunraku {
 namespace {
 
+#ifdef BUNRAKU_NINA
+// The MKR WiFi 1010 has its divider on board, 330 kilohm and 1 megohm: 4.39 V are the full 3.3 V at the pin.
+constexpr uint8_t kBatteryPin = ADC_BATTERY;
+constexpr uint32_t kFullScaleMillivolts = 4389;
+#else
 // The MKR1000 does not measure its battery. Two resistors do: battery + to A1 over 100 kilohm, A1 to ground
 // over 330 kilohm; 4.3 V at the battery is the full 3.3 V at the pin.
 constexpr uint8_t kBatteryPin = A1;
 constexpr uint32_t kFullScaleMillivolts = 4300;
-constexpr uint16_t kLeastMillivolts = 2500;  // below it nothing runs: the resistors are not there
+#endif
+constexpr uint16_t kLeastMillivolts = 2500;  // below it nothing runs: the resistors or the cell are not there
 constexpr uint8_t kNoisePin = A3;            // open
 constexpr uint8_t kAdcBits = 12;
 constexpr uint8_t kSamplesPerByte = 8;  // 0.8 ms each
@@ -95,3 +104,5 @@ void MkrBoard::start_watchdog() {
 }
 
 }  // namespace bunraku
+
+#endif

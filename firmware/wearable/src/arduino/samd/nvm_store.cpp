@@ -1,5 +1,8 @@
 // The flash store in the SAM D21's own flash. A row bears 25,000 erasures; each of the two records that take turns
 // in counting power-ons wanders a page at a time over four rows, so it wears out after 400,000 saves.
+#include "../board.h"
+#ifdef BUNRAKU_SAMD
+
 #include "nvm_store.h"
 
 #include <Arduino.h>
@@ -63,3 +66,5 @@ void NvmStore::program(uint8_t row_number, uint8_t page, const uint8_t (&data)[k
 }
 
 }  // namespace bunraku
+
+#endif

@@ -1,7 +1,7 @@
-// The rest of the MKR1000: lamp, battery, watchdog, noise.
+// The rest of an MKR board: lamp, battery, watchdog, noise.
 #pragma once
 
-#include "../core/ports.h"
+#include "../../core/ports.h"
 
 namespace bunraku {
 
