@@ -22,7 +22,7 @@ from appliance.sensor.transports.udp import UdpIntake
 
 FOREIGN = frozenset(("length", "magic", "version", "kind", "device", "tag", "old_session", "old_hello"))
 RESERVE_EACH_S = 1.0
-LATE_LOOKS = 8  # of others' packets that come first, while one is awaited
+LATE_LOOKS = 8  # at most, while packets of other sensors come first
 HEARTBEATS_APART = 8  # sensors get their heartbeats at different eighths of a second, in key file order
 REASONS = (
     "accepted",

@@ -18,7 +18,7 @@ MOCOPI_BONES = (
 class Program:
     """How a program sends: by bones of a figure, or by OSC with this address and these numbers.
 
-    address: "" where the program has none of its own. values: xyzw, wxyz, euler, matrix.
+    address: "" where every user chooses another one. values: xyzw, wxyz, euler, matrix.
     """
 
     port: int

@@ -18,7 +18,7 @@ HELLO_EVERY_S = 0.2
 LOST_S = 3.0  # without a packet from the stage, as in the firmware
 _ANSWERED_HELLOS = 4  # an assignment answers the newest hello or one of the three before
 _LONGEST = 2 * wire.LARGEST
-_UNIT = 0.1  # an orientation this far from length 1 is none
+_UNIT = 0.1  # a quaternion this far from length 1 is refused
 _LAMPS = {wire.LED_ON: "on", wire.LED_SLOW: "slow", wire.LED_FAST: "fast", wire.LED_STROBE: "strobe"}
 _CALIBRATED = 0xFF
 _NO_FIRMWARE = (0, 0, 0)
@@ -65,7 +65,7 @@ class ForeignSensor:
 
     @property
     def lamp(self) -> str:
-        """What a wearable's lamp would show: off, on, slow, fast, strobe, or looking (for the stage)."""
+        """The state of a wearable's lamp: off, on, slow, fast, strobe, or looking (for the stage)."""
         return _LAMPS.get(self._boot.led, "off") if self.is_linked else "looking"
 
     def switch_on(self) -> None:

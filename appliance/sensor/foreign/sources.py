@@ -1,4 +1,4 @@
-"""What programs send, as orientations of one sensor: OSC of any address, bones of VMC, bones of mocopi."""
+"""Datagrams of programs as orientations of one sensor: OSC of any address, bones of VMC, bones of mocopi."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class BoneSource:
 
 @dataclass(frozen=True)
 class SourceSettings:
-    """What a box file says about a foreign sensor; "" stands for the program's own."""
+    """A foreign sensor as the box file has it; an empty text means the program's usual value."""
 
     name: str
     program: str
