@@ -1,10 +1,19 @@
-"""Shared by the box's HTTP servers: their socket, the names of this machine, a client's address."""
+"""Shared by the box's HTTP servers: their socket, this machine's names and addresses, a client's address."""
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import ipaddress
 import socket
+import struct
 from collections.abc import Iterable
+from pathlib import Path
+
+_ELSEWHERE = "192.0.2.1", 9  # an address of no machine (RFC 5737): which of ours would a packet leave by?
+_GET_ADDRESS, _GET_NETMASK = 0x8915, 0x891B  # SIOCGIFADDR, SIOCGIFNETMASK, netdevice(7)
+_IPV6 = Path("/proc/net/if_inet6")
+_LINK_LOCAL = "20"  # scope, in hexadecimal, as the kernel writes it
 
 
 def listening(host: str, port: int) -> socket.socket:
@@ -13,6 +22,44 @@ def listening(host: str, port: int) -> socket.socket:
         host = "0.0.0.0"
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     return socket.create_server((host, port), family=family, dualstack_ipv6=host == "::")
+
+
+def outward_host() -> str:
+    """The address by which other machines reach this one; its name where it has no network."""
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        asking.connect(_ELSEWHERE)
+        return str(asking.getsockname()[0])
+    return socket.gethostname()
+
+
+def addresses() -> list[tuple[str, str]]:
+    """Interface and address by which the box can be reached from elsewhere: IPv4, then IPv6."""
+    return [(name, one.partition("/")[0]) for name, one in _interfaces() if "%" not in one]
+
+
+def own_networks() -> list[str]:
+    """The networks that this machine's interfaces are in, as a box file has them."""
+    found = (ipaddress.ip_interface(one.replace("%", "")) for _, one in _interfaces())
+    return [str(one.network) for one in found]
+
+
+def _interfaces() -> list[tuple[str, str]]:
+    """Interface and address/network; a link-local address of IPv6 has a % before the slash."""
+    found = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        for _, name in socket.if_nameindex():
+            asked = struct.pack("256s", name.encode())
+            try:
+                address, mask = (fcntl.ioctl(asking, what, asked) for what in (_GET_ADDRESS, _GET_NETMASK))
+            except OSError:
+                continue  # it has none
+            found.append((name, "/".join(socket.inet_ntoa(one[20:24]) for one in (address, mask))))
+    lines = _IPV6.read_text().splitlines() if _IPV6.exists() else []
+    for number, _, length, scope, _, name in map(str.split, lines):
+        local = "%" * (scope == _LINK_LOCAL)
+        found.append((name, f"{ipaddress.IPv6Address(int(number, 16))}{local}/{int(length, 16)}"))
+    loopback = [one for one in found if ipaddress.ip_interface(one[1].replace("%", "")).ip.is_loopback]
+    return [one for one in found if one not in loopback]
 
 
 class OwnNames:

@@ -122,13 +122,24 @@ def play(
     ] = None,
     chosen: ChosenFile = None,
     cue: Annotated[str | None, typer.Option(help="Begin in this cue of the show.")] = None,
+    phone: Annotated[
+        bool,
+        typer.Option(
+            "--phone",
+            help="Let a phone be the show's first sensor: print a QR code, and serve the page over HTTPS to "
+            "this machine's networks.",
+        ),
+    ] = False,
 ) -> int:
     """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
     from appliance.cli.play import play_show
 
     if alone:
         refuse_idle(context, ("window",), "with --alone, which starts no projector")
-    return play_show(show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse, chosen, cue)
+        refuse_idle(context, ("phone",), "with --alone, which serves no page")
+    return play_show(
+        show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse, chosen, cue, phone
+    )
 
 
 def preflight(context: typer.Context) -> int:

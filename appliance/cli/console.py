@@ -24,6 +24,7 @@ from appliance.cli.options import (
     is_for_subcommand,
 )
 from appliance.cli.page_address import address, address_of, open_console_port
+from appliance.cli.phones import offer_phones, phone_names
 from appliance.console.devices import Devices
 from appliance.console.settings import WHERE, Settings
 from appliance.show.config_error import NotAskedForError, Problem
@@ -98,12 +99,42 @@ def revoke(
     print(f"{device} is forgotten.")
 
 
+@console.command()
+def phone(
+    name: Annotated[
+        str | None, typer.Argument(help="The sensor. Default: the only one that phones may be.")
+    ] = None,
+    box: ThisBoxFile = None,
+) -> None:
+    """Print a code, as QR code and address, by which one phone becomes a sensor of the running box."""
+    from appliance.cli.phones import invitation
+    from appliance.console.join_codes import JoinCodes
+    from appliance.release.installed_box import box_here
+    from appliance.show.box import load_box
+
+    folder = runtime_of(load_box(box_here(box)))
+    codes = JoinCodes(folder)
+    names = codes.names
+    chosen = names[0] if name is None and len(names) == 1 else name
+    if chosen not in names:
+        those = f"Phones may be: {', '.join(names)}." if names else "No phone may be a sensor of this box."
+        raise StageError(
+            f"{those} The box file lists them: sensors: foreign: [{{name: left-wrist, from: phone}}]. To try "
+            "it: bunraku play --phone"
+        )
+    try:
+        _, host, port, https = (folder / WHERE).read_text().splitlines()
+        for line in invitation(codes, address(host, int(port), bool(https)), chosen, sys.stdout.isatty()):
+            print(line)
+    except (OSError, ValueError) as error:
+        raise StageError("No page runs here. Start the box: bunraku play") from error
+
+
 def card_lines(box: BoxConfig) -> tuple[str, ...]:
     """For the projector's test card: address and PIN of the page that runs here; nothing without one."""
     try:
-        kept, host, port = (runtime_of(box) / WHERE).read_text().splitlines()
-        https = box.console is not None and box.console.https
-        return f"page {address(host, int(port), https)}", f"pin {Devices(Path(kept)).pin}"
+        kept, host, port, https = (runtime_of(box) / WHERE).read_text().splitlines()
+        return f"page {address(host, int(port), bool(https))}", f"pin {Devices(Path(kept)).pin}"
     except (OSError, ValueError, StageError):
         return ()
 
@@ -131,7 +162,7 @@ def console_command(
     folder = runtime_of(box)
     with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as opened:
         host, port = opened.getsockname()[:2]
-        (folder / WHERE).write_text(f"{kept}\n{host}\n{port}\n")
+        (folder / WHERE).write_text(f"{kept}\n{host}\n{port}\n{'https' * console.https}\n")
     settings = Settings(
         folder=str(folder),
         descriptor=descriptor,
@@ -144,6 +175,7 @@ def console_command(
         journal=None if journal is None else str(journal.resolve()),
         box=_named(box, chosen),
         is_installed=chosen is not None,
+        phones=phone_names(box),
     )
     return sys.executable, "-m", "appliance.console", settings.packed()
 
@@ -165,9 +197,14 @@ def page_companion(
     command = console_command(box, page.fileno(), kept, heard_on, journal)
     try:
         https = box.console is not None and box.console.https
-        say(f"The page: {address_of(page.fileno(), https)}, PIN {Devices(kept).pin}.")
+        origin = address_of(page.fileno(), https)
+        say(f"The page: {origin}, PIN {Devices(kept).pin}.")
     except OSError as error:
         say(f"{kept}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
+    else:
+        if names := phone_names(box):
+            option = "" if box.path is None else f" --box {box.path}"
+            offer_phones(runtime_of(box), origin, names, option, say)
     return Companion(
         "The page",
         command,

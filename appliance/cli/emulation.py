@@ -29,9 +29,18 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     """Run `bunraku emulate` as the show's sensors; yields the box with their key file.
 
     The venue's own sensors are not admitted meanwhile, and what the box learns about the emulated ones is
-    discarded with them. That box has no journal: the venue's is not for rehearsals. Raises StageError.
+    discarded with them. That box has no journal: the venue's is not for rehearsals. Phones and programs stay
+    the sensors that they are. Raises StageError.
     """
-    names = list(dict.fromkeys(hand.sensor for _, hand in show.config.hands_at if hand.sensor))
+    others = {one.name for one in box.sensors.foreign}
+    worn = dict.fromkeys(hand.sensor for _, hand in show.config.hands_at if hand.sensor)
+    names = [name for name in worn if name not in others]
+    journal = box.journal.model_copy(update={"folder": None})
+    if worn and not names:
+        (scratch / _WORDS).write_text("No sensor is emulated.\n")
+        sensors = box.sensors.model_copy(update={"keys": None})
+        yield box.model_copy(update={"sensors": sensors, "state": None, "journal": journal})
+        return
     if not names:
         raise StageError("This show has no sensors to emulate. Leave --emulate out.")
     if missing := absent_commands().get("emulate"):
@@ -44,7 +53,6 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
         *("--host", udp.host, "--port", str(udp.port), "--stand-still", str(_STAND_STILL_S), "--tap"),
     ]
     sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
-    journal = box.journal.model_copy(update={"folder": None})
     with words.open("wb") as output:
         process = start_child(
             command,

@@ -8,6 +8,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
         "bunraku play --emulate --seconds 30",
         "bunraku play --show martial --emulate",
         "bunraku play --show my_show --box box.yaml",
+        "bunraku play --emulate --phone",
     ),
     "project": (
         "bunraku project --window",
@@ -18,6 +19,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     "console pin": ("bunraku console pin", "bunraku console pin --new"),
     "console devices": ("bunraku console devices",),
     "console revoke": ("bunraku console revoke 3",),
+    "console phone": ("bunraku console phone left-wrist",),
     "check": ("bunraku check martial", "bunraku check my_show", "bunraku check my_show --box box.yaml"),
     "doctor": ("bunraku doctor",),
     "generate": ("bunraku generate --box box.yaml",),

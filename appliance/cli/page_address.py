@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import ipaddress
 import os
 import socket
 from typing import TYPE_CHECKING
 
-from appliance.box.served import listening
+from appliance.box.served import listening, outward_host
 from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
     from appliance.show.console import ConsoleConfig
-
-_ELSEWHERE = "192.0.2.1", 9  # an address of no machine (RFC 5737): which of ours would a packet leave by?
 
 
 def open_console_port(console: ConsoleConfig, or_any: bool = False) -> socket.socket:
@@ -44,8 +41,5 @@ def address_of(descriptor: int, https: bool = False) -> str:
 def address(host: str, port: int, https: bool = False) -> str:
     """The same of a socket that listens on this host and port."""
     if ipaddress.ip_address(host).is_unspecified:
-        host = socket.gethostname()
-        with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-            asking.connect(_ELSEWHERE)
-            host = asking.getsockname()[0]
+        host = outward_host()
     return f"http{'s' * https}://{f'[{host}]' if ':' in host else host}:{port}"

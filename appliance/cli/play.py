@@ -48,18 +48,23 @@ def play_show(
     rehearse: Path | None = None,
     chosen: Path | None = None,
     cue: str | None = None,
+    phone: bool = False,
 ) -> int:
     """Dance until the seconds are over or a signal comes; returns the exit status.
 
     alone: start no companions. window: show the projection in a window. rehearse: the same if there is a
     display, and a picture of the projection at the end. chosen: dance what the preflight chose and proved.
-    cue: begin in this one.
+    cue: begin in this one. phone: a phone is the show's first sensor.
 
     Raises ConfigError, StageError.
     """
     if chosen is not None:
         directory, box_file = _pair_to_dance(chosen, directory, box_file)
     show, box = load_show(named_show(directory) or default_show_path()), load_box(box_file)
+    if phone:
+        from appliance.cli.phones import with_phone
+
+        box = with_phone(show, box)
     words = ""
     if directory is not None and chosen is None:  # a network that never ends would block every signal
         from appliance.cli.network_proof import prove_network

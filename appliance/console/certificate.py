@@ -1,4 +1,4 @@
-"""The box's own certificate for HTTPS: made once by the command openssl, and kept."""
+"""The box's own certificates for HTTPS, made by the command openssl: an authority's, and the server's."""
 
 from __future__ import annotations
 
@@ -7,47 +7,145 @@ import ipaddress
 import re
 import ssl
 import subprocess
+import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from aiohttp import web
+
 from appliance.box.durable import write_whole
 
-FILE = "console.pem"
-_DAYS = 3650
+FILE = "console.pem"  # the server's key and certificate, then the authority's certificate
+AUTHORITY_FILE = "console-authority.pem"  # what a phone may install signs no other server's name
+_AUTHORITY_DAYS = 3650
+_DAYS = 397  # Apple's devices trust no server's certificate for longer than 825 days
+_RENEWED_DAYS = 30
+_DAY_S = 24 * 3600.0
 _PATIENCE_S = 60.0
+_OWN = ("localhost", "127.0.0.1", "::1")
+_PRIVATE = (
+    *("127.0.0.0/8", "10.0.0.0/8", "172.16.0.0/12", "192.168.0.0/16", "169.254.0.0/16"),
+    *("::1/128", "fc00::/7", "fe80::/10"),
+)
 _CERTIFICATE = re.compile(r"-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE-----", re.DOTALL)
+_NEW_KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
 
 
-def certificate_in(folder: Path, names: Sequence[str]) -> Path:
-    """The file with key and certificate; made where there is none. names: addresses and names of the box.
+def certificate_in(folder: Path, names: Sequence[str], now: float | None = None) -> Path:
+    """The file with key and certificate, made anew where it is missing, lacks a name or is about to expire.
 
-    Raises OSError where it can be neither made nor kept.
+    names: addresses and names of the box. The authority that signs it stays as long as it may sign them.
+    now: Unix seconds. Raises OSError where a certificate can be neither made nor kept.
     """
-    path = folder / FILE
-    if path.is_file():
+    now = time.time() if now is None else now
+    own = list(dict.fromkeys((*_OWN, *(name.split("%")[0].lower() for name in names))))
+    path, authority = folder / FILE, folder / AUTHORITY_FILE
+    if _covers(path, own, now + _RENEWED_DAYS * _DAY_S):
         return path
-    own = dict.fromkeys(("localhost", "127.0.0.1", "::1", *names))
-    meant = ",".join(f"{'IP' if _is_address(name) else 'DNS'}:{name}" for name in own)
-    command = (
-        *("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"),
-        *("-days", str(_DAYS), "-subj", "/CN=Bunraku", "-addext", f"subjectAltName={meant}"),
-        *("-keyout", "-", "-out", "-"),
-    )
-    try:
-        made = subprocess.run(command, capture_output=True, timeout=_PATIENCE_S, check=True).stdout
-    except (subprocess.SubprocessError, FileNotFoundError) as error:
-        raise OSError(0, "openssl did not make a certificate: is the package openssl there?") from error
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    write_whole(path, made, private=True)
+    more = [name for name in own if not _is_private(name)]
+    if not _covers(authority, more, now + _DAYS * _DAY_S):
+        allowed = [*_PRIVATE, "local", *more]
+        permitted = ",".join(f"permitted;{_constraint(one)}" for one in allowed)
+        made = _openssl(
+            *("req", "-x509", *_NEW_KEY, "-days", str(_AUTHORITY_DAYS), "-subj", "/CN=Bunraku"),
+            *("-addext", f"nameConstraints=critical,{permitted}", "-addext", "keyUsage=critical,keyCertSign"),
+            *("-keyout", "-", "-out", "-"),
+        )
+        _keep(authority, made, [name for name in own if name in more], now + _AUTHORITY_DAYS * _DAY_S)
+    meant = ",".join(f"{'IP' if _is_address(name) else 'DNS'}:{name}" for name in own)
+    with tempfile.NamedTemporaryFile("w", suffix=".conf") as settings:
+        settings.write(
+            f"subjectAltName={meant}\nextendedKeyUsage=serverAuth\nbasicConstraints=critical,CA:FALSE\n"
+        )
+        settings.flush()
+        asked = _openssl("req", "-new", *_NEW_KEY, "-subj", "/CN=Bunraku box", "-keyout", "-", "-out", "-")
+        signed = _openssl(
+            *("x509", "-req", "-CA", str(authority), "-days", str(_DAYS), "-extfile", settings.name),
+            said=asked,
+        )
+    key = asked[: asked.index(b"-----BEGIN CERTIFICATE REQUEST-----")]
+    _keep(path, key + signed + authority_certificate(folder).encode(), own, now + _DAYS * _DAY_S)
     return path
 
 
-def fingerprint(path: Path) -> str:
-    """SHA-256 of the certificate, as browsers show it. Raises OSError, ValueError."""
-    found = _CERTIFICATE.search(path.read_text())
-    if found is None:
+def authority_certificate(folder: Path) -> str:
+    """The certificate that a phone installs to trust this box, as PEM. Raises OSError, ValueError."""
+    return _certificates((folder / AUTHORITY_FILE).read_text())[0]
+
+
+def routes(folder: Path) -> list[web.RouteDef]:
+    """Where a device fetches the authority's certificate, to install it."""
+
+    async def serve(request: web.Request) -> web.Response:
+        try:
+            body = ssl.PEM_cert_to_DER_cert(authority_certificate(folder))
+        except (OSError, ValueError):
+            raise web.HTTPNotFound(text="This box serves its page without HTTPS: `console: https`.") from None
+        headers = {"Content-Disposition": 'attachment; filename="bunraku.crt"'}
+        return web.Response(body=body, content_type="application/x-x509-ca-cert", headers=headers)
+
+    return [web.get("/bunraku.crt", serve)]
+
+
+def _keep(path: Path, made: bytes, names: Sequence[str], until: float) -> None:
+    write_whole(path, f"{_told(names)}{until:.0f}\n".encode() + made, private=True)
+
+
+def _covers(path: Path, names: Sequence[str], until: float) -> bool:
+    """Whether a file of ours has all these names, and is valid until then. Its first line says so."""
+    try:
+        told = path.read_text().partition("\n")[0].split()
+        return told[0] == "bunraku" and set(names) <= set(told[1:-1]) and float(told[-1]) >= until
+    except (OSError, ValueError, IndexError):
+        return False
+
+
+def _told(names: Sequence[str]) -> str:
+    return " ".join(("bunraku", *names, ""))
+
+
+def _is_private(name: str) -> bool:
+    """Whether every authority of ours may sign it."""
+    if not _is_address(name):
+        return name == "local" or name.endswith(".local")
+    address = ipaddress.ip_address(name)
+    return any(
+        address in network
+        for network in map(ipaddress.ip_network, _PRIVATE)
+        if network.version == address.version
+    )
+
+
+def _constraint(allowed: str) -> str:
+    if "/" in allowed or _is_address(allowed):
+        network = ipaddress.ip_network(allowed)
+        return f"IP:{network.network_address.exploded}/{network.netmask.exploded}"
+    return f"DNS:{allowed}"
+
+
+def _openssl(*arguments: str, said: bytes = b"") -> bytes:
+    try:
+        done = subprocess.run(
+            ("openssl", *arguments), input=said, capture_output=True, timeout=_PATIENCE_S, check=True
+        )
+    except (subprocess.SubprocessError, FileNotFoundError) as error:
+        raise OSError(0, "openssl did not make a certificate: is the package openssl there?") from error
+    return done.stdout
+
+
+def _certificates(text: str) -> list[str]:
+    found = _CERTIFICATE.findall(text)
+    if not found:
         raise ValueError("there is no certificate in it")
-    return hashlib.sha256(ssl.PEM_cert_to_DER_cert(found[0])).digest().hex(":").upper()
+    return [f"{one}\n" for one in found]
+
+
+def fingerprint(path: Path) -> str:
+    """SHA-256 of the server's certificate, as browsers show it. Raises OSError, ValueError."""
+    served = _certificates(path.read_text())[0]
+    return hashlib.sha256(ssl.PEM_cert_to_DER_cert(served)).digest().hex(":").upper()
 
 
 def https_context(path: Path) -> ssl.SSLContext:

@@ -1,4 +1,4 @@
-"""The page's fallbacks: when strangers crowd it, and when they try PINs."""
+"""The page's fallbacks: when strangers crowd it, when they try PINs, when a phone sends nonsense."""
 
 from __future__ import annotations
 
@@ -19,7 +19,16 @@ PIN_CHANGED = Fallback(
     "So many wrong PINs came to the page that it chose a longer one. The dance goes on, and devices that "
     "gave the PIN before go on too. A new device finds it on the test card, or by: bunraku console pin.",
 )
-OF_THE_PAGE = (CROWDED, PIN_CHANGED)
+_NONSENSE = (
+    "no numbers, too many a second, or by a clock that runs back. They were dropped, and the joint is given "
+    "back where no others come. Open the page on that phone again."
+)
+PHONE_REFUSED = Fallback(
+    "phone-refused",
+    f"A phone in place of a sensor sent readings with {_NONSENSE}",
+    f"The phone that is {{about}} sent readings with {_NONSENSE}",
+)
+OF_THE_PAGE = (CROWDED, PIN_CHANGED, PHONE_REFUSED)
 
 
 def note_crowd(fallbacks: Fallbacks, address: str) -> None:

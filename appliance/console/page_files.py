@@ -33,7 +33,7 @@ def read_files(folder: Path = FOLDER) -> dict[str, _File]:
             content = path.read_bytes()
             tag = f'"{hashlib.sha256(content).hexdigest()[:16]}"'
             found[f"/{path.relative_to(folder).as_posix()}"] = _File(content, _KINDS[path.suffix], tag)
-    return found | {"/": found["/index.html"]}
+    return found | {"/": found["/index.html"], "/phone": found["/phone.html"]}
 
 
 def languages(folder: Path = FOLDER) -> list[str]:

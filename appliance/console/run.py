@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import signal
 import socket
 import ssl
@@ -20,7 +21,9 @@ from appliance.box.open_files import open_more_files
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.realtime import give_way
 from appliance.box.runtime_folder import kept_file
+from appliance.box.served import addresses
 from appliance.box.show_state import ShowStateReader
+from appliance.console import certificate
 from appliance.console.about import About
 from appliance.console.box_view import BoxView
 from appliance.console.certificate import certificate_in, https_context
@@ -31,6 +34,7 @@ from appliance.console.guard import Guard
 from appliance.console.hands import Hands
 from appliance.console.happened import Happened
 from appliance.console.logs import Logs
+from appliance.console.phones import Phones
 from appliance.console.pose_map import PoseMap
 from appliance.console.prove import Prove
 from appliance.console.rehearsed import FOLDER, ZIP, Rehearsed
@@ -79,7 +83,9 @@ async def _serve(settings: Settings) -> int:
     rehearsed = Path(settings.kept).parent / FOLDER
     venue = Venue(guard, folder, settings.box, settings.is_installed, rehearsed)
     hands, rig = Hands(guard, desk, folder), Rig(folder)
-    others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes()]
+    phones = Phones(guard, door, settings.phones, folder, fallbacks)
+    others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes(), *phones.routes()]
+    others += certificate.routes(Path(settings.kept).parent)
     named = ("--box", settings.box["box"]) if "box" in settings.box else ()
     others += SensorChanges(guard, stage, named).routes()
     if settings.rehearsal:
@@ -103,6 +109,7 @@ async def _serve(settings: Settings) -> int:
         asyncio.create_task(_refresh(box, watchers)),
         asyncio.create_task(_send_frames(stage, watchers)),
         asyncio.create_task(hands.watch()),
+        asyncio.create_task(phones.watch()),
         asyncio.create_task(stopped.wait()),
     ]
     ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -112,6 +119,7 @@ async def _serve(settings: Settings) -> int:
     await watchers.close()
     await prove.close()
     await hands.close()
+    phones.close()
     await runner.cleanup()
     listening.close()
     faults = [fault for task in ended if (fault := task.exception())]
@@ -127,7 +135,9 @@ async def _serve(settings: Settings) -> int:
 
 
 def _https(settings: Settings) -> ssl.SSLContext:
-    names = (socket.gethostname(), *settings.names)
+    host = socket.gethostname()
+    private = (one for _, one in addresses() if ipaddress.ip_address(one).is_private)
+    names = (host, f"{host}.local", *private, *settings.names)
     return https_context(certificate_in(Path(settings.kept).parent, names))
 
 

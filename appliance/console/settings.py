@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 
-WHERE = "console.path"  # in the runtime folder: PIN and devices, host and port of the page that runs
+WHERE = "console.path"  # in the runtime folder: PIN and devices, host and port of the page that runs, https
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Settings:
     journal: its folder; None: none is kept. box: the path of its box file as `box`, or of what the preflight
     chose as `chosen`, or neither. is_installed: systemd starts what the page wants done. folder: where the
     box's processes meet. kept: the file with PIN and remembered devices. viewers, names, rehearsal, https: as
-    in the box file.
+    in the box file. phones: the sensors that phones may be.
     """
 
     folder: str
@@ -29,6 +29,7 @@ class Settings:
     journal: str | None = None
     box: dict[str, str] = field(default_factory=dict)
     is_installed: bool = False
+    phones: tuple[str, ...] = ()
 
     def packed(self) -> str:
         """As one argument of a command line; there are no secrets in it."""
@@ -45,5 +46,6 @@ class Settings:
                 "control": None if control is None else (str(control[0]), int(control[1])),
                 "viewers": tuple(values["viewers"]),
                 "names": tuple(values["names"]),
+                "phones": tuple(values["phones"]),
             }
         )

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
-import ipaddress
 import socket
-import struct
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from appliance.box.served import addresses
 from appliance.release.choice import Choice
 
 HOME = Path("/opt/bunraku")
-_GET_ADDRESS = 0x8915  # SIOCGIFADDR, netdevice(7)
-_IPV6 = Path("/proc/net/if_inet6")
-_LINK_LOCAL = "20"  # scope, in hexadecimal, as the kernel writes it
 
 
 def about(chosen: Path | None, box: Path | None, home: Path = HOME) -> dict[str, Any]:
@@ -54,20 +49,3 @@ def releases(home: Path) -> list[str]:
             except (OSError, ValueError):
                 continue  # the installer clears away what is not whole
     return [name for _, name in sorted(found)]
-
-
-def addresses() -> list[tuple[str, str]]:
-    """Interface and address by which the box can be reached from elsewhere: IPv4, then IPv6."""
-    found = []
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-        for _, name in socket.if_nameindex():
-            try:
-                said = fcntl.ioctl(asking, _GET_ADDRESS, struct.pack("256s", name.encode()))
-            except OSError:
-                continue  # it has none
-            found.append((name, socket.inet_ntoa(said[20:24])))
-    lines = _IPV6.read_text().splitlines() if _IPV6.exists() else []
-    for number, _, _, scope, _, name in map(str.split, lines):
-        if scope != _LINK_LOCAL:
-            found.append((name, str(ipaddress.IPv6Address(int(number, 16)))))
-    return [(name, one) for name, one in found if not ipaddress.ip_address(one).is_loopback]

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from appliance.release import about as module
-from appliance.release.about import about, addresses, releases
+from appliance.box import served as module
+from appliance.box.served import addresses
+from appliance.release.about import about, releases
 from appliance.release.choice import Aside, Choice, Pair
 
 

@@ -7,6 +7,7 @@ import { command, initDevice } from "./device.js";
 import { byId, every } from "./elements.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
 import { initLogs } from "./logs.js";
+import { initPhones } from "./phones.js";
 import { initPicture, showPicture } from "./picture.js";
 import { initProve, leaveProve, showProve } from "./prove.js";
 import { initRehearsal, leaveRehearsal, showRehearsal } from "./rehearsal.js";
@@ -137,6 +138,7 @@ const box = new Box();
 const dance = new Dance(byId("stage"), byId("held"), box, words);
 initDevice(me, words);
 document.addEventListener("known", () => box.reopen());  // as a device with the PIN, which gives way to nobody
+initPhones();
 initPicture();
 initHappened();
 initProve();

@@ -1,0 +1,215 @@
+"""A phone as a sensor: a real browser's orientation moves the joint of a real box."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import BrowserContext, CDPSession, expect
+from playwright.sync_api import Page as Tab
+
+from appliance.outputs.frame_reader import FrameReader
+from appliance.pose import quaternion
+from tests.bundles import FIGURE, WORN, write_show
+from tests.console.browser import PATIENCE_MS, PHONE, await_true, press, unlock
+from tests.console.page import Page, box_with_page
+from tests.system.box import Box
+from tests.system.processes import run_bunraku, wait_until
+
+pytestmark = pytest.mark.realtime
+
+NAME, JOINT = WORN["sensor"], FIGURE.index(WORN["joint"])
+UPRIGHT = {"alpha": 100.0, "beta": 90.0, "gamma": 0.0}  # the screen faces somewhere, its top edge is up
+TURN_DEGREES = 40.0
+NEAR = 0.02  # radians
+NO_SOCKETS = """WebSocket = class {
+  static OPEN = 1;
+  readyState = 3;
+  constructor() { setTimeout(() => this.onclose({ code: 1006 })); }
+  close() {}
+}"""
+Stage = tuple[Box, Page, FrameReader]
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
+    folder = tmp_path_factory.mktemp("phones")
+    settings = {"sensors": {"foreign": [{"name": NAME, "from": "phone"}], "keys": None}}
+    with box_with_page(write_show(folder / "show"), folder, settings=settings, has_sensors=False) as (
+        box,
+        page,
+    ):
+        reader = FrameReader(box.runtime)
+        yield box, page, reader
+        reader.close()
+
+
+class Phone:
+    """A browser with motion sensors, at an address of the box."""
+
+    def __init__(self, context: BrowserContext, address: str, script: str = "") -> None:
+        expect.set_options(timeout=PATIENCE_MS)
+        self.errors: list[str] = []
+        context.grant_permissions(["accelerometer", "gyroscope"])
+        self.tab: Tab = context.new_page()
+        self.tab.on("pageerror", lambda error: self.errors.append(str(error)))
+        if script:
+            self.tab.add_init_script(script)
+        self._sensors: CDPSession = context.new_cdp_session(self.tab)
+        self.turn(**UPRIGHT)
+        self.tab.goto(address)
+        expect(self.tab.locator("#begin")).to_be_enabled()
+
+    def turn(self, **angles: float) -> None:
+        """Degrees, as browsers tell them."""
+        self._sensors.send("DeviceOrientation.setDeviceOrientationOverride", angles)
+
+    def begin(self, where: str = "left-arm") -> None:
+        press(self.tab, f'[data-where="{where}"]')
+        press(self.tab, "#begin")
+
+    def await_lamp(self, lamp: str) -> None:
+        expect(self.tab.locator("body")).to_have_attribute("data-lamp", lamp)
+
+    def take_neutral_pose(self) -> None:
+        """A still phone gives no event: the page sends its last reading again."""
+        self.await_lamp("on")
+        press(self.tab, "#neutral-pose")
+        self.await_lamp("slow")
+        self.await_lamp("on")
+
+
+def invited(page: Page) -> str:
+    """The address that `bunraku console phone` prints."""
+    done = run_bunraku("console", "phone", "--box", page.box_file)
+    assert done.returncode == 0, done.stderr
+    return next(word for word in done.stdout.split() if "/phone#" in word)
+
+
+def angle(stage: Stage, degrees: float) -> float:
+    """Radians between the joint and a turn about the vertical."""
+    frame = stage[2].newest(time.monotonic())
+    assert frame is not None
+    wanted = quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.radians(degrees))
+    return float(quaternion.angle_between(frame.pose[JOINT], wanted))
+
+
+def held(stage: Stage) -> float:
+    frame = stage[2].newest(time.monotonic())
+    assert frame is not None
+    return float(frame.holds[JOINT])
+
+
+@pytest.mark.parametrize("script", ["", NO_SOCKETS], ids=["WebSocket", "POST"])
+def test_a_phone_holds_a_joint_until_its_page_is_closed(
+    context: BrowserContext, stage: Stage, script: str
+) -> None:
+    phone = Phone(context, invited(stage[1]), script)
+    phone.begin()
+    phone.take_neutral_pose()
+    wait_until(lambda: held(stage) == 1.0)
+    phone.turn(**UPRIGHT | {"alpha": UPRIGHT["alpha"] + TURN_DEGREES})
+    wait_until(lambda: angle(stage, TURN_DEGREES) < NEAR, lambda: f"{angle(stage, TURN_DEGREES)}")
+    phone.take_neutral_pose()
+    wait_until(lambda: angle(stage, 0.0) < NEAR, lambda: f"{angle(stage, 0.0)}")
+    assert not phone.errors
+    phone.tab.close(run_before_unload=True)
+    wait_until(lambda: not stage[1].get("/api/phones").value[0]["taken"])
+    wait_until(lambda: held(stage) < 1.0)
+    wait_until(lambda: held(stage) == 0.0)
+
+
+def test_one_phone_is_a_sensor_and_another_takes_its_place_only_when_asked(
+    context: BrowserContext, stage: Stage
+) -> None:
+    page = stage[1]
+    address = invited(page)
+    first = Phone(context, address)
+    first.begin("chest")
+    first.await_lamp("on")
+    assert context.browser is not None
+    other = context.browser.new_context(**PHONE, locale="en-GB")
+    stranger = Phone(other, address)
+    stranger.begin()
+    expect(stranger.tab.locator("#phone-said")).to_contain_text(f"Another phone is {NAME} now.")
+    press(stranger.tab, "#take-over")
+    expect(stranger.tab.locator("#phone-said")).to_contain_text("not valid any more")
+    assert held(stage) == 1.0, "a used code took the joint away"
+    stranger.tab.fill("#phone-pin", page.pin)
+    stranger.begin()
+    press(stranger.tab, "#take-over")
+    stranger.await_lamp("on")
+    expect(first.tab.locator("#start")).to_be_visible()
+    expect(first.tab.locator("#phone-said")).to_contain_text(f"Another phone is {NAME} now.")
+    stranger.tab.reload()
+    assert not first.errors and not stranger.errors
+    other.close()
+
+
+def test_the_technician_s_page_shows_a_code_that_a_phone_reads(context: BrowserContext, stage: Stage) -> None:
+    expect.set_options(timeout=PATIENCE_MS)
+    tab = context.new_page()
+    tab.goto(stage[1].origin)
+    unlock(tab, stage[1])
+    press(tab, '[data-page="sensors"]')
+    press(tab, "#phones button")
+    await_true(tab, "document.querySelector('#phone-qr path')?.getAttribute('d').length > 1000")
+    address = tab.locator("#phone-address").inner_text()
+    assert f"/phone#{NAME}=" in address and "127.0.0.1" not in address, "no phone reaches that"
+
+
+def test_a_phone_that_sends_nonsense_is_counted_and_holds_nothing(stage: Stage) -> None:
+    page = stage[1]
+    page.unlock()
+    session = page.post("/api/phones/join", {"name": NAME, "where": "hand", "take_over": True}).value[
+        "session"
+    ]
+    sent = 0.0
+
+    def send(**message: Any) -> Any:
+        nonlocal sent
+        sent += 20.0
+        answer = page.post(
+            "/api/phones/reading", {"session": session, "t": sent, "turned": [0, 0, 0], **message}
+        )
+        return answer.value["said"] if answer.status == 200 else answer.status
+
+    assert send() == ""
+    for turned in (
+        [None] * 3,
+        [0, 0],
+        [0, 0, "1"],
+        [1e9, 0, 0],
+        [10**400, 0, 0],
+        {"a": 1},
+        "x",
+        [True, 0, 0],
+    ):
+        assert send(turned=turned) == "no_numbers", turned
+    assert page.post("/api/phones/reading", b'{"t": NaN}').status == 400
+    assert send(t=None) == "no_numbers"
+    assert send(t=sent - 10) == "", "it was overtaken"
+    sent = -1e6
+    assert send() == "clock_back" and send() == ""
+    assert send(session="0" * 32) == 410 and send(session="") == 410 and send(session=5) == 410
+    refused = [send() for _ in range(400)]
+    assert page.get("/api/phones").value[0]["counts"]["no_numbers"] == 9
+    said = page.get("/status").value["fallbacks"]
+    assert NAME in next(one["words"] for one in said if one["name"] == "phone-refused"), refused
+    page.post("/api/phones/leave", {"session": session})
+    wait_until(lambda: held(stage) == 0.0)
+    page.cookie = ""
+
+
+def test_a_phone_needs_the_pin_or_its_code(stage: Stage) -> None:
+    page = stage[1]
+    joining = {"name": NAME, "where": "hand", "take_over": True}
+    assert page.post("/api/phones/join", joining).status == 401
+    assert page.post("/api/phones/code", {"name": NAME}).status == 401
+    assert page.post("/api/phones/join", {**joining, "name": "head"}).status == 404
+    assert page.post("/api/phones/join", {**joining, "where": "foot"}).status == 400
+    answers = [page.post("/api/phones/join", {**joining, "code": "x" * 10}).status for _ in range(7)]
+    assert answers[0] == 403 and answers[-1] == 429
