@@ -10,7 +10,6 @@ namespace {
 
 constexpr uint32_t kSession = 0x5E551041;
 constexpr uint32_t kBeatUs = 1000000;
-constexpr uint8_t kRateHz = 50;
 
 }  // namespace
 
@@ -43,11 +42,11 @@ void SmallBox::hear(const uint8_t* data, uint16_t count, uint32_t now_us) {
 uint8_t SmallBox::answer(uint8_t (&packet)[wire::kLargest], uint32_t now_us) {
   if (is_greeted_) {
     is_greeted_ = false;
-    return sign(wire::Assignment{device_id_, hello_.boot_nonce, kSession, ++sequence_, hello_.sequence, 0, kRateHz,
+    return sign(wire::Assignment{device_id_, hello_.boot_nonce, kSession, ++sequence_, hello_.sequence, 0, rate_hz,
                                  wire::kLedSlow},
                 packet);
   }
-  if (readings == 0 || now_us - beat_us_ < kBeatUs) return 0;
+  if (is_silent || readings == 0 || now_us - beat_us_ < kBeatUs) return 0;
   beat_us_ = now_us;
   return sign(wire::Heartbeat{device_id_, hello_.boot_nonce, kSession, ++sequence_, newest_.sequence,
                               now_us - heard_us_, wire::kLedOn},

@@ -12,6 +12,8 @@ class SmallBox {
   void hear(const uint8_t* data, uint16_t count, uint32_t now_us);
   uint8_t answer(uint8_t (&packet)[wire::kLargest], uint32_t now_us);  // 0: nothing is due
 
+  uint8_t rate_hz = 50;    // of the next assignment
+  bool is_silent = false;  // sends no heartbeats
   uint32_t hellos = 0, readings = 0;
   uint32_t refused = 0;  // wrong length, tag, session or order
   uint32_t lost = 0;     // gaps in the readings' sequence
