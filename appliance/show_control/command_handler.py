@@ -25,6 +25,7 @@ from appliance.show_control.command import (
     command,
 )
 from appliance.show_control.fallback import COMMAND_FAILED, LIVE_PARTIAL, LIVE_REFUSED
+from appliance.show_control.figure_datagram import DATAGRAM, is_figure
 from appliance.show_control.key_file import KeyFile
 from appliance.show_control.live_input import LiveInput, is_live
 from appliance.show_control.names_of_show import joint_name
@@ -85,7 +86,7 @@ class CommandHandler:
     def handle_datagram(self, received: bytes, asker: Address, now: float) -> None:
         """Carry out what one datagram asks for; never raises, whatever it is."""
         try:
-            messages = messages_in(received)
+            messages = [(DATAGRAM, [received])] if is_figure(received) else messages_in(received)
         except ValueError as error:
             self._reply(asker, "", False, str(error))
             return

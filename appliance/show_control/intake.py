@@ -12,7 +12,9 @@ WAITING, URGENT_WAITING, LIVE_WAITING = 256, 4096, 1024  # datagrams; then the o
 WAITING_BYTES = 4 << 20  # for each kind
 _LOOKED_AT = 1024  # datagrams at most before one has its turn: 5 ms
 _IN_BUNDLE = re.compile(b"(?:%s)\0" % "|".join(URGENT).encode())
-_LIVE = re.compile(b"(?:#bundle\0.{12})*/(?:VMC|mocap/0)/", re.DOTALL)  # 12: a time tag, the first one's size
+_LIVE = re.compile(  # 12: a time tag, the first one's size; MXTP and head: Xsens MVN and mocopi
+    b"(?:#bundle\0.{12})*/(?:VMC|mocap/0)/|MXTP|[^/].{3}head", re.DOTALL
+)
 
 Datagram = tuple[bytes, Address]
 

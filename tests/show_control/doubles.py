@@ -98,9 +98,10 @@ class StageDouble:
         self.remark = ""
         self._show_state = ShowStateReader(folder)
         self._telling = threading.Lock()
-        self._writer = FrameWriter(folder, show or facts())
+        show = show or facts()
+        self._writer = FrameWriter(folder, show)
         self._inbox = OrderInbox(folder, "stage")
-        self._frame = JointFrame(len(FIGURE))
+        self._frame = JointFrame(len(show.skeleton))
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._live, daemon=True)
 

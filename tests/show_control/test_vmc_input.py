@@ -18,6 +18,7 @@ from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.receivers import OscOutputs
 from appliance.pose import quaternion
 from appliance.show.osc import OscConfig
+from appliance.show_control.figure_pose import FigurePose
 from appliance.show_control.vmc_input import BONE, ROOT, VmcInput
 from hw_sim.osc_receiver import OscReceiver, Received
 from tests.outputs.conftest import fill
@@ -91,7 +92,7 @@ def test_the_boxs_own_vmc_comes_back_as_the_same_dance(
 def test_known_movements_come_with_the_boxs_signs(
     bone: str, unity: Sequence[float], joint: str, ours: Sequence[float]
 ) -> None:
-    vmc = VmcInput(FIGURE)
+    vmc = VmcInput(FigurePose(FIGURE))
     vmc.hear(BONE, [bone, 0, 0, 0, *unity])
     whole = vmc.hear(BONE, [bone, 0, 0, 0, *unity])
     assert whole is not None
@@ -101,7 +102,7 @@ def test_known_movements_come_with_the_boxs_signs(
 
 
 def test_the_root_carries_the_hips_and_may_say_more() -> None:
-    vmc = VmcInput(FIGURE)
+    vmc = VmcInput(FigurePose(FIGURE))
     quarter = (0, HALF, 0, HALF)  # in Unity: +Z goes to +X, which is the dancer's right
     vmc.hear(ROOT, ["root", 1, 0, 2, *quarter, 1, 1, 1, 0, 0, 0])
     vmc.hear(BONE, ["Hips", 0, 0.9, 1, *REST])
@@ -121,7 +122,7 @@ def frame(vmc: VmcInput, *bones: str) -> np.ndarray:
 
 
 def test_a_bone_that_this_figure_lacks_says_nothing() -> None:
-    vmc = VmcInput(FIGURE)
+    vmc = VmcInput(FigurePose(FIGURE))
     for _ in range(3):
         assert vmc.hear(BONE, ["Spine", 0, 0, 0, *REST]) is None  # it has a chest only
     assert not vmc.known
@@ -130,12 +131,12 @@ def test_a_bone_that_this_figure_lacks_says_nothing() -> None:
 def test_a_joint_between_two_bones_comes_with_the_lower_one() -> None:
     between = replace(FIGURE, names=("Hips", "Twist", "lShldr", "lForeArm", *FIGURE.names[4:]))
     for bones, joints in ((("Hips",), {0}), (("Hips", "LeftUpperArm"), {0, 1, 2})):
-        pose = frame(VmcInput(between), *bones)
+        pose = frame(VmcInput(FigurePose(between)), *bones)
         assert set(np.flatnonzero(np.isfinite(pose).all(axis=1))) == joints
 
 
 def test_a_bone_that_is_sent_as_nothing_but_zeros_does_not_come() -> None:
-    vmc = VmcInput(FIGURE)
+    vmc = VmcInput(FigurePose(FIGURE))
     for _ in range(3):
         vmc.hear(BONE, ["LeftUpperArm", 0, 0, 0, 0, 0, 0, 0])
         whole = vmc.hear(BONE, ["Hips", 0, 0, 0, *REST])
@@ -143,7 +144,7 @@ def test_a_bone_that_is_sent_as_nothing_but_zeros_does_not_come() -> None:
 
 
 def test_a_bone_that_is_lost_once_is_not_missing() -> None:
-    vmc = VmcInput(FIGURE)
+    vmc = VmcInput(FigurePose(FIGURE))
     frame(vmc, "Hips", "Chest", "LeftUpperArm")
     for bone in ("Hips", "LeftUpperArm", "Hips"):
         whole = vmc.hear(BONE, [bone, 0, 0, 0, *REST])
@@ -154,11 +155,11 @@ def test_a_bone_that_is_lost_once_is_not_missing() -> None:
 
 
 def test_names_from_outside_never_stay_in_memory() -> None:
-    vmc = VmcInput(FIGURE)
+    vmc = VmcInput(FigurePose(FIGURE))
     for number in range(10_000):
         vmc.hear(BONE, [f"Bone{number}", 0, 0, 0, *REST])
     assert not vmc.known
-    assert sum(map(len, (vmc._came, vmc._whole, vmc._joint_of))) < 60
+    assert sum(map(len, (vmc._came, vmc._whole, vmc._turns))) < 60
 
 
 @pytest.mark.parametrize(
@@ -173,22 +174,22 @@ def test_names_from_outside_never_stay_in_memory() -> None:
 )
 def test_numbers_that_no_figure_has_are_refused(address: str, arguments: list[object]) -> None:
     with pytest.raises(ValueError, match=r"farther than 1000 m|length 1"):
-        VmcInput(FIGURE).hear(address, arguments)
+        VmcInput(FigurePose(FIGURE)).hear(address, arguments)
 
 
 def test_the_place_of_a_bone_that_does_not_count_may_be_anything() -> None:
-    VmcInput(FIGURE).hear(BONE, ["Chest", 1e39, 0, 0, *REST])
+    VmcInput(FigurePose(FIGURE)).hear(BONE, ["Chest", 1e39, 0, 0, *REST])
 
 
 def test_without_hips_the_place_is_unknown() -> None:
-    vmc = VmcInput(FIGURE)
+    vmc = VmcInput(FigurePose(FIGURE))
     vmc.hear(BONE, ["LeftUpperArm", 0, 0, 0, *REST])
     whole = vmc.hear(BONE, ["LeftUpperArm", 0, 0, 0, *REST])
     assert whole is not None and np.isnan(whole[0]).all()
 
 
 def test_a_frame_comes_once_as_soon_as_its_last_bone_has_come() -> None:
-    vmc, bones = VmcInput(FIGURE), ["Hips", "Chest", "LeftUpperArm"]
+    vmc, bones = VmcInput(FigurePose(FIGURE)), ["Hips", "Chest", "LeftUpperArm"]
     poses = [[vmc.hear(BONE, [bone, 0, 0, 0, *REST]) for bone in bones] for _ in range(4)]
     came = [[pose is not None for pose in frame] for frame in poses]
     assert came == [[False] * 3, [True, False, True], [False, False, True], [False, False, True]]
