@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import json
 import struct
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 _HEAD = struct.Struct("<I")  # bytes of the JSON; the arrays follow it
 _ARRAY, _TUPLE, _REST = "\0array", "\0tuple", "\0rest"  # keys that no state has
-_known: dict[type, tuple[str, ...]] = {}  # all fields of a class
 _PLAIN = frozenset((int, float, str, bool, type(None)))
 
 
@@ -33,16 +33,16 @@ def restore(one: Any, data: bytes) -> None:
 
 
 def _plain(value: Any, arrays: list[bytes]) -> Any:
-    kind = type(value)
+    kind: Any = type(value)
     if kind in _PLAIN:
         return value
     if kind is np.ndarray:
         arrays.append(value.tobytes())
-        return {_ARRAY: [value.dtype.str, value.shape]}
+        return {_ARRAY: [_form(value.dtype), value.shape]}
     if kind is list:
-        return [_plain(each, arrays) for each in value]
+        return [each if type(each) in _PLAIN else _plain(each, arrays) for each in value]
     if kind is tuple:
-        return {_TUPLE: [_plain(each, arrays) for each in value]}
+        return {_TUPLE: [each if type(each) in _PLAIN else _plain(each, arrays) for each in value]}
     if kind is dict:
         return {name: _plain(each, arrays) for name, each in value.items()}
     if _has_state(kind):
@@ -76,7 +76,7 @@ def unpacked(data: bytes) -> Any:
 
 def _restored(now: Any, value: Any) -> Any:
     """The value to set where `now` stands; `now` itself where it was restored in place."""
-    kind = type(now)
+    kind: Any = type(now)
     if kind is np.ndarray:
         now[...] = value
     elif _has_state(kind):
@@ -91,18 +91,24 @@ def _restored(now: Any, value: Any) -> Any:
     elif kind in (list, tuple) and now and _has_state(type(now[0])):
         for one, state in zip(now, value, strict=True):
             _restored(one, state)
+    elif kind is dict and any(_has_state(type(one)) for one in now.values()):
+        for name, one in now.items():
+            _restored(one, value[name])
     else:
         return value
     return now
 
 
-def _has_state(kind: type) -> bool:
+def _has_state(kind: Any) -> bool:
     return bool(_fields(kind)) or hasattr(kind, "state")
 
 
+@cache
 def _fields(kind: type) -> tuple[str, ...]:
-    fields = _known.get(kind)
-    if fields is None:
-        named = (vars(one).get("SNAPSHOT", ()) for one in reversed(kind.__mro__))
-        fields = _known[kind] = tuple(name for names in named for name in names)
-    return fields
+    named = (vars(one).get("SNAPSHOT", ()) for one in reversed(kind.__mro__))
+    return tuple(name for names in named for name in names)
+
+
+@cache
+def _form(kind: np.dtype[Any]) -> str:
+    return kind.str  # numpy works it out anew each time: more than a microsecond

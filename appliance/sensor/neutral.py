@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +62,8 @@ class Mounting:
 class Stillness:
     """Whether a sensor stays within 3 degrees of where it was; time is an argument, in seconds."""
 
+    SNAPSHOT = ("_anchor", "_since", "_heard")
+
     def __init__(self) -> None:
         self._anchor: Quaternion = (
             0.0,
@@ -84,15 +85,6 @@ class Stillness:
         if cosine < _STILL_COSINE or now - self._heard > _GAP_S:
             self._anchor, self._since = orientation, now
         self._heard = now
-
-    def state(self) -> tuple[Quaternion, float, float]:
-        """Its state, for `restore`."""
-        return self._anchor, self._since, self._heard
-
-    def restore(self, state: Sequence[Any]) -> None:
-        """Continue from a state."""
-        (w, x, y, z), self._since, self._heard = state
-        self._anchor = (w, x, y, z)
 
     def restart(self) -> None:
         """Start again: earlier readings no longer count."""

@@ -25,10 +25,20 @@ class WornHand:
         self.pose = pose
         self.joint.wear(joint_from_reading(pose, self.mounting))
 
+    def state(self) -> tuple[Any, ...]:
+        """The pose as a plain value, for `restore`."""
+        return astuple(self.pose)
+
+    def restore(self, state: tuple[Any, ...]) -> None:
+        """Be worn as the one was that gave this state."""
+        self.pose = NeutralPose(*state)
+
 
 @dataclass(slots=True)
 class SensorBinding:
     """One sensor on a dancer: its joints, its newest reading, the stillness that it needs yet (0: none)."""
+
+    SNAPSHOT = ("hands", "stillness", "reading", "needs_still_s", "waits_until")
 
     name: str
     hands: list[WornHand]
@@ -37,23 +47,9 @@ class SensorBinding:
     needs_still_s: float = 0.0
     waits_until: float = math.inf
 
-    def state(self) -> dict[str, Any]:
-        """For `restore`: plain values."""
-        return {
-            "poses": [astuple(hand.pose) for hand in self.hands],
-            "stillness": self.stillness.state(),
-            "reading": self.reading,
-            "needs_still_s": self.needs_still_s,
-            "waits_until": self.waits_until,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state; the joints' matrices are the hands' to restore."""
-        for hand, ((w, x, y, z), heading, boot_nonce) in zip(self.hands, state["poses"], strict=True):
-            hand.pose = NeutralPose((w, x, y, z), heading, boot_nonce)
-        self.stillness.restore(state["stillness"])
-        self.reading = restored_reading(state["reading"])
-        self.needs_still_s, self.waits_until = state["needs_still_s"], state["waits_until"]
+    def settle(self) -> None:
+        """A restored reading is one again; the joints' matrices are the hands' to restore."""
+        self.reading = restored_reading(self.reading)
 
     def has_pose_of(self, boot_nonce: int) -> bool:
         """Whether all poses hold for the readings of that power-on."""

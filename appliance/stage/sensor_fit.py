@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any
 
 from appliance.sensor.link import SensorReading
 from appliance.sensor.neutral import (
@@ -33,6 +32,8 @@ class SensorFit:
     asked for. A wearable that is back within a minute, or whose IMU restarted, keeps the pose: its heading is
     lost, and carried over from where the joint was. Another wearable under the same name does not.
     """
+
+    SNAPSHOT = ("_wearers", "_news")
 
     def __init__(self, parts: StageParts, memory: SensorMemory, say: Callable[[str], None]) -> None:
         self._link = parts.link
@@ -126,19 +127,13 @@ class SensorFit:
             return "taken"
         return "assumed" if any(hand.pose.boot_nonce == NO_BOOT for hand in wearer.hands) else "kept"
 
-    def state(self) -> dict[str, Any]:
-        """How the sensors are worn, for `restore`: plain values."""
-        return {name: wearer.state() for name, wearer in self._wearers.items()} | {"": self._news[:]}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state; the matrices of the joints are the hands' to restore."""
+    def settle(self) -> None:
+        """The link knows which restored sensors wait for their neutral pose."""
         for name, wearer in self._wearers.items():
-            wearer.restore(state[name])
             if wearer.needs_still_s:
                 self._link.wants_neutral.add(name)
             else:
                 self._link.wants_neutral.discard(name)
-        self._news[:] = state[""]
 
     def _meet(self, wearer: SensorBinding, reading: SensorReading) -> None:
         """The first reading of this run: after a restart of only the box, its pose holds still."""

@@ -208,7 +208,7 @@ def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(
     (_, asked, _), (_, reset, words) = evening.inbox.answers
     assert (asked, reset) == (True, False)  # the reading is of before both stops, and by now too old
     assert "heard at this moment" in words
-    waits_until = evening.stage.wearing.state()["left-wrist"]["waits_until"]
+    waits_until = evening.stage.wearing._wearers["left-wrist"].waits_until
     assert waits_until == pytest.approx(began + 0.3 + 3.0)
 
 
