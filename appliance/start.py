@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def wishes_to_play(given: Sequence[str]) -> Wishes | None:
-    """What the arguments of a plain `play` wish, by their names; None where the whole parser must look."""
+    """The options of a plain `play`, by their names; None where the whole parser must look."""
     if not given or given[0] != "play":
         return None
     wishes: Wishes = {}

@@ -9,7 +9,7 @@ from appliance.body.surface import surface_of
 from appliance.body.volumes import sampled
 from appliance.pose.skeleton import Skeleton
 
-SPACING = 0.0065  # of the height between samples: about 14,000 vertices for a figure with fingers
+SPACING = 0.0065  # share of the height between samples: about 14,000 vertices for a figure with fingers
 
 
 def body_mesh(skeleton: Skeleton) -> BodyMesh:

@@ -15,8 +15,8 @@ _CRANIUM = ((-0.018, 0.010), (0.012, 0.004), (0.052, 0.049), (0.000, 0.000))
 _JAW = ((0.006, -0.014), (0.032, -0.064), (0.040, 0.018), (0.002, 0.005))
 _RIDGE = ((0.048, 0.014), (0.059, -0.020), (0.006, 0.008), (0.000, 0.000))
 _FACE_AT, _FACE_TURNED = 0.050, 0.42  # the two halves of the face: how far before the middle, how turned
-PALM = 0.3  # of the fingers belongs to the palm: else they are claws
-CLOSED = 0.5  # of the fingers' spread at rest is taken away
+PALM = 0.3  # share of the fingers that belongs to the palm; with less they are claws
+CLOSED = 0.5  # share of the fingers' spread at rest that is taken away
 THUMB_AWAY = 0.3  # metres aside for each metre from its base: else it is lost beside the palm
 _REACH = 0.115  # from the head joint to the crown, where the skeleton does not say
 

@@ -11,8 +11,8 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.t_pose import aimed
 
-CROWDED_SHARE = 0.3  # of a limb's points that lie in another part of the body
-CLEARANCE = 0.01  # of the height, between the surfaces of two limbs
+CROWDED_SHARE = 0.3  # share of a limb's points that may be inside another part of the body
+CLEARANCE = 0.01  # gap between the surfaces of two limbs, as a share of the height
 _UP = np.array([0.0, 1.0, 0.0])
 _DOWNWARDS = 0.35  # how steeply feet point to the floor
 
@@ -31,7 +31,7 @@ def anatomy_of(skeleton: Skeleton) -> Anatomy:
 
 
 def is_crowded(anatomy: Anatomy) -> bool:
-    """Whether a limb lies in another limb or in the trunk for a good part of its length."""
+    """Whether a good part of a limb is inside another limb or the trunk."""
     chains = [anatomy.chain(first) for _, first in anatomy.limbs()]
     beyond = [chain[anatomy.limb_start(chain) + 1 :] for chain in chains]
     spine = [*anatomy.trunk, *anatomy.neck]

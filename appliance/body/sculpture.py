@@ -119,7 +119,7 @@ def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
     first, last = anatomy.thickness(joint), anatomy.thickness(child)
     belly = start + 0.32 * (end - start)
     if is_leg and anatomy.reach[child] < 0.5 * anatomy.reach[joint]:
-        belly = belly - 0.010 * anatomy.height * anatomy.forward  # the calf lies behind the bone
+        belly = belly - 0.010 * anatomy.height * anatomy.forward  # the calf is behind the bone
     first = 0.9 * first if is_leg else first
     full = (first + 0.32 * (last - first)) * (1.18 if is_leg else 1.12)
     return [
@@ -129,7 +129,7 @@ def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
 
 
 def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bool) -> list[Slab]:
-    """What joins a limb to the trunk: shoulder girdle and chest muscle, or hip and seat."""
+    """The parts that join a limb to the trunk: shoulder girdle and chest muscle, or hip and seat."""
     places, height = anatomy.positions, anatomy.height
     start = places[chain[-1]]
     thick = anatomy.thickness(chain[-1])

@@ -60,7 +60,7 @@ def weights_of(
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Which joints move each vertex, (V, 4), and how much, (V, 4), strongest first.
 
-    The owner of the nearest volume, softened along the surface alone: a hanging hand does not move the thigh
+    The owner of the nearest volume, softened only along the surface: a hanging hand does not move the thigh
     next to it. Softened far between the parts of the body, little within a part (hand and fingers).
     faces: as `surface_of` gives them.
     """

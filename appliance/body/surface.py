@@ -76,7 +76,7 @@ def _codes(inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
 
 
 def _is_doubtful(code: int) -> bool:
-    """Whether corners inside, or those outside, hang together by a diagonal alone, in the cell or a face."""
+    """Whether corners inside, or those outside, hang together only by a diagonal, in the cell or a face."""
     inside = [corner for corner in range(8) if code >> corner & 1]
     if not (_hangs_together(inside) and _hangs_together([c for c in range(8) if c not in inside])):
         return True

@@ -64,7 +64,7 @@ class Slab:
 
 @dataclass(frozen=True)
 class Cut:
-    """Takes away what lies beyond a plane through `point` whose `normal` points outwards, near `point` alone.
+    """Takes away what lies beyond a plane through `point` whose `normal` points outwards, only near `point`.
 
     reach: metres from the point along which it cuts; softness: over how many metres the edge is rounded.
     """
@@ -92,7 +92,7 @@ class Group:
 
     @property
     def movers(self) -> list[Slab]:
-        """What decides which joint moves which part; bones replace all slabs of the first bone's joint."""
+        """Volumes that decide which joint moves what; bones replace the slabs of the first bone's joint."""
         by_bones = self.bones[0].owner if self.bones else None
         return [*(slab for slab in self.slabs if slab.owner != by_bones), *self.bones]
 

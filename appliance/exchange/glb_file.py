@@ -107,7 +107,7 @@ class GlbFile:
             raise ValueError("an array is stored sparsely, which is not read")
         view = self.document["bufferViews"][accessor["bufferView"]]
         if view.get("buffer", 0) != 0 or "uri" in self.document["buffers"][0]:
-            raise ValueError("an array lies in another file")
+            raise ValueError("an array is in another file")
         form, shape = np.dtype(_TYPES[accessor["componentType"]]), _SHAPES[accessor["type"]]
         count, item = int(accessor["count"]), form.itemsize * int(np.prod(shape))
         start = int(view.get("byteOffset", 0)) + int(accessor.get("byteOffset", 0))

@@ -34,8 +34,8 @@ CHOICE_NOT_KEPT = Fallback(
 )
 KEPT_IN_MEMORY = Fallback(
     "kept-in-memory",
-    "What this box keeps is in memory: sensors' keys, neutral poses, shows from sticks and the journal are "
-    "gone at power-off. The audience sees nothing of it tonight. Give /data a partition of its own: bunraku "
+    "This box keeps its data in memory: sensors' keys, neutral poses, shows from sticks and the journal are "
+    "gone at power-off. The audience sees nothing of it tonight. Give /data a separate partition: bunraku "
     "doctor.",
     "What this box keeps is in memory, on {about}: sensors' keys, neutral poses, shows from sticks and the "
     "journal are gone at power-off. The audience sees nothing of it tonight. Give /data a partition of its "

@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
 
 
 _SEED = Parameter(
-    "Of its chance: another number, another dance. `/motion/again` counts on.", 1, 0, 999_999, True
+    "Its random seed: another number, another dance. `/motion/again` counts on.", 1, 0, 999_999, True
 )
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     VARY: {

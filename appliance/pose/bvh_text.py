@@ -191,7 +191,7 @@ def _read_hierarchy(lines: _Lines) -> tuple[list[BvhJoint], list[tuple[int, tupl
         elif key == "MOTION" and not open_joints and joints:
             return joints, ends
         elif key == "MOTION":
-            lines.fail("MOTION stands here, but the hierarchy is not complete: a closing brace is missing.")
+            lines.fail("MOTION is here, but the hierarchy is not complete: a closing brace is missing.")
         else:
             lines.fail(f"'{words[0][:40]}' is not expected here in the hierarchy.")
         if len(ends) > MAX_JOINTS:

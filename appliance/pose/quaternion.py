@@ -171,7 +171,7 @@ def to_euler_zxy(q: Array) -> Array:
 
 
 def aligned(q: Array, reference: Array) -> Array:
-    """The same rotations with signs chosen to lie in the reference's hemisphere."""
+    """The same rotations with signs that bring them into the reference's hemisphere."""
     return np.where(np.sum(q * reference, axis=-1, keepdims=True) < 0, -q, q)
 
 

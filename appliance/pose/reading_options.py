@@ -16,7 +16,7 @@ from appliance.pose.stage_frame import CENTIMETRE, Guess, Reading, in_stage_fram
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """What is known of recordings beyond their files, by pattern of their names, the first that fits counts.
+    """Facts about recordings beyond their files, by pattern of their names; the first that fits counts.
 
     metres_per_unit; up: 'y' or 'z'; facing: a key of FACINGS; root: a joint's name; all_frames: none is a
     capture error.
@@ -50,7 +50,7 @@ AS_THE_FILES_SAY = ReadingOptions()
 
 
 def _rest(known: Mapping[str, Any], first: ReadingOptions, name: str) -> dict[str, Any]:
-    """What is known by other patterns than those that come first."""
+    """The facts of the patterns below the first ones."""
     return {pattern: value for pattern, value in known.items() if pattern not in getattr(first, name)}
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from appliance.projector.picture.wall import DETAILS, Detail
 
 _SPARE = 0.45  # fraction of the display's period for drawing: cards, masks and other programs need the rest
-_TRIES = 2  # of which the faster one counts
+_TRIES = 2  # the faster one counts
 
 
 def affordable_detail(

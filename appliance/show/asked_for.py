@@ -33,7 +33,7 @@ def no_sound(box: Path | None) -> NotAskedForError:
 
 
 def no_wires(box: Path | None) -> NotAskedForError:
-    """What to say of this box file."""
+    """The sentence about this box file."""
     cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
     return _not_asked_for(box, "No wire leads to the lights.", cure)
 

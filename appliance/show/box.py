@@ -70,6 +70,11 @@ class SensorsConfig(Section):
         "20; it needs more battery, and Wi-Fi that carries it.",
         50,
     )
+    heading: Literal["auto", "button"] = key(
+        "auto: drift of the sensors' headings is estimated while they dance, and taken out slowly; button: "
+        "only a neutral pose or a heading reset corrects it.",
+        "auto",
+    )
     light: bool = key(
         "A short flash of a sensor's lamp every 3 seconds shows that it is linked; false: it stays "
         "dark on stage. Signals that ask for something are still shown.",
@@ -92,9 +97,9 @@ def out_of_reach(sensors: SensorsConfig) -> str | None:
     udp = sensors.udp
     if udp is not None and udp.host == "0.0.0.0":
         return None
-    where = "to no network" if udp is None else f"on {udp.host} alone, and their hello is a broadcast"
+    where = "to no network" if udp is None else f"on {udp.host} only, and their hello is a broadcast"
     if udp is not None and udp.host.startswith("127."):
-        where = "to this machine alone"
+        where = "to this machine only"
     port = udp.port if udp is not None and udp.port else UdpConfig().port
     return (
         f"No wearable on Wi-Fi reaches the box: it listens {where}. "
@@ -115,7 +120,7 @@ class OutputsConfig(Section):
     @classmethod
     def _each_receiver_once(cls, receivers: list[OscConfig]) -> list[OscConfig]:
         seen = [(receiver.host, receiver.port, receiver.dialect) for receiver in receivers]
-        refuse_repeats(seen, "This receiver stands here twice.", "Remove one, or change its port.")
+        refuse_repeats(seen, "This receiver is listed twice.", "Remove one, or change its port.")
         return receivers
 
 

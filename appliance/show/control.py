@@ -72,7 +72,7 @@ class ControlConfig(Section):
         if self.host.startswith("127.") and unheard:
             raise refusal(
                 f"{unheard[0].removesuffix('/32')} may command the box, but commands are heard on "
-                f"{self.host}: from this machine alone.",
+                f"{self.host}: from this machine only.",
                 "Write `host: 0.0.0.0` beside `senders`, or this machine's address in that network.",
                 at="senders",
             )

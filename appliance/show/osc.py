@@ -116,7 +116,7 @@ class OscConfig(Section):
     @field_validator("messages", "joints")
     @classmethod
     def _each_once(cls, names: list[str]) -> list[str]:
-        refuse_repeats(names, "'{value}' stands here twice.", "Remove one.")
+        refuse_repeats(names, "'{value}' is listed twice.", "Remove one.")
         return names
 
     @model_validator(mode="after")

@@ -50,7 +50,7 @@ class PosiStageNetConfig(Section):
     @field_validator("joints")
     @classmethod
     def _each_joint_once(cls, joints: list[str]) -> list[str]:
-        refuse_repeats(joints, "The joint '{value}' stands here twice.", "Remove one.")
+        refuse_repeats(joints, "The joint '{value}' is listed twice.", "Remove one.")
         return joints
 
 

@@ -63,7 +63,7 @@ def _words(model: type[Section], location: Location, error: ErrorDetails) -> tup
 
 def _complaint(error: ErrorDetails, field: FieldInfo | None) -> str:
     if error["type"] in ("too_long", "too_short", "string_too_long", "string_too_short"):
-        return "of a wrong length"
+        return "too short or too long"
     if error["type"].startswith(("greater", "less", "finite")):
         return "out of range"
     wanted = (

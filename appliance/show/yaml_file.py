@@ -143,7 +143,7 @@ class _Plain:
                 first = self._file.line((*location, key))
                 self._problem(
                     key_node,
-                    f"The key '{shortened(key)}' stands here twice (first on line {first}).",
+                    f"The key '{shortened(key)}' is here twice (first on line {first}).",
                     "Remove one.",
                 )
                 continue

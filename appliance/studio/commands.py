@@ -1,4 +1,4 @@
-"""The studio's commands, from a dancer's recordings to a show; those with a module of their own join last.
+"""The studio's commands, from a dancer's recordings to a show; those in separate modules join last.
 
 Only this module loads with the command line; what needs torch is imported by the command that runs.
 """
@@ -42,7 +42,7 @@ class NetworkName(StrEnum):
 
 
 class ModelName(StrEnum):
-    """What to train, by its name in models.MODELS."""
+    """The model to train, by its name in models.MODELS."""
 
     puppet = "puppet"
     pose = "pose"

@@ -31,7 +31,7 @@ def granular(
     ] = 1.2,
     speed: Annotated[
         float,
-        typer.Option(min=0.01, max=25.0, help="Of a walk: how often a second the dance changes, at most."),
+        typer.Option(min=0.01, max=25.0, help="Most changes a second in a walk."),
     ] = 1.0,
     hop: Annotated[int, typer.Option(min=1, help="Ticks of 20 ms from one window to the next.")] = 1,
     samples: Annotated[
@@ -55,7 +55,7 @@ def granular(
     *,
     reading: ReadingOptions,
 ) -> None:
-    """Make an endless phrase out of a dancer's latents alone: Granular Dance.
+    """Make an endless phrase from only a dancer's latents: Granular Dance.
 
     A walk through the prior (or samples, with --samples), the path between two takes, or the network fed with
     what it danced before. The phrase plays in a show as any other.

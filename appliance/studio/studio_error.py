@@ -4,4 +4,4 @@ from __future__ import annotations
 
 
 class StudioError(ValueError):
-    """What happened and what to do; the command prints it as one message and ends with status 2."""
+    """A sentence with the cause and the cure; the command prints it as one message and ends with status 2."""

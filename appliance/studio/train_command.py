@@ -124,7 +124,7 @@ def _finish(
             console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
         if isinstance(training, ImproviserTraining):
             _export_improviser(training, checkpoint, console)
-        console.print(f"{checkpoint} is ready. What it is for: {USES[settings.model]}.")
+        console.print(f"{checkpoint} is ready. Its use: {USES[settings.model]}.")
     elif training.settings.window != WINDOW:
         console.print(
             f"{checkpoint} dances by itself: bunraku granular {shlex.quote(str(checkpoint))} --out "

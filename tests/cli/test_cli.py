@@ -168,7 +168,7 @@ def test_without_a_sensors_key_check_refuses_and_play_dances(
 @pytest.mark.parametrize(
     ("udp", "said"),
     [
-        ("{host: 127.0.0.1, port: 0}", "it listens to this machine alone"),
+        ("{host: 127.0.0.1, port: 0}", "it listens to this machine only"),
         ("{host: 0.0.0.0, port: 0}", ""),
         ("null", "it listens to no network"),
     ],

@@ -163,7 +163,7 @@ def test_the_profiles_that_come_along_are_sound(name: str) -> None:
         ("channels: [pan]\n    chanels: 1", "Did you mean 'channels'?"),
         ("channels: [pan]\nattributes:\n  - {name: pna}", "Did you mean 'pan'?"),
         ("channels: [pan]\nattributes:\n  - {name: pan, limits: [9, 3]}", "no room between its ends"),
-        ("channels: []", "of a wrong length"),
+        ("channels: []", "too short or too long"),
     ],
 )
 def test_a_faulty_profile_is_named_with_its_line(tmp_path: Path, change: str, words: str) -> None:

@@ -218,7 +218,7 @@ def box_file(folder: Path, text: str) -> Path:
     ("text", "line", "message"),
     [
         ("    - {hosts: 10.0.0.1}", 3, "Did you mean 'host'?"),
-        ("    - joints:\n        - head\n        - head", 5, "The joint 'head' stands here twice."),
+        ("    - joints:\n        - head\n        - head", 5, "The joint 'head' is listed twice."),
         ("    - axes: [x, z, z]", 3, "Each of x, y and z is needed once."),
         ("    - axes: [x, up, z]", 3, ""),
         ("    - {every: 0}", 3, ""),

@@ -159,7 +159,7 @@ def test_a_key_beside_the_program_counts_more(tmp_path: Path) -> None:
         ("{dialect: vmc, scale: 100}", "'scale' belongs to the dialect ai-toolbox"),
         ("{dialect: joint, program: classifier}", "'program' belongs to the dialect ai-toolbox"),
         ("{axes: [x, x, y]}", "Each of x, y and z is needed once"),
-        ("{messages: [pos_world, pos_world]}", "stands here twice"),
+        ("{messages: [pos_world, pos_world]}", "is listed twice"),
         ("{prefix: mocap}", "prefix"),
         ("{program: clasifier}", "classifier"),
     ],

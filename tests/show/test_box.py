@@ -69,7 +69,7 @@ def test_everything_can_be_said(tmp_path: Path) -> None:
         ("outputs:\n  osc:\n    - dialect: vcm", 3, ["not one of ai-toolbox, joint, vmc", "mean 'vmc'?"]),
         ("outputs:\n  osc:\n    - host: touch.local", 3, ["'touch.local' is not an IPv4", "192.168.0.20"]),
         ("outputs:\n  osc:\n    - host: 300.1.1.1", 3, ["is not an IPv4 address"]),
-        ("outputs: {osc: [{port: 1},\n {port: 1}]}", 2, ["stands here twice"]),
+        ("outputs: {osc: [{port: 1},\n {port: 1}]}", 2, ["is listed twice"]),
         ("limits: {tick_budget_ms: 19}", 1, ["Write 0.5 to 18."]),
         ("realtime:\n  priority: 100", 2, ["Write 1 to 99."]),
         ("phase_lock: 1", 1, ["which is not true or false"]),

@@ -161,7 +161,7 @@ def test_iterations_that_do_not_fit_this_machine_are_reported_beforehand(
         ("\n    quiet: ../phrase.bvh", 4, ["is not inside the show's folder"]),
         ("\n    quiet: 5", 4, ["'motion.phrases.quiet' is 5"]),
         ("[quiet.bvh]", 3, ["is a list of 1, which is not a group of names, each with text"]),
-        ("\n    quiet: phrase.bvh\n    quiet: phrase.bvh", 5, ["'quiet' stands here twice"]),
+        ("\n    quiet: phrase.bvh\n    quiet: phrase.bvh", 5, ["'quiet' is here twice"]),
     ],
 )
 def test_a_fault_in_the_phrases_is_named_with_its_line(

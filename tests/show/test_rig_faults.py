@@ -120,7 +120,7 @@ def test_a_fault_of_the_rig_is_named_with_its_line(
         (
             "port: 9002",
             "senders: [10.0.0.5]",
-            ["10.0.0.5 may command", "this machine alone", "`host: 0.0.0.0`"],
+            ["10.0.0.5 may command", "this machine only", "`host: 0.0.0.0`"],
         ),
         ("port: 9002", "port: 9750", ["Commands and sensors cannot both arrive on port 9750"]),
     ],

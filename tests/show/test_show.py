@@ -149,7 +149,7 @@ FAULTS = [
     ("springs:\n  - {name: a, arms: {mass: 0}}", 3, ["out of range", "Write 0.05 to 50."]),
     ("cues:\n  - {name: a, springs: loose}", 3, ["no setting of springs 'loose'", "Remove `springs`"]),
     ("hands: {sensor: a, joint: hip}", 2, ["'hands' is a group of keys, which is not a list"]),
-    ("name: again", 2, ["'name' stands here twice (first on line 1)"]),
+    ("name: again", 2, ["'name' is here twice (first on line 1)"]),
     ("motion: {rate: 1", 2, ["not YAML", "behind the '{' on this line, up to line 3", "Close it"]),
     ("motion: {rate: 1; start_s: 1}", 2, ["behind the '{' on this line.", "commas between its parts"]),
     ("motion:\n\trate: 1", 3, ["This is not YAML: this line has a tab. Put spaces in its place."]),

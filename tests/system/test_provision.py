@@ -87,7 +87,7 @@ def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: P
         said = provision(bench, "--name", "left-wrist", "--box", str(box.box_file))
         assert "The running box took it. The box knows 1 sensor now." in said
         assert f"looks for its box on '{NETWORK}'" in said
-        assert "listens to this machine alone" in said
+        assert "listens to this machine only" in said
         bench.pull_out()
         box.frame_that(lambda frame: frame[2] > 0)
         sensor = await_state(box, "left-wrist", "linked")

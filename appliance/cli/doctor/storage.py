@@ -59,7 +59,7 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
         return wrong(
             what,
             f"{folder} is in memory ({disk.kind}), not on a disk: {_LOST} are gone at power-off.",
-            "Give /data a partition of its own, and keep a read-only root's overlay off it "
+            "Give /data a separate partition, and keep a read-only root's overlay off it "
             "(`overlayroot=tmpfs:recurse=0` in the kernel's command line). Until then provision the sensors "
             "again after each power-on.",
         )
@@ -152,8 +152,8 @@ def system_partition(host: HostView) -> Iterator[Finding]:
         yield better(
             "system",
             "Its partition is writable: a power cut may damage it.",
-            "For a tour: the image (`make image`), or a read-only root with an overlay, once /data has a "
-            "partition of its own.",
+            "For a tour: the image (`make image`), or a read-only root with an overlay, once /data is a "
+            "separate partition.",
         )
 
 

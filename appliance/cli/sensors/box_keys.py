@@ -94,7 +94,7 @@ def forgotten(keys: Path) -> str:
     memory = memory_of(keys.parent)
     return memory and (
         f"{keys} is in memory, on {memory}: this change is gone at power-off, and the box is a stranger to "
-        "its sensors then. Give /data a partition of its own: bunraku doctor."
+        "its sensors then. Give /data a separate partition: bunraku doctor."
     )
 
 

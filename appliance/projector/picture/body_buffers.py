@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from appliance.body.skinning import BodyMesh
 from appliance.projector.picture.vertices import layout, packed
 
-COARSE = 0.02  # of the figure's height: vertices closer than this are merged for shadows
-OCCLUDER = 0.03  # of the figure's height: size of the points that shade each other
+COARSE = 0.02  # share of the figure's height: vertices closer than this are merged for shadows
+OCCLUDER = 0.03  # share of the figure's height: size of the points that shade each other
 SMOOTHINGS = 6
-REACH = 0.22  # of the figure's height: points further away cast no shade
+REACH = 0.22  # share of the figure's height: points further away cast no shade
 
 Floats = NDArray[np.float32]
 PARTS = ("position", "normal", "joints", "weights")

@@ -11,7 +11,7 @@ from PIL import Image as Files
 
 Image = NDArray[np.uint8]
 MOST_PIXELS = 64_000_000  # in a file: more would hold up the projector's start
-LINES = 1080  # of the texture at most
+LINES = 1080  # most lines of a texture
 
 
 def read_image(path: Path | str, lines: int = LINES) -> Image:

@@ -22,7 +22,7 @@ Floats = NDArray[np.float32]
 class Poses:
     """Where the joints were: row 0 now, row i ROW_S * i seconds ago; in figure heights, the floor at y = 0.
 
-    positions: (ROWS, J, 3); world: (ROWS, J, 4). Of several figures the joints stand one behind the other.
+    positions: (ROWS, J, 3); world: (ROWS, J, 4). The joints of several figures follow each other.
     """
 
     positions: Floats

@@ -83,7 +83,7 @@ class Scene:
 
     @property
     def share_of_picture(self) -> float:
-        """Of the picture's height that a figure height takes where the dancer is."""
+        """Share of the picture's height that a figure height takes where the dancer is."""
         return 0.5 / (self.view.slopes[1] * self.distance)
 
     def box(self, rows: int = 1, margin: float = 0.0) -> Box:
@@ -101,7 +101,7 @@ class Scene:
 
 
 class _FigureTextures:
-    """What one figure does, on the GPU."""
+    """The pose of one figure, on the GPU."""
 
     def __init__(self, ctx: moderngl.Context, mesh: BodyMesh, joints: int) -> None:
         self.poses, self.holds = PoseTexture(ctx, mesh, joints), HoldTexture(ctx, joints)
@@ -138,7 +138,7 @@ class Easel:
         self._sheets: dict[tuple[str, ...], Drawing] = {}
 
     def show(self, poses: Sequence[Poses], holds: Sequence[Floats | None]) -> None:
-        """What the figures of the next picture do, at least one."""
+        """The poses of the next picture's figures, at least one."""
         self._shown = len(poses)
         while len(self._figures) < self._shown:
             self._figures.append(_FigureTextures(self.ctx, self._mesh, len(self.skeleton)))

@@ -77,7 +77,7 @@ class Feed:
         return self._process is None or self._process.poll() is not None
 
     def _asked(self) -> bytes:
-        """What it said since the last picture: that it lives, and whether it wants one."""
+        """Its messages since the last picture: it is alive, and it wants one or not."""
         assert self._process is not None and self._process.stdout is not None
         try:
             return os.read(self._process.stdout.fileno(), 64)

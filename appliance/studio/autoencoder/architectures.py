@@ -16,7 +16,7 @@ NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {
     "lstm384": (Lstm, {"latent": 256, "width": 384, "depth": 3}),
     "dense64": (Dense, {"latent": 32, "width": 64, "depth": 2}),
 }
-MOST_CURVES = 32  # of 128 poses: all that is slower than 6 Hz
+MOST_CURVES = 32  # for 128 poses: everything slower than 6 Hz
 
 
 def build(

@@ -31,7 +31,7 @@ PLACE_WIDTH = 192
 LONGEST_STEP = 0.5  # metres that one interaction asks of a joint at most
 SMALLEST_SPREAD = 0.02  # metres; of the places of a joint that hardly moves
 CALM = 0.6  # share of the residual that liveliness 0 keeps: as calm as the answers of release 0.1
-BODY = 1.2  # of the body's share of a difference vector, added to it: what the hand encoder leaves out
+BODY = 1.2  # gain of the body's share of a difference vector, which the hand encoder leaves out
 LEARNED_BODY = 0.6  # the same in training: the critic works against the whole of it (docs/results.md)
 NOISE = 0.25  # standard deviations of a latent, at liveliness 1
 

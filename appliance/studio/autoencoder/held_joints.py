@@ -8,7 +8,7 @@ Values = TypeVar("Values")  # torch tensors or numpy arrays
 
 
 class HeldJoints(NamedTuple, Generic[Values]):
-    """Of M joints in windows of T poses.
+    """For M joints in windows of T poses.
 
     mask (M,): which are held; targets (B, T, M, 4): one orientation for each pose of each window; weights
     (M,), 0 to 1: how firmly. For all windows alike: targets (T, M, 4); a different hold for each: weights

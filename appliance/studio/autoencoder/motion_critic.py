@@ -25,16 +25,16 @@ from appliance.studio.autoencoder.answers import held_weights
 from appliance.studio.autoencoder.coupled import matrix_of_products
 from appliance.studio.data.dataset import Dataset
 
-WINDOWS, HOP = 12, 2  # of a sequence: one every second tick
+WINDOWS, HOP = 12, 2  # windows in a sequence, one every second tick
 PENALTY_EVERY, PENALTY = 4, 0.06
 # Standard deviations for poses, speeds, accelerations: no numerical fingerprint counts.
 _NOISE = (0.06, 0.3, 0.5)
 _MOST = 8.0
-_FEWEST_SHARE, _MOST_SHARE = 0.2, 0.35  # of the batches: with 2 passes, with the most
+_FEWEST_SHARE, _MOST_SHARE = 0.2, 0.35  # shares of the batches with 2 passes and with the most
 _WANDERING = ("pool", "age", "end")
 _POOL, _WANDER = 64, 100  # sequences that are coded over and over, and passes at most
 _CARRIED = 4096  # ticks extrapolated at a time
-_HAND = 6.0  # of a difference of rotation matrices between joint and hand
+_HAND = 6.0  # scale of a difference of rotation matrices between joint and hand
 
 
 class Sequence(NamedTuple):

@@ -33,7 +33,7 @@ PLACED = 64  # windows of a step from which the place encoder learns
 HAND_PACE = 2.0  # factor on the hand encoder's learning rate: it follows answers, not only the critic
 SAMPLED_SEQUENCES = 500  # to measure how the dancer moves
 _NO_LONGER_SETTINGS = ("betas",)  # in older checkpoints; nothing read it
-SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
+SHORTEST_REACH = 0.04  # share of the longest reach that a joint without a bone below it counts as
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,9 @@ class Settings:
     mirror: bool = True
     critic_every: int = 2  # steps; the prior moves slowly
     sequences: int = 20  # dances that the motion critic sees in a step; 0: there is no critic
-    passes: int = 10  # of them at most, the last one without hands
-    free_sequences: float = 0.4  # of them without a hand: half of these wander, coded again and again
-    alive_from: float = 0.25  # of the training, when the network begins to follow the motion critic
+    passes: int = 10  # at most; the last pass has no hands
+    free_sequences: float = 0.4  # share without a hand; half of these wander, coded again and again
+    alive_from: float = 0.25  # share of the training after which the network follows the motion critic
     motion_learning_rate: float = 4e-4
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
     answers: AnswerSettings = field(default_factory=AnswerSettings)
@@ -407,7 +407,7 @@ class Training(TrainingLoop[Report]):
     def _own_windows(self, mirror: bool) -> tuple[Tensor, Tensor]:
         """Those of the training windows that are no mirror images, and the numbers of their takes (N,).
 
-        Of few takes each is counted as several, so that a window is answered by what it is not part of.
+        Each of a few takes is counted as several, so that a window is answered by what it is not part of.
         """
         settings, takes = self.settings, self.dataset.training
         counts = [len(window_starts(take, settings.hop, settings.window)) for take in takes]

@@ -106,7 +106,7 @@ def load_dataset(
         if not take.recording.skeleton.same_joints(skeleton):
             raise DatasetError(
                 f"{file.name} has another skeleton than {files[0].name}. Train one dancer on one skeleton: "
-                "move the file to a folder of its own."
+                "move the file to another folder."
             )
     moving = moving_joints(takes)
     if len(moving) < 2:

@@ -24,7 +24,7 @@ from appliance.pose.skeleton import Skeleton
 
 UNEQUAL = 0.03  # fraction of the body's span: tolerance between the two sides (a dancer's head sits 5 mm off)
 OPPOSITE_DEGREES = 120.0  # a joint usually this far from its counterpart's image has other axes
-NEAR_AXES_DEGREES = 25.0  # of the mean pose of a dance from a symmetric one
+NEAR_AXES_DEGREES = 25.0  # between the mean pose of a dance and a symmetric one
 _PRIOR = 1e-4  # how much the usual pose weighs against the bones
 _LEAST_BONE_M = 1e-3
 _SAMPLES = 500  # poses of which a mean is taken

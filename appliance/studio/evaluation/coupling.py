@@ -15,8 +15,8 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 
 EVERY = 6  # ticks between the poses that are compared
-LAGS = np.arange(-3, 4)  # of those: up to 0.36 s before and after
-AWAY = 8  # of those, 1 s: a shift from which on two motions count as unrelated
+LAGS = np.arange(-3, 4)  # in hops: up to 0.36 s before and after
+AWAY = 8  # in hops, 1 s: a shift from which on two motions count as unrelated
 SHIFTS = 24  # so many of them, evenly
 LEAST_POSES = 4 * AWAY
 

@@ -12,7 +12,7 @@ from appliance.studio.data.dataset import FPS, WINDOW, Dataset, DatasetError, Ta
 from appliance.studio.inspection import doubts, zero_pose
 
 MASKED_PICTURE = "pictures/masked.png"
-FEW_S = 120.0  # of sound dance to learn from
+FEW_S = 120.0  # a dance shorter than this teaches little
 _ENOUGH = f"{FEW_S / 60:g} minutes of dance are enough to begin with, ten for a stage"
 
 
@@ -64,7 +64,7 @@ def require_windows(dataset: Dataset, least: int, window: int = WINDOW) -> None:
 
 def _kept_apart(dataset: Dataset) -> str:
     if not dataset.held_out:
-        return "Nothing is kept apart: one short take alone is here, so what is learned cannot be measured."
+        return "Nothing is kept apart: there is only one short take, so the learning cannot be measured."
     held = ", ".join(sorted(take.name for take in dataset.held_out))
     alone = {take.take for take in dataset.training} & {take.take for take in dataset.held_out}
     how = "the end of the only take" if alone else "by take"
@@ -128,8 +128,8 @@ def _masked(takes: Sequence[Take]) -> list[str]:
     return [
         f"Masked as capture errors: {total:,} of {frames:,} frames ({100 * total / frames:.1f} %) in "
         f"{counted(len(worst), 'recording')}: {named}.",
-        f"{MASKED_PICTURE} shows the worst. What is no error: --keep '{worst[0].file}', or keep: with its "
-        "seconds in catalogue.yaml.",
+        f"{MASKED_PICTURE} shows the worst. To keep one: --keep '{worst[0].file}', or keep: with its seconds "
+        "in catalogue.yaml.",
     ]
 
 

@@ -26,7 +26,7 @@ def draw_claims(
 ) -> Path:
     """excerpts: their strip, a PNG. For each network a table: claims by excerpts, green where they hold.
 
-    nulls: the claims of networks that know nothing; each row tells which of them pass.
+    nulls: the claims of networks that know nothing; each row marks those that pass.
     """
     import matplotlib.image
 

@@ -21,8 +21,8 @@ from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.evaluation.coders import Poses
 
 PULL = 0.3  # fraction of the way to the mean pose in each pass
-LATENT = 32  # of the untrained network
-SPREAD_DEGREES = 20.0  # of its output about the mean pose: as far as a dancer's joints go
+LATENT = 32  # size of the untrained latent
+SPREAD_DEGREES = 20.0  # spread of its output about the mean pose: as far as a dancer's joints go
 
 
 class NullNetwork(ABC):
@@ -114,7 +114,7 @@ class Untrained(NullNetwork):
     def __init__(self, joints: Sequence[str], mean: Array, seed: int = 0) -> None:
         super().__init__(joints, mean)
         random, count = np.random.default_rng(seed), 4 * len(self.joints)
-        spread = np.radians(SPREAD_DEGREES) / 2  # of a quaternion's components
+        spread = np.radians(SPREAD_DEGREES) / 2  # standard deviation of a quaternion's components
         self._encoder = random.normal(0, 1 / spread / np.sqrt(count), (count, LATENT)).astype(np.float32)
         self._decoder = random.normal(0, spread / np.sqrt(LATENT), (LATENT, count)).astype(np.float32)
 

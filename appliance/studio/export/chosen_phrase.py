@@ -15,7 +15,7 @@ from appliance.studio.improviser.stretches import best_stretches
 LONGEST_S, SHORTEST_S = 60.0, 10.0
 CHOICE = 0.6  # fraction of the longest stretch: the rest is room to choose in
 FINALISTS = 4
-COMPARED_S = 1200.0  # of recordings; comparing all poses with each other grows with the square
+COMPARED_S = 1200.0  # longest recordings; comparing all poses with each other grows with the square
 _SPARE_S = 0.5
 
 

@@ -75,7 +75,7 @@ def coder_nodes(graph: Graph, layers: Layers, autoencoder: Autoencoder) -> tuple
     encoder, decoder = network.encoder, network.decoder
     if not isinstance(encoder, networks.MlpEncoder) or not isinstance(decoder, networks.MlpDecoder):
         raise StudioError(
-            "The box's sources of motion take networks of the kind mlp alone: train the model with its "
+            "The box's sources of motion take only networks of the kind mlp: train the model with its "
             "default network."
         )
     basis = graph.constant("curves", encoder.time.curves.numpy())

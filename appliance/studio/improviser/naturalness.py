@@ -16,7 +16,7 @@ from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.improviser.pace import Pace, mean_pace, mean_speed, pace
 from appliance.studio.standing import Standing, measure_standing
 
-EVERY_S = 0.2  # of poses that are compared with each other
+EVERY_S = 0.2  # between two poses that are compared
 SECOND_S = 1.0  # length of the stretches that are searched for in the recordings
 
 
@@ -59,7 +59,7 @@ class Naturalness:
     penetration_cm: float
     worst_penetration_cm: float
     stage_m: tuple[float, float]  # how wide and how deep the root's path is
-    seam: Seam | None  # of an endless phrase
+    seam: Seam | None  # where an endless phrase begins anew
 
     def as_json(self) -> dict[str, object]:
         return asdict(self)

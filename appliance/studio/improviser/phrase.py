@@ -39,7 +39,7 @@ class PhraseOptions:
     seed: int = 1
     temperature: float = 1.2
     dances: int = 16
-    minutes: float = 4.0  # of each dance
+    minutes: float = 4.0  # length of each dance
     finalists: int = 4
     settling: int = 250  # iterations of gradient descent that plant the feet
 

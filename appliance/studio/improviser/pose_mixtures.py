@@ -111,6 +111,6 @@ class PoseImproviser:
 
 
 def shape_for(poses: Tensor, variance: float, sizes: dict[str, int]) -> PoseMixturesShape:
-    """Of a network for features (N, M * 4 + 4)."""
+    """For a network with features (N, M * 4 + 4)."""
     latent = poses.shape[1] - ROOT
     return PoseMixturesShape(latent, kept_of(poses[:, :latent], variance), ROOT, **sizes)

@@ -23,7 +23,7 @@ from appliance.studio.improviser.steps import WindowCoder
 from appliance.studio.standing_dance import standing
 from appliance.studio.studio_error import StudioError
 
-KNOWN = 5  # of the prompt's steps that ours decodes again, for the motion that is faded over
+KNOWN = 5  # the prompt's last steps, decoded again by this network so that the motion can be faded over
 AROUND_S = 0.3  # on either side of the join, where a seam would show
 
 

@@ -12,8 +12,8 @@ from appliance.pose.recording import Recording
 from appliance.studio.improviser.naturalness import Yardstick, distances, figure_shapes
 
 EVERY = 4  # frames; ends are looked for at each of these
-STARTS_EVERY = 2  # of them
-SHORTEST, LONGEST = 0.9, 1.1  # of the wanted length
+STARTS_EVERY = 2  # in poses
+SHORTEST, LONGEST = 0.9, 1.1  # share of the wanted length
 PACE_S = 0.1  # a joint's speed counts in distances as its displacement in this time
 APART_S = 5.0  # finalists from one dance begin at least this far apart
 ENDS_EACH = 2  # ends that are considered for each start

@@ -10,7 +10,7 @@ from appliance.pose.foreign_file import opened
 from appliance.pose.quaternion import Array
 from appliance.studio.studio_error import StudioError
 
-UNITS = 100.0  # of map.svg for one of the map; its y points down
+UNITS = 100.0  # units of map.svg for one unit of the map; its y points down
 STEPS = 400  # points of a drawn curve
 LARGEST = 5_000_000  # bytes
 

@@ -31,7 +31,7 @@ from appliance.studio.variations.variations import encode_phrase, sampled, varie
 
 SIGMAS = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
 WINDOWS, SEEDS = 16, 2
-COLUMNS = 8  # of the picture
+COLUMNS = 8  # pictures in a row
 ACTIVE = 0.1  # standard deviation of a number's mean over the recordings: it says something about them
 
 

@@ -19,8 +19,8 @@ from appliance.show.look import LookConfig
 ECHOES = 5
 STROKES, BRUSH = 12, 0.026  # how many points of the body hold a brush, and how wide it is in figure heights
 WET = 180  # lines of the picture in which ink spreads
-PAPER_LINES = 400  # of the sheet, which is made once
-SPILL = 0.07  # of the picture's height that ink reaches beyond the figure: brush, spreading and pull
+PAPER_LINES = 400  # lines of the sheet, which is made once
+SPILL = 0.07  # share of the picture's height that ink reaches beyond the figure: brush, spreading and pull
 PULL = 0.016  # fraction of the picture's height: how far fibres pull the ink
 
 
