@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -48,7 +50,8 @@ def walk_through(
     from appliance.release.installed_box import pair_here
 
     show, box = pair_here(show, box)
-    walk_rig(show, box, fixture or [], attribute, seconds)
+    with _named_options():
+        walk_rig(show, box, fixture or [], attribute, seconds)
 
 
 @lights.command("show")
@@ -62,7 +65,8 @@ def show_rig(
     """Print the patch as a table and draw the rig: fixtures, dancer, where the heads point."""
     from appliance.lights.rig_sheet import print_rig
 
-    print_rig(show, box, out, mapping, at)
+    with _named_options():
+        print_rig(show, box, out, mapping, at)
 
 
 @lights.command()
@@ -76,3 +80,14 @@ def convert(
     from appliance.fixture_library.convert import convert_file
 
     convert_file(fixture, out)
+
+
+@contextlib.contextmanager
+def _named_options() -> Iterator[None]:
+    """A name that the rig does not have is told as the option's fault."""
+    from appliance.lights.unknown_name import UnknownNameError
+
+    try:
+        yield
+    except UnknownNameError as error:
+        raise typer.BadParameter(str(error), param_hint=error.option) from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import typer
 from rich.console import Console
 from rich.table import Table
 
@@ -14,6 +13,7 @@ from appliance.lights.patch import Patch
 from appliance.lights.phrase_run import passes
 from appliance.lights.plan import draw_plan
 from appliance.lights.run import rig_problems, say
+from appliance.lights.unknown_name import UnknownNameError
 from appliance.pictures.filmstrip import MissingPicturesError
 from appliance.pose.bvh import read_bvh
 from appliance.pose.counted import counted
@@ -33,7 +33,7 @@ def print_rig(
 ) -> None:
     """Print the table and the warnings, and draw the picture.
 
-    Raises ConfigError for a rig that cannot hang like this, typer.BadParameter for an unknown mapping.
+    Raises ConfigError for a rig that cannot hang like this, UnknownNameError for an unknown mapping.
     """
     show, box = load_show(directory or default_show_path()), load_box(box_file)
     problems = rig_problems(show, box)
@@ -42,7 +42,7 @@ def print_rig(
         raise ConfigError(problems)
     if mapping is not None and mapping not in names:
         words = f"The show has no mapping '{mapping}'. {did_you_mean(mapping, names)}"
-        raise typer.BadParameter(words, param_hint="--mapping")
+        raise UnknownNameError("--mapping", words)
     config = at_venue(show.config.lights, box.lights)
     Console().print(_table(config, show, box))
     for sentence in unwired(show, box):

@@ -5,14 +5,12 @@ from __future__ import annotations
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NoReturn
-
-import typer
 
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.stop_signals import stop_signals
 from appliance.lights.patch import Patch
 from appliance.lights.run import require_wires, rig_here, say, wired
+from appliance.lights.unknown_name import UnknownNameError
 from appliance.lights.walk import steps, walk
 from appliance.show.box import load_box
 from appliance.show.bundle import default_show_path
@@ -27,7 +25,7 @@ def walk_rig(
 ) -> None:
     """Take every step, then send zeros.
 
-    Raises ConfigError, typer.BadParameter for unknown names, or AlreadyHereError while the lights run.
+    Raises ConfigError, UnknownNameError, or AlreadyHereError while the lights run.
     """
     show, box = load_show(directory or default_show_path()), load_box(box_file)
     require_wires(box)
@@ -58,16 +56,16 @@ def walk_rig(
 
 
 def _require_known(show: Show, fixtures: list[str], attribute: str | None) -> None:
-    """Raises typer.BadParameter for names that the rig does not have."""
+    """Raises UnknownNameError for names that the rig does not have."""
     rig = show.config.lights.fixtures
     names = [fixture.name for fixture in rig]
     for name in fixtures:
         if name not in names:
-            _refuse("--fixture", f"The show has no fixture '{name}'. {did_you_mean(name, names)}")
+            raise UnknownNameError(
+                "--fixture", f"The show has no fixture '{name}'. {did_you_mean(name, names)}"
+            )
     known = sorted({word for fixture in rig for word in drivable(fixture, show.directory)})
     if attribute is not None and attribute not in known:
-        _refuse("--attribute", f"No fixture has '{attribute}'. {did_you_mean(attribute, known)}")
-
-
-def _refuse(option: str, words: str) -> NoReturn:
-    raise typer.BadParameter(words, param_hint=option)
+        raise UnknownNameError(
+            "--attribute", f"No fixture has '{attribute}'. {did_you_mean(attribute, known)}"
+        )
