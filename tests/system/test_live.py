@@ -15,6 +15,7 @@ from pythonosc.udp_client import SimpleUDPClient
 
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose import quaternion
+from appliance.pose.point_layouts import LAYOUTS
 from hw_sim.peers import HOST
 from tests.bundles import FIGURE, write_show
 from tests.show_control.doubles import PATIENCE_S, Asker
@@ -36,11 +37,29 @@ def streaming(control: int, radians: float, rate: float = 60.0) -> Iterator[None
     """A program that sends a dancer with a bent elbow, as the AI-Toolbox programs do."""
     pose = np.tile(quaternion.IDENTITY.astype(float), (len(FIGURE), 1))
     pose[ELBOW] = quaternion.from_axis_angle([0.0, 0.0, 1.0], radians)
+    with sending(control, "/mocap/0/joint/rot_local", pose.ravel().tolist(), rate):
+        yield
+
+
+def points_of(radians: float) -> list[float]:
+    """COCO's 17 points of a person with spread arms and a bent left elbow; its face points to +Z."""
+    places = {"shoulder": (0.2, 1.4, 0.0), "elbow": (0.5, 1.4, 0.0), "wrist": (0.8, 1.4, 0.0)}
+    places |= {"hip": (0.1, 0.9, 0.0), "knee": (0.1, 0.5, 0.02), "ankle": (0.1, 0.1, 0.0)}
+    places |= {"eye": (0.03, 1.65, 0.1), "ear": (0.07, 1.63, 0.0)}
+    bent = (0.5 + 0.3 * np.cos(radians), 1.4 + 0.3 * np.sin(radians), 0.0)
+    points = {"nose": (0.0, 1.6, 0.12), **{f"left {part}": place for part, place in places.items()}}
+    points |= {f"right {part}": (-x, y, z) for part, (x, y, z) in places.items()}
+    points["left wrist"] = bent
+    return [float(number) for part in LAYOUTS["coco"].parts for number in points[part]]
+
+
+@contextlib.contextmanager
+def sending(control: int, address: str, numbers: list[float], rate: float = 30.0) -> Iterator[None]:
     client, is_over = SimpleUDPClient(HOST, control), threading.Event()
 
     def send() -> None:
         while not is_over.wait(1 / rate):
-            client.send_message("/mocap/0/joint/rot_local", pose.ravel().tolist())
+            client.send_message(address, numbers)
 
     thread = threading.Thread(target=send, daemon=True)
     thread.start()
@@ -88,6 +107,22 @@ def test_a_live_dancer_comes_falls_silent_comes_back_and_goes(show: Path, tmp_pa
             await_elbow(box, reader, 0.4)  # the stage starts again with its guest
             assert desk.order("/phrase", "main", 0.2)[2] == 1
             await_elbow(box, reader, 0.0)
+        assert box.end() == 0
+    assert "Traceback" not in box.words
+
+
+def test_a_camera_programs_points_move_the_figure(show: Path, tmp_path: Path) -> None:
+    with (
+        playing(show, tmp_path) as box,
+        closing(Asker(box.control)) as desk,
+        closing(FrameReader(box.runtime)) as reader,
+    ):
+        box.frames(1)
+        with sending(box.control, "/mocap/0/joint/pos_world", points_of(0.8)):
+            wait_until(lambda: "COCO's 17 points" in desk.status().live, lambda: box.words)
+            assert desk.order("/phrase", "live", 0.2)[2] == 1
+            await_elbow(box, reader, 0.8)
+        await_elbow(box, reader, 0.0)  # silent: the phrase plays on
         assert box.end() == 0
     assert "Traceback" not in box.words
 
