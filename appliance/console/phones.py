@@ -321,7 +321,7 @@ def _object(text: str) -> dict[str, Any] | None:
 
 
 def _numbers(given: object, most: float) -> tuple[float, ...]:
-    """The numbers of a list; () where any is none, or is farther from zero than this."""
+    """The numbers of a list; () where it holds anything else, or one farther from zero than this."""
     if not isinstance(given, list):
         return ()
     found = tuple(one for one in given if type(one) in (int, float) and abs(one) <= most)

@@ -67,6 +67,7 @@ class Server:
                 web.get("/status", self._status),
                 web.get("/metrics", self._metrics),
                 web.get("/watch", self._watch),
+                web.get("/frame", self._frame),
                 web.get("/api/show", self._show),
                 web.get("/api/me", self._me),
                 web.get("/api/box", self._about.serve),
@@ -92,6 +93,10 @@ class Server:
     async def _watch(self, request: web.Request) -> web.StreamResponse:
         is_known = self._guard.device(request) is not None
         return await self._watchers.serve(request, self._box.words, peer(request), is_known)
+
+    async def _frame(self, request: web.Request) -> web.Response:
+        frame = self._watchers.polled("ghost" in request.query)
+        return web.Response(body=frame, content_type="application/octet-stream")
 
     async def _show(self, request: web.Request) -> web.Response:
         return web.json_response({**self._stage.facts, "generation": self._stage.generation})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import socket
 import time
 from collections import Counter
@@ -17,6 +18,7 @@ MOST = 64
 LONGEST_MESSAGE = 64  # bytes; what a browser says here is whether it wants frames
 _SEND_BUFFER = 16384  # bytes in the kernel: frames that wait there are old when a slow browser gets them
 _QUIET_S = 10.0  # a browser that answers no ping for this long is gone
+_POLLED_S = 1.0  # frames are read for so long after a browser asked for one
 _FEW = 8  # browsers that get each frame; with more of them each gets every second one
 
 
@@ -51,6 +53,7 @@ class Watchers:
 
     def __init__(self) -> None:
         self._watchers: dict[_Watcher, web.WebSocketResponse] = {}
+        self._polled, self._polled_until = (b"", b""), -math.inf
 
     def __len__(self) -> int:
         return len(self._watchers)
@@ -58,7 +61,7 @@ class Watchers:
     @property
     def frames_wanted(self) -> bool:
         """Whether any browser shows the dance."""
-        return any(one.wants_frames for one in self._watchers)
+        return any(one.wants_frames for one in self._watchers) or time.monotonic() < self._polled_until
 
     @property
     def every(self) -> int:
@@ -73,10 +76,16 @@ class Watchers:
 
     def put_frame(self, frame: bytes, with_ghost: bytes) -> None:
         """The same for those that show the dance, alone or beside what it starts from."""
+        self._polled = frame, with_ghost
         for one in self._watchers:
             if one.wants_frames:
                 one.frame = with_ghost if one.wants_ghost else frame
                 one.ready.set()
+
+    def polled(self, with_ghost: bool) -> bytes:
+        """The newest frame, for a browser that has no WebSocket and asks for each; empty before the first."""
+        self._polled_until = time.monotonic() + _POLLED_S
+        return self._polled[with_ghost]
 
     async def serve(
         self, request: web.Request, words: str, address: str, is_known: bool

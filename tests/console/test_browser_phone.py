@@ -14,7 +14,7 @@ from playwright.sync_api import Page as Tab
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose import quaternion
 from tests.bundles import FIGURE, WORN, write_show
-from tests.console.browser import PATIENCE_MS, PHONE, await_true, press, unlock
+from tests.console.browser import PATIENCE_MS, PHONE, await_box, await_true, observe, press, unlock
 from tests.console.page import Page, box_with_page
 from tests.system.box import Box
 from tests.system.processes import run_bunraku, wait_until
@@ -159,6 +159,19 @@ def test_the_technician_s_page_shows_a_code_that_a_phone_reads(context: BrowserC
     await_true(tab, "document.querySelector('#phone-qr path')?.getAttribute('d').length > 1000")
     address = tab.locator("#phone-address").inner_text()
     assert f"/phone#{NAME}=" in address and "127.0.0.1" not in address, "no phone reaches that"
+
+
+def test_without_a_websocket_the_page_asks_for_words_and_frames(
+    context: BrowserContext, stage: Stage
+) -> None:
+    tab = context.new_page()
+    tab.add_init_script(NO_SOCKETS)
+    tab.goto(stage[1].origin)
+    await_box(tab)
+    observe(tab)
+    press(tab, '[data-page="dance"]')
+    await_true(tab, "seen.frames > 20")
+    expect(tab.locator("body")).not_to_have_class("silent")
 
 
 def test_a_phone_that_sends_nonsense_is_counted_and_holds_nothing(stage: Stage) -> None:

@@ -65,6 +65,7 @@ function say(sentence) { byId("phone-said").textContent = sentence; }
 
 // iOS asks the user, and only within a tap: this comes before anything that waits.
 async function isAllowed() {
+  /** @type {any[]} */
   const kinds = [globalThis.DeviceOrientationEvent, globalThis.DeviceMotionEvent];
   const asking = kinds.filter((kind) => typeof kind?.requestPermission === "function").map((kind) => kind.requestPermission());
   try {
