@@ -25,3 +25,5 @@ class RosterLine(NamedTuple):
     imu_id: str
     neutral: str  # taken, wanted, kept, assumed; empty: no hand of the show
     complaint: str
+    corrected: float = 0.0  # degrees of drift that were taken out of the heading since it was set
+    battery_left_s: float = UNKNOWN_S

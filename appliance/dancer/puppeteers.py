@@ -116,6 +116,15 @@ class WornSensor(Puppeteer):
             np.matmul(joint_from_reading, self._reading, out=self._local)
             self._lead(TAKE_S)
 
+    def adjust(self, joint_from_reading: NDArray[np.float32]) -> None:
+        """Use a matrix that differs by less than can be seen: the target is not led."""
+        self._joint_from_reading = joint_from_reading
+
+    @property
+    def local(self) -> FloatArray:
+        """The joint's orientation by the newest reading, (4,); overwritten by the next."""
+        return self._local
+
     def take_reading(self, orientation: Sequence[float] | FloatArray, arrival: float) -> None:
         """Take a reading (unit quaternion w, x, y, z) that arrived at this time."""
         self._reading[:] = orientation

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
+from appliance.sensor.heading_drift import HeadingDrift
 from appliance.sensor.link import SensorReading
 from appliance.sensor.neutral import (
     NO_BOOT,
@@ -15,14 +16,15 @@ from appliance.sensor.neutral import (
     with_heading_reset,
 )
 from appliance.show.config_error import did_you_mean
-from appliance.stage.sensor_binding import SensorBinding, WornHand, upright
+from appliance.stage.sensor_binding import FRESH_S, SensorBinding, WornHand, upright
+from appliance.stage.sensor_habits import habit_of
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts
 
 ASKED_STILL_S = 0.5  # seconds of stillness are enough for a neutral pose that was asked for
 ASKED_WITHIN_S = 3.0
 CARRIED_WITHIN_S = 60.0  # a sensor that comes back later may have changed hands
-FRESH_S = 0.5  # an older reading does not tell how the dancer stands
+_KEPT_DEGREES = 1.0  # a heading that was corrected by more is remembered
 
 
 class SensorFit:
@@ -31,19 +33,24 @@ class SensorFit:
     One neutral pose is taken by itself at each power-on, when the dancer stands still; after that only when
     asked for. A wearable that is back within a minute, or whose IMU restarted, keeps the pose: its heading is
     lost, and carried over from where the joint was. Another wearable under the same name does not.
+    While the dancer dances, drift of the heading is estimated and taken out, slowly (HeadingDrift).
     """
 
-    SNAPSHOT = ("_wearers", "_news")
+    SNAPSHOT = ("_wearers", "_news", "corrects_heading")
 
-    def __init__(self, parts: StageParts, memory: SensorMemory, say: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        parts: StageParts,
+        memory: SensorMemory,
+        say: Callable[[str], None],
+        corrects_heading: bool = True,
+    ) -> None:
         self._link = parts.link
         self._memory = memory
         self._say = say
         self._news: list[str] = []
-        self._wearers = {
-            name: SensorBinding(name, list(map(WornHand, joints, parts.mountings[name])))
-            for name, joints in parts.worn.items()
-        }
+        self.corrects_heading = corrects_heading
+        self._wearers = {name: _binding(parts, name) for name in parts.worn}
         for wearer in self._wearers.values():
             for hand in wearer.hands:
                 kept = memory.neutral(wearer.name, hand.joint.joint)
@@ -59,6 +66,7 @@ class SensorFit:
             self._meet(wearer, reading)
         elif reading.wearable != before.wearable:  # it hangs otherwise
             wearer.stillness.restart()
+            wearer.drift.restart()
             self._ask_for_stillness(wearer)
         elif reading.boot_nonce != before.boot_nonce or reading.recoveries != before.recoveries:
             self._meet_again(wearer, before, reading)
@@ -68,8 +76,12 @@ class SensorFit:
         wearer.stillness.add_reading(reading.orientation, reading.arrival)
 
     def look(self, now: float) -> None:
-        """After the frame: take the neutral pose of each sensor that is at rest, and report it."""
+        """After the frame: take the neutral pose of each sensor that is at rest, and report it; correct the
+        headings of the others.
+        """
         for wearer in self._wearers.values():
+            if self.corrects_heading and wearer.correct_heading(now):
+                self._keep_corrected(wearer)
             if wearer.needs_still_s and wearer.stillness.still_s >= wearer.needs_still_s:
                 self._take(wearer)
             elif now > wearer.waits_until:
@@ -113,6 +125,7 @@ class SensorFit:
                 )
                 continue
             self._wear(wearer, [pose for pose in poses if pose is not None])
+            wearer.drift.take_front()
             self._news.append(f"Sensor {wearer.name}: this is the front now. Dance.")
         return bool(asked)
 
@@ -127,6 +140,11 @@ class SensorFit:
             return "taken"
         return "assumed" if any(hand.pose.boot_nonce == NO_BOOT for hand in wearer.hands) else "kept"
 
+    def corrected_of(self, sensor: str) -> float:
+        """Degrees of drift that were taken out of a sensor's heading since it was set; 0 for a stranger."""
+        wearer = self._wearers.get(sensor)
+        return 0.0 if wearer is None else wearer.drift.corrected
+
     def settle(self) -> None:
         """The link knows which restored sensors wait for their neutral pose."""
         for name, wearer in self._wearers.items():
@@ -137,6 +155,7 @@ class SensorFit:
 
     def _meet(self, wearer: SensorBinding, reading: SensorReading) -> None:
         """The first reading of this run: after a restart of only the box, its pose holds still."""
+        wearer.drift.take_front()
         if wearer.has_pose_of(reading.boot_nonce):
             self._news.append(f"Sensor {wearer.name}: the neutral pose taken before is used on. Dance.")
         else:
@@ -145,6 +164,8 @@ class SensorFit:
     def _meet_again(self, wearer: SensorBinding, before: SensorReading, reading: SensorReading) -> None:
         """The sensor was switched on again, or its IMU restarted: its heading is another one."""
         wearer.stillness.restart()
+        wearer.drift.restart()
+        wearer.drift.take_front()
         is_known = wearer.has_pose_of(before.boot_nonce)
         if not is_known or reading.arrival - before.arrival > CARRIED_WITHIN_S:
             self._ask_for_stillness(wearer)
@@ -170,6 +191,7 @@ class SensorFit:
         self._settle(wearer)
         pose = NeutralPose(reading.orientation, 0.0, reading.boot_nonce)
         self._wear(wearer, [pose] * len(wearer.hands))
+        wearer.drift.take_neutral()
         self._news.append(f"Sensor {wearer.name}: neutral pose taken. Dance.")
         for hand in wearer.hands:
             _, axis = front(pose.orientation, hand.mounting.facing)
@@ -205,6 +227,13 @@ class SensorFit:
         if taken:
             self._memory.keep_neutral(wearer.name, taken)
 
+    def _keep_corrected(self, wearer: SensorBinding) -> None:
+        """Keep a corrected heading for the next start, once it has moved far enough."""
+        kept = self._memory.neutral(wearer.name, wearer.hands[0].joint.joint)
+        off = wearer.hands[0].pose.heading - (kept.heading if kept is not None else 0.0)
+        if abs(math.remainder(off, math.tau)) > math.radians(_KEPT_DEGREES):
+            self._memory.keep_neutral(wearer.name, {hand.joint.joint: hand.pose for hand in wearer.hands})
+
     def _asked(self, sensor: str | None, now: float) -> list[tuple[SensorBinding, SensorReading]]:
         """The sensors that a command means and that have a fresh reading; silent ones have no pose."""
         wearers = (self._wearers[name] for name in self.named(sensor))
@@ -213,3 +242,10 @@ class SensorFit:
             for wearer in wearers
             if wearer.reading is not None and now - wearer.reading.arrival <= FRESH_S
         ]
+
+
+def _binding(parts: StageParts, name: str) -> SensorBinding:
+    """A sensor of the show and its joints; the first one tells of drift."""
+    joints, mountings = parts.worn[name], parts.mountings[name]
+    drift = HeadingDrift(habit_of(parts, joints[0], mountings[0]), mountings[0].at_neutral)
+    return SensorBinding(name, list(map(WornHand, joints, mountings)), drift)

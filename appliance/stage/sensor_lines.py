@@ -8,9 +8,21 @@ from appliance.box.roster import UNKNOWN_S, RosterLine
 from appliance.sensor.link import SensorState
 
 
-def roster_lines(states: Sequence[SensorState], neutral_of: Callable[[str], str]) -> list[RosterLine]:
-    """A line for each; `neutral_of` gives the state of a sensor's neutral pose, in one word."""
-    return [_line(state, neutral_of(state.name)) for state in states]
+def roster_lines(
+    states: Sequence[SensorState],
+    neutral_of: Callable[[str], str],
+    corrected_of: Callable[[str], float] = lambda _: 0.0,
+    battery_left_s: Callable[[str], float] = lambda _: UNKNOWN_S,
+) -> list[RosterLine]:
+    """A line for each. By a sensor's name: the state of its neutral pose, in one word; degrees of drift taken
+    out of its heading; seconds that its battery lasts.
+    """
+    return [
+        _line(state, neutral_of(state.name))._replace(
+            corrected=corrected_of(state.name), battery_left_s=battery_left_s(state.name)
+        )
+        for state in states
+    ]
 
 
 def _line(state: SensorState, neutral: str) -> RosterLine:

@@ -31,11 +31,11 @@ def test_the_table_has_everything_that_the_box_knows(box: RunningBox, bunraku: C
     *first, heading, left, head, spare = out.splitlines()
     assert re.split(r"  +", heading.strip()) == [
         *("name", "state", "rate", "loss", "round trip", "age", "battery"),
-        *("calibration", "neutral", "firmware", "id", "way"),
+        *("calibration", "neutral", "heading", "firmware", "id", "way"),
     ]
     assert re.split(r"  +", left.strip()) == [
         *("left-wrist", "linked", "50 Hz", "1.2 %", "4.2 ms", "13 ms", "12 %"),
-        *("gyro 3 accel 2", "wanted", "1.0.0", "1a2b3c4d", "192.168.4.7:2390"),
+        *("gyro 3 accel 2", "wanted", "+0°", "1.0.0", "1a2b3c4d", "192.168.4.7:2390"),
     ]
     assert re.split(r"  +", head.strip())[:7] == ["head", "lost", "-", "-", "-", "3 min", "-"]
     assert "absent" in spare
@@ -52,6 +52,14 @@ def test_newer_wearables_tell_their_signal(tmp_path: Path, bunraku: Command) -> 
     (sensor,) = json.loads(out)["sensors"]
     assert (sensor["signal_dbm"], sensor["has_crystal"]) == (-70, True)
     box.close()
+
+
+def test_a_drift_taken_out_and_the_time_that_a_battery_lasts_are_shown() -> None:
+    (line,) = roster_lines([LEFT], lambda _: "taken", lambda _: -23.4, lambda _: 2700.0)
+    console = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
+    console.print(SensorTable([line]))
+    shown = console.export_text()
+    assert "-23°" in shown and "12 %, 45 min" in shown
 
 
 def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
@@ -83,12 +91,14 @@ def test_programs_get_values_and_nulls(box: RunningBox, bunraku: Command) -> Non
         "round_trip_s": 0.0042,
         "age_s": 0.013,
         "battery_percent": 12,
+        "battery_left_s": None,
         "calibration": {"system": 0, "gyro": 3, "accel": 2, "mag": 3},
         "has_profile": True,
         "fusion": "imuplus",
         "firmware": "1.0.0",
         "imu": "00112233445566778899aabbccddeeff",
         "neutral": "wanted",
+        "heading_corrected_degrees": 0.0,
         "complaint": None,
     }
     assert (head["round_trip_s"], head["age_s"], head["battery_percent"]) == (None, 192.0, None)

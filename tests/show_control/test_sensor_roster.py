@@ -18,7 +18,7 @@ def test_the_roster_is_told_as_the_stage_saw_it_last(
     texts = ["1.0.0", "00112233445566778899aabbccddeeff", "taken", ""]
     stage.tell(sensors=[line + texts], looked_at=time.monotonic() - 5.0)
     sensor, end = asker.ask_all("/sensors/list")
-    assert sensor == ["/sensors/sensor", *line, *texts]
+    assert sensor == ["/sensors/sensor", *line, *texts, 0.0, -1.0]
     assert end[:2] == ["/sensors/end", 1]
     assert 5.0 <= end[2] < 65.0
     assert end[3] == str(key_file)

@@ -56,6 +56,7 @@ class Stage:
         taps: int = 0,
         restarts: int = 0,
         wearable: int = 1,
+        flags: int = 0,
     ) -> None:
         """One tick with one reading."""
         self.now += TICK_S
@@ -64,6 +65,7 @@ class Stage:
             *(sensor, orientation, self.sequence, 0, self.now, self.now, 90, 255),
             *(boot, taps, restarts),
             wearable=wearable,
+            flags=flags,
         )
         self.take(reading)
 

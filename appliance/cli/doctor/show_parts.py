@@ -58,6 +58,8 @@ def _sensor(line: RosterLine) -> Finding:
         return wrong(what, f"{words.format(ago=ago)}: its joint moves freely.", cure)
     known = line.battery != BATTERY_UNKNOWN
     battery = f"its battery is at {line.battery} %" if known else "its battery is not known"
+    if known and line.battery_left_s >= 0:
+        battery += f" and lasts about {_duration(line.battery_left_s)} yet"
     words = f"It sends {line.rate_hz:.0f} readings a second; {100 * line.loss:.1f} % are lost; {battery}."
     if line.complaint:
         return better(what, f"{words} {line.complaint}", "See to that before the doors open.")

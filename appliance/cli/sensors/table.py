@@ -88,12 +88,14 @@ def plain_values(line: RosterLine) -> dict[str, object]:
         "round_trip_s": _seconds(line.round_trip_s),
         "age_s": _seconds(line.age_s),
         "battery_percent": None if line.battery == BATTERY_UNKNOWN else line.battery,
+        "battery_left_s": _seconds(line.battery_left_s),
         "calibration": _levels(line.calibration) if is_heard else None,
         "has_profile": bool(line.flags & HAS_PROFILE),
         "fusion": ("ndof" if line.flags & IS_NDOF else "imuplus") if is_heard else None,
         "firmware": line.firmware or None,
         "imu": line.imu_id or None,
         "neutral": line.neutral or None,
+        "heading_corrected_degrees": round(line.corrected, 2),
         "complaint": line.complaint or None,
     } | _told_by_newer(line)
 
@@ -151,7 +153,19 @@ def _age(line: RosterLine) -> Text:
 def _battery(line: RosterLine) -> Text:
     if line.battery == BATTERY_UNKNOWN:
         return _NONE
-    return Text(f"{line.battery} %", style="bold red" if line.battery < LOW_BATTERY else "")
+    left = "" if line.battery_left_s < 0 else f", {duration(line.battery_left_s)}"
+    return Text(f"{line.battery} %{left}", style="bold red" if line.battery < LOW_BATTERY else "")
+
+
+def duration(seconds: float) -> str:
+    """Time that is left, in minutes, or in hours and a half."""
+    minutes = seconds / 60.0
+    return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"
+
+
+def _corrected(line: RosterLine) -> Text:
+    """How much drift of its heading was taken out."""
+    return Text(f"{line.corrected:+.0f}°") if line.neutral else _NONE
 
 
 def _signal(line: RosterLine) -> Text:
@@ -190,6 +204,7 @@ _COLUMNS = (
     _SIGNAL,
     _Column("calibration", _calibration),
     _Column("neutral", lambda line: Text(line.neutral, style=_NEUTRAL_COLOURS.get(line.neutral, ""))),
+    _Column("heading", _corrected, "right"),
     _Column("firmware", lambda line: Text(line.firmware) if line.firmware else _NONE),
     _Column("id", lambda line: Text(line.device_id, style="dim")),
     _Column("way", lambda line: Text(line.way) if line.way else _NONE),

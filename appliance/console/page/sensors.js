@@ -50,7 +50,8 @@ function fill(card, sensor, words) {
   card.state.textContent = words(`sensor_${sensor.state}`) + ago;
   card.complaint.textContent = sensor.complaint;
   const grades = ["system", "gyro", "accel", "mag"].map((_, place) => (sensor.calibration >> (6 - 2 * place)) & 3);
-  const battery = sensor.battery === null ? words("unknown_value") : `${sensor.battery} %${sensor.heard ? "" : ` (${words("last")})`}`;
+  const left = sensor.heard && sensor.battery_left_s >= 0 ? words("battery_left", { time: duration(sensor.battery_left_s) }) : "";
+  const battery = sensor.battery === null ? words("unknown_value") : `${sensor.battery} %${sensor.heard ? left : ` (${words("last")})`}`;
   const facts = [
     ["rate", `${number(sensor.rate_hz, 1)} Hz`],
     ["loss", `${number(100 * sensor.loss, 1)} %`],
@@ -59,6 +60,7 @@ function fill(card, sensor, words) {
     ["signal", sensor.flags >> 4 ? `${4 * (sensor.flags >> 4) - 90} dBm` : words("unknown_value")], // docs/wire.md
     ["calibration", words("of_three", { gyro: grades[1], accel: grades[2] })],
     ["neutral_pose", hasWords(`neutral_${sensor.neutral}`) ? words(`neutral_${sensor.neutral}`) : sensor.neutral || words("not_worn")],
+    ["heading_corrected", sensor.is_worn ? `${number(sensor.corrected, 0)}°` : "–"],
     ["way", sensor.way || "–"],
     ["firmware", sensor.firmware || "–"],
   ];
