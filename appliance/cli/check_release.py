@@ -78,7 +78,7 @@ def _danced(pair: Pair) -> tuple[float, float]:
     box = load_box(pair.box)
     parts, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None, print)
     parts.run_with(verdict)
-    tick = Tick(parts, SensorFit(parts, memory, print), parts.first.iterations, latest_start_s=TICK_S)
+    tick = Tick(parts, SensorFit(parts, memory, print), latest_start_s=TICK_S)
     costs_ms: list[float] = []
     for number in range(_TICKS):
         started, begun = time.monotonic(), time.thread_time()
@@ -86,7 +86,7 @@ def _danced(pair: Pair) -> tuple[float, float]:
         tick.run(slot)
         tick.after(slot)
         costs_ms.append(1000.0 * (time.thread_time() - begun))
-        if not np.isfinite(tick.frame.pose).all():
+        if not all(np.isfinite(frame.pose).all() for frame in tick.frames):
             raise ValueError("The poses are not numbers.")
     parts.close()
     memory.close()

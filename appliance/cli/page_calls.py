@@ -98,7 +98,9 @@ def stretch(journal: str, run: int, start: float, seconds: float, out: str | Non
     if Path(out).suffix.casefold() == EXPORTED:
         export_stretch(Path(journal), Path(out), one, start, seconds)
         return b""
-    whole = Recording(one.skeleton, one.ticks["pose"], one.ticks["root"], 1.0 / one.header["tick_s"])
+    whole = Recording(
+        one.skeleton, one.ticks["pose"][:, 0], one.ticks["root"][:, 0], 1.0 / one.header["tick_s"]
+    )
     write_recording(Path(out), whole.excerpt(start, start + seconds))
     return b""
 

@@ -28,43 +28,41 @@ from appliance.stage.stage_error import StageError
 
 @dataclass(frozen=True)
 class RecordedDance:
-    """A recording, how firmly hands held each joint in it (N, J; None: no hand did), its title.
+    """The dance of each puppet, frame by frame, how firmly hands held each joint in it (N, P, J; None: no hand
+    did), its title.
 
-    others: of the puppets beside the first, frame by frame; names: of all puppets, where there are several;
-    start_s: second of what was danced at which it begins.
+    names: of the puppets, where there are several; start_s: second of what was danced at which it begins.
     """
 
-    recording: Recording
+    recordings: tuple[Recording, ...]
     holds: Array | None
     title: str
-    others: tuple[Recording, ...] = ()
     names: tuple[str, ...] = ()
     start_s: float = 0.0
 
     def of_puppet(self, name: str | None) -> Recording:
-        """The dance of one of several puppets; None: of the first. Raises StageError."""
+        """The dance of one of several puppets; None: of the one named first. Raises StageError."""
         if name is None:
-            return self.recording
+            return self.recordings[0]
         if name not in self.names:
             there = f"There are {', '.join(self.names)}." if self.names else "It has one, without a name."
             raise StageError(f"{self.title}: no puppet '{name}' danced. {there}")
-        return (self.recording, *self.others)[self.names.index(name)]
+        return self.recordings[self.names.index(name)]
 
     def part(self, start_s: float, seconds: float) -> RecordedDance:
         """`seconds` of it from a start on; a negative start counts from the end. Raises StageError."""
-        whole = self.recording
+        whole = self.recordings[0]
         start_s = start_s if start_s >= 0.0 else max(0.0, whole.seconds + start_s)
-        part = whole.excerpt(start_s, start_s + max(seconds, 1.0 / whole.fps))
-        if not len(part):
+        end_s = start_s + max(seconds, 1.0 / whole.fps)
+        parts = tuple(one.excerpt(start_s, end_s) for one in self.recordings)
+        if not len(parts[0]):
             raise StageError(
                 f"{self.title}: nothing was danced after second {start_s:g}. Choose an earlier start."
             )
         first = min(round(start_s * whole.fps), len(whole))
-        holds = None if self.holds is None else self.holds[first : first + len(part)]
-        end_s = start_s + max(seconds, 1.0 / whole.fps)
-        others = tuple(other.excerpt(start_s, end_s) for other in self.others)
+        holds = None if self.holds is None else self.holds[first : first + len(parts[0])]
         begin_s = self.start_s + first / whole.fps
-        return replace(self, recording=part, holds=holds, others=others, start_s=begin_s)
+        return replace(self, recordings=parts, holds=holds, start_s=begin_s)
 
 
 @reading_options
@@ -104,23 +102,16 @@ def load_dance(source: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> Reco
         recording, guesses = read_upright(source, reading)
         for guess in guesses:
             print(f"{source.name}: {guess.sentence()}.", file=sys.stderr)
-        return RecordedDance(recording, None, source.stem)
+        return RecordedDance((recording,), None, source.stem)
     journal = read_journal(source)
     ticks = journal.ticks
     skeleton, fps = journal.skeleton, 1.0 / TICK_S
-    danced = Recording(skeleton, ticks["pose"], ticks["root"], fps)
-    others = ticks["others_pose"].shape[1] if "others_pose" in (ticks.dtype.names or ()) else 0
-    names = tuple(name for name, _ in journal.header.get("puppets", ())) if others else ()
-    return RecordedDance(
-        danced,
-        holds_of(journal.header, ticks),
-        source.stem,
-        tuple(
-            Recording(skeleton, ticks["others_pose"][:, one], ticks["others_root"][:, one], fps)
-            for one in range(others)
-        ),
-        names,
-    )
+    names = journal.runs[-1].puppets
+    recordings = [
+        Recording(skeleton, ticks["pose"][:, one], ticks["root"][:, one], fps) for one in range(len(names))
+    ]
+    holds = holds_of(journal.header, ticks)
+    return RecordedDance(tuple(recordings), holds, source.stem, tuple(names) if len(names) > 1 else ())
 
 
 def _is_recording(source: Path) -> bool:
@@ -132,16 +123,17 @@ def draw_dance(dance: RecordedDance, out: Path) -> Path:
 
     Raises StageError.
     """
-    danced, start_s = dance.recording, dance.start_s
-    body, holds = (danced.skeleton, danced.poses, danced.roots, danced.fps), dance.holds
+    first, start_s = dance.recordings[0], dance.start_s
+    holds = [None if dance.holds is None else dance.holds[:, one] for one in range(len(dance.recordings))]
     try:
-        if not dance.others:
-            return draw_filmstrip(out, *body, holds=holds, title=dance.title, start_s=start_s)
+        if not dance.names:
+            body = first.skeleton, first.poses, first.roots, first.fps
+            return draw_filmstrip(out, *body, holds=holds[0], title=dance.title, start_s=start_s)
         strips = [
-            Strip(one.poses, one.roots, name, holds=holds if one is danced else None)
-            for one, name in zip((danced, *dance.others), dance.names, strict=True)
+            Strip(one.poses, one.roots, name, holds=held)
+            for one, name, held in zip(dance.recordings, dance.names, holds, strict=True)
         ]
-        return draw_strips(out, danced.skeleton, strips, danced.fps, dance.title, COLUMNS, start_s)
+        return draw_strips(out, first.skeleton, strips, first.fps, dance.title, COLUMNS, start_s)
     except MissingPicturesError as error:
         raise StageError(str(error)) from error
     except OSError as error:
@@ -159,7 +151,8 @@ def render_dance(dance: RecordedDance, out: Path, look: str, show: Path | None) 
     try:
         from appliance.projector.strip import render_strip
 
-        return render_strip(out, dance.recording, looks, look, dance.holds, dance.others)
+        (first, *others), holds = dance.recordings, dance.holds
+        return render_strip(out, first, looks, look, None if holds is None else holds[:, 0], others)
     except ProjectorError as error:
         raise StageError(str(error)) from error
     except OSError as error:

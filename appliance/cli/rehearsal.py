@@ -50,10 +50,11 @@ def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
 
 def pictured_from(dance: RecordedDance) -> float:
     """Second at which a picture of the end begins: ten seconds before it, and not before a hand leads."""
-    firmest = np.zeros(len(dance.recording)) if dance.holds is None else dance.holds.max(axis=1)
+    danced = dance.recordings[0]
+    firmest = np.zeros(len(danced)) if dance.holds is None else dance.holds.max(axis=(1, 2))
     led = np.flatnonzero(firmest > 0.5)
-    first_s = led[0] / dance.recording.fps if len(led) else 0.0
-    return max(0.0, dance.recording.seconds - PICTURED_S, float(first_s))
+    first_s = led[0] / danced.fps if len(led) else 0.0
+    return max(0.0, danced.seconds - PICTURED_S, float(first_s))
 
 
 def _render(journal: Path, out: Path, show: Path, look: str, start_s: float) -> str | None:

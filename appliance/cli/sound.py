@@ -47,7 +47,7 @@ def sound(
     strings = load_show(show or default_show_path()).config.strings or StringsConfig()
     config = load_box(box).sound or SoundConfig()
     try:
-        seconds = render_file(load_dance(recording).recording, strings, config, file)
+        seconds = render_file(load_dance(recording).of_puppet(None), strings, config, file)
     except OSError as error:
         raise StageError(f"{file}: the sound cannot be written ({error.strerror}).") from error
     print(f"{seconds:.1f} s of sound, {config.channels} channels: {file}")

@@ -12,7 +12,7 @@ from pathlib import Path
 from appliance.pose.foreign_file import opened
 
 HEADER, KEYFRAME, LOG = 1, 2, 3  # kinds
-_MAGIC = b"bkj1"
+_MAGIC = b"bkj2"
 _HEAD = struct.Struct("<4sHHIII")  # magic, kind, ticks in it, bytes stored, bytes unpacked, CRC-32 of it all
 _CHECK_AT = _HEAD.size - 4
 # Bytes unpacked, by kind: 80 s of a figure of a thousand joints; a header becomes some ten times as much.

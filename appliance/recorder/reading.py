@@ -22,7 +22,7 @@ from appliance.recorder.record import DAMAGED, EVENT, PIECE, TICK, layout_of, re
 from appliance.recorder.segments import SUFFIX, segment_paths
 
 EXPORTED = ".bunraku"
-_OLD_MAGIC = b"bunraku journal 1\n"
+_OLD_MAGIC = b"bunraku journal 1\n", b"bkj1"
 _NAME_ONE = "Name the folder of `bunraku play --journal`, a segment in it, or an exported file."
 _LARGEST = 1 << 26  # bytes of a segment: a minute of the show that comes with the box has a fiftieth of it
 _MOST_SEGMENTS = 20_000  # in an exported file; a day has 1440 where the disk has room
@@ -55,6 +55,11 @@ class Run:
     def skeleton(self) -> Skeleton:
         """The figure that danced."""
         return skeleton_of(self.header)
+
+    @property
+    def puppets(self) -> list[str]:
+        """The name of each puppet; "" of one without."""
+        return list(self.header["puppets"])
 
 
 @dataclass(frozen=True)

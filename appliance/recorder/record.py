@@ -15,6 +15,7 @@ from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
 from appliance.show.bundle import default_show_path
 
 if TYPE_CHECKING:
+    from appliance.show.hand import HandConfig
     from appliance.show.show import Show
 
 LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sent the last pose once more
@@ -27,10 +28,11 @@ _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970
 SAID = "said"  # kind of the event that people were told something
 
 
-def record(joints: int, hands: int, sensors: int, live: int, others: int = 0) -> np.dtype[np.void]:
+def record(joints: int, hands: int, sensors: int, live: int, puppets: int = 1) -> np.dtype[np.void]:
     """One tick: its slot, what it heard, what it made of it, and how long that took.
 
-    others: puppets beside the first, whose frames others_* hold; without them there are no such fields.
+    hands: of all puppets, in the order of the facts. flags: NOT_FINITE and JUMPED of any puppet; failed: each
+    puppet whose network gave no sound poses.
 
     live: 1 for a show with a live dancer, else 0. live_*: the pose that came of it in this tick; the arrival
     is not a number where none did.
@@ -47,13 +49,13 @@ def record(joints: int, hands: int, sensors: int, live: int, others: int = 0) ->
             ("sensor_arrival", "<f8"),
             ("flags", "<u4"),
             ("skipped", "<u4"),
-            ("coding_iterations", "<u2"),
-            ("interaction_iterations", "<u2"),
             ("sections_ms", "<f4", (len(SECTIONS),)),
             ("targets", "<f4", (hands, 4)),
             ("weights", "<f4", (hands,)),
-            ("root", "<f4", (3,)),
-            ("pose", "<f4", (joints, 4)),
+            ("failed", "u1", (puppets,)),
+            ("iterations", "<u2", (puppets, 2)),  # coding, interaction
+            ("root", "<f4", (puppets, 3)),
+            ("pose", "<f4", (puppets, joints, 4)),
             ("live_arrival", "<f8", (live,)),
             ("live_root", "<f4", (live, 3)),
             ("live_pose", "<f4", (joints * live, 4)),
@@ -62,18 +64,8 @@ def record(joints: int, hands: int, sensors: int, live: int, others: int = 0) ->
             ("reading_times", "<f8", (sensors, 3)),  # measured_at, arrival, round_trip_s (not a number: none)
             # sequence, sensor_time_us, battery, calibration, boot_nonce, taps, recoveries, flags, wearable
             ("reading_numbers", "<i8", (sensors, 9)),
-            *(_of_others(joints, others) if others else ()),
         ]
     )
-
-
-def _of_others(joints: int, others: int) -> list[tuple[str, str, tuple[int, ...]]]:
-    return [
-        ("others_flags", "<u4", (others,)),  # NOT_FINITE
-        ("others_iterations", "<u2", (others, 2)),  # coding, interaction
-        ("others_root", "<f4", (others, 3)),
-        ("others_pose", "<f4", (others, joints, 4)),
-    ]
 
 
 def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
@@ -86,12 +78,11 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
 
     skeleton, bundled = show.skeleton, show.directory.resolve() == default_show_path().resolve()
     hands = [
-        {"joint": hand.joint, "kind": hand.kind, "sensor": hand.sensor, "by": hand.by}
-        for hand in show.config.hands
+        {"puppet": number, "joint": hand.joint, "kind": hand.kind, "sensor": hand.sensor, "by": hand.by}
+        for number, hand in hands_of(show)
     ]
-    puppets = puppets_of(show)
-    live, others = int(show.config.motion.live), max(len(puppets) - 1, 0)
-    layout = record(len(skeleton), len(hands), len(sensors), live, others)
+    puppets, live = puppets_of(show), int(show.config.motion.live)
+    layout = record(len(skeleton), len(hands), len(sensors), live, len(puppets))
     files = [show.file.path, show.network, *dict.fromkeys(show.phrases.values())]
     return {
         "run": os.urandom(8).hex(),
@@ -100,7 +91,7 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
         "sections": SECTIONS,
         "hands": hands,
         "sensors": list(sensors),
-        **({"puppets": puppets} if puppets else {}),
+        "puppets": puppets,
         "joints": skeleton.names,
         "parents": [int(parent) for parent in skeleton.parents],
         "offsets": np.asarray(skeleton.offsets).tolist(),
@@ -116,28 +107,31 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def puppets_of(show: Show) -> list[list[Any]]:
-    """Name and held joints of each puppet; [] for a show that has one without a place."""
-    names, hands = [puppet.name for puppet in show.config.puppets], show.config.hands_of_puppets
-    return [[name, [hand.joint for hand in held]] for name, held in zip(names, hands, strict=False)]
+def puppets_of(show: Show) -> list[str]:
+    """The name of each puppet; "" in a show that has one without a name."""
+    return [puppet.name for puppet in show.config.puppets] or [""]
+
+
+def hands_of(show: Show) -> list[tuple[int, HandConfig]]:
+    """The hands of all puppets, each with its puppet's number."""
+    return [(number, hand) for number, held in enumerate(show.config.hands_of_puppets) for hand in held]
 
 
 def require_sound(facts: dict[str, Any]) -> None:
     """Raises KeyError, ValueError or TypeError where a file's facts are not those of a run."""
     figure, layout = skeleton_of(facts), layout_of(facts)
     live = min(layout["live_arrival"].shape[0], 1)
-    puppets = facts.get("puppets", [])
-    others = max(len(puppets) - 1, 0)
-    needed = record(len(figure), len(facts["hands"]), len(facts["sensors"]), live, others)
+    puppets = facts["puppets"]
+    needed = record(len(figure), len(facts["hands"]), len(facts["sensors"]), live, len(puppets))
     for name in needed.names or ():
         if layout[name] != needed[name]:
             raise ValueError(f"another '{name}' in its ticks")
     for hand in facts["hands"]:
-        figure.index(hand["joint"])
+        figure.index(hand["joint"]), puppets[hand["puppet"]]
     directory, files = facts["show_directory"], facts["show_files"]
     texts = [facts["run"], facts["show"], *facts["sensors"], *files, *files.values()]
     texts += [] if directory is None else [directory]
-    texts += [text for name, held in puppets for text in (name, *held)]
+    texts += puppets
     if not all(isinstance(text, str) for text in texts):
         raise TypeError("names that are no text")
     if not 0.0 < facts["tick_s"] < _LONGEST_TICK_S or not 0.0 <= facts["written_at"] < _LAST_WRITTEN_AT:
@@ -150,10 +144,11 @@ def layout_of(facts: dict[str, Any]) -> np.dtype[np.void]:
 
 
 def holds_of(header: dict[str, Any], ticks: np.ndarray[Any, np.dtype[np.void]]) -> np.ndarray:
-    """(N, J): how firmly a hand held each joint in ticks (N,) of a run with these facts, 0 to 1."""
-    skeleton = skeleton_of(header)
-    holds = np.zeros((len(ticks), len(skeleton)), np.float32)
-    holds[:, [skeleton.index(hand["joint"]) for hand in header["hands"]]] = ticks["weights"]
+    """(N, P, J): how firmly a hand held each joint of each puppet in ticks (N,) of a run, 0 to 1."""
+    skeleton, hands = skeleton_of(header), header["hands"]
+    holds = np.zeros((len(ticks), len(header["puppets"]), len(skeleton)), np.float32)
+    joints = [skeleton.index(hand["joint"]) for hand in hands]
+    holds[:, [hand["puppet"] for hand in hands], joints] = ticks["weights"]
     return holds
 
 

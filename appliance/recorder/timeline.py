@@ -87,8 +87,8 @@ def stretch(run: Run, start_s: float, seconds: float) -> Iterator[bytes]:
     text = json.dumps(facts).encode()
     yield struct.pack("<I", len(text)) + text
     part = ticks[chosen]
-    positions, world = skeleton.forward_kinematics(part["pose"], part["root"])
-    holds = holds_of(run.header, part)
+    positions, world = skeleton.forward_kinematics(part["pose"][:, 0], part["root"][:, 0])
+    holds = holds_of(run.header, part)[:, 0]
     for place, tick in enumerate(part):
         head = BROWSER_HEAD.pack(tick["tick"], int(tick["flags"]) & LATE, len(skeleton))
         arrays = (world[place], positions[place], holds[place])

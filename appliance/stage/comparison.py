@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from appliance.recorder.record import NOT_FINITE, RESENT
+from appliance.recorder.record import RESENT
 
 if TYPE_CHECKING:
     from appliance.stage.tick import Tick
 
-Floats = NDArray[np.float32]
 METRES_PER_DEGREE = 0.01  # how far the root may be off where joints may be off by a degree
 
 
@@ -55,7 +53,10 @@ class Comparison:
         self.ticks += 1
         words = self._words or _other(recorded, tick)
         self._words = ""
-        root, pose = _of_all(recorded, "root", tick), _of_all(recorded, "pose", tick)
+        root, pose = (
+            (recorded[name], np.stack([getattr(frame, name) for frame in tick.frames]))
+            for name in ("root", "pose")
+        )
         if all(then.tobytes() == here.tobytes() for then, here in (root, pose)) and not words:
             return
         degrees = _degrees_between(*pose)
@@ -86,34 +87,25 @@ class Comparison:
         return _size(found) > self._tolerance
 
 
-def _of_all(recorded: Any, name: str, tick: Tick) -> tuple[Floats, Floats]:
-    """`root` (P, 3) or `pose` (P, J, 4) of all puppets: as recorded, and as they are now."""
-    here = np.stack([getattr(puppet.frame, name) for puppet in tick.parts.puppets])
-    then = recorded[name][None]
-    return (then if len(here) == 1 else np.concatenate([then, recorded[f"others_{name}"]])), here
-
-
 def _size(found: Difference) -> float:
     return max(found.degrees, found.metres / METRES_PER_DEGREE)
 
 
 def _other(recorded: Any, tick: Tick) -> str:
     """Differences from the recording other than the pose, in words."""
-    frame, times = tick.frame, tick.iterations
-    was_late, had_failed = (bool(recorded["flags"] & flag) for flag in (RESENT, NOT_FINITE))
-    iterations = int(recorded["coding_iterations"]), int(recorded["interaction_iterations"])
-    others = tick.parts.puppets[1:]
-    other_failed = bool(others) and bool((recorded["others_flags"] & NOT_FINITE).any())
-    if other_failed != any(puppet.network_failed for puppet in others):
-        return "the network failed for another puppet then, or fails here"
-    if was_late != frame.late:
+    was_late, sequence = bool(recorded["flags"] & RESENT), tick.frames[0].sensor_sequence
+    if was_late != tick.late:
         return "it was late then and is in time here" if was_late else "it was in time then and is late here"
-    if had_failed != tick.network_failed:
-        return "the network failed then" if had_failed else "the network gives no sound poses here"
-    if iterations != (times.coding, times.interaction):
-        return f"iterations were {iterations[0]}/{iterations[1]}, and are {times.coding}/{times.interaction}"
-    if int(recorded["sensor_sequence"]) != frame.sensor_sequence:
-        return f"reading {int(recorded['sensor_sequence'])} went into it then, {frame.sensor_sequence} here"
+    for puppet, had_failed, then in zip(
+        tick.parts.puppets, recorded["failed"].tolist(), recorded["iterations"].tolist(), strict=True
+    ):
+        if had_failed != puppet.network_failed:
+            return "the network failed then" if had_failed else "the network gives no sound poses here"
+        here = [puppet.iterations.coding, puppet.iterations.interaction]
+        if then != here:
+            return f"iterations were {then[0]}/{then[1]}, and are {here[0]}/{here[1]}"
+    if int(recorded["sensor_sequence"]) != sequence:
+        return f"reading {int(recorded['sensor_sequence'])} went into it then, {sequence} here"
     return ""
 
 

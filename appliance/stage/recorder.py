@@ -14,7 +14,7 @@ from appliance.box.live_pose import LivePose
 from appliance.box.ring_file import RingFileWriter
 from appliance.box.snapshot import packed
 from appliance.recorder.log import POSITION, pieces_of
-from appliance.recorder.record import EVENT, NOT_FINITE, PIECE, TICK, layout_of
+from appliance.recorder.record import EVENT, JUMPED, LATE, NOT_FINITE, PIECE, RESENT, TICK, layout_of
 
 if TYPE_CHECKING:
     from appliance.box.clock import Slot
@@ -45,7 +45,7 @@ class Recorder:
         said, layout = json.dumps(facts).encode(), layout_of(facts)
         entry_bytes = ENTRY.size + max(layout.itemsize, EVENT_BYTES)
         keyframe_bytes = KEYFRAME_BYTES + KEYFRAME_JOINT_BYTES * len(facts["joints"])
-        keyframe_bytes *= len(facts.get("puppets", ())) or 1
+        keyframe_bytes *= len(facts["puppets"])
         shapes = [(1, len(said)), (LOG_SLOTS, entry_bytes), (KEYFRAME_SLOTS, keyframe_bytes)]
         self.lost = 0
         self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
@@ -63,35 +63,35 @@ class Recorder:
         """Whether the next keyframe is due."""
         return self._ticks >= KEYFRAME_TICKS
 
-    def note_tick(self, slot: Slot, tick: Tick, flags: int) -> None:
-        """The frame of this slot has left: one copy into the memory."""
-        frame, field, parts = tick.frame, self._field, tick.parts
+    def note_tick(self, slot: Slot, tick: Tick, late: bool) -> None:
+        """The frames of this slot have left: one copy into the memory. late: they left late, or will."""
+        field, puppets = self._field, tick.parts.puppets
         ENTRY.pack_into(self._log.payload, 0, TICK)
         field["tick"][0] = slot.tick
         field["frame_time"][0] = slot.deadline
         field["started"][0] = slot.started
         field["skipped"][0] = slot.skipped
-        field["sensor_sequence"][0] = frame.sensor_sequence
-        field["sensor_arrival"][0] = frame.sensor_arrival
-        field["flags"][0] = flags
-        field["coding_iterations"][0] = tick.iterations.coding
-        field["interaction_iterations"][0] = tick.iterations.interaction
+        field["sensor_sequence"][0] = tick.frames[0].sensor_sequence
+        field["sensor_arrival"][0] = tick.frames[0].sensor_arrival
+        jumped = any(puppet.motion.jumped for puppet in puppets)
+        field["flags"][0] = (
+            late * LATE | tick.late * RESENT | tick.network_failed * NOT_FINITE | jumped * JUMPED
+        )
         field["sections_ms"][0] = tick.sections_ms
-        hands = parts.hands
-        for hand, place in enumerate(parts.first.hand_places):
-            field["targets"][0, hand] = hands.targets[0, place]
-            if hands.by_place[hand]:
-                field["targets"][0, hand, 0] = 0.0
-                field["targets"][0, hand, 1:] = hands.places[place]
-            field["weights"][0, hand] = hands.holds[place]
-        field["root"][0] = frame.root
-        field["pose"][0] = frame.pose
-        for other, puppet in enumerate(parts.puppets[1:]):
-            field["others_flags"][0, other] = puppet.network_failed * NOT_FINITE
-            times = puppet.iterations
-            field["others_iterations"][0, other] = times.coding, times.interaction
-            field["others_root"][0, other] = puppet.frame.root
-            field["others_pose"][0, other] = puppet.frame.pose
+        row = 0
+        for number, puppet in enumerate(puppets):
+            field["failed"][0, number] = puppet.network_failed
+            field["iterations"][0, number] = puppet.iterations.coding, puppet.iterations.interaction
+            field["root"][0, number] = puppet.frame.root
+            field["pose"][0, number] = puppet.frame.pose
+            hands = puppet.hands
+            for place, by_place in zip(puppet.hand_places, hands.by_place, strict=True):
+                field["targets"][0, row] = hands.targets[0, place]
+                if by_place:
+                    field["targets"][0, row, 0] = 0.0
+                    field["targets"][0, row, 1:] = hands.places[place]
+                field["weights"][0, row] = hands.holds[place]
+                row += 1
         self._note_readings(tick)
         self._note_live(tick.live_heard)
         self._log.publish()

@@ -16,13 +16,12 @@ from appliance.box.snapshot import restore
 from appliance.dancer.puppet import PuppetNetwork
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import Run
-from appliance.recorder.record import DAMAGED, NOT_FINITE, ORDER, puppets_of
+from appliance.recorder.record import DAMAGED, ORDER, hands_of, puppets_of
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show
 from appliance.stage.carry_out import carry_out
 from appliance.stage.comparison import Comparison
-from appliance.stage.iterations import Iterations
 from appliance.stage.made_again import maker_of
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
@@ -44,10 +43,9 @@ class Replay:
         self.skipped = 0
         self._run = run
         parts = assemble(show, _NO_PORTS, network_of=_RecordedNetwork)
-        hands = [hand["joint"] for hand in run.header["hands"]]
-        is_same = hands == [hand.joint for hand in show.config.hands]
-        is_same = is_same and run.header.get("puppets", []) == puppets_of(show)
-        if parts.skeleton.names != run.skeleton.names or not is_same:
+        hands = [[hand["puppet"], hand["joint"]] for hand in run.header["hands"]]
+        held = [[number, hand.joint] for number, hand in hands_of(show)]
+        if parts.skeleton.names != run.skeleton.names or hands != held or run.puppets != puppets_of(show):
             raise JournalError(
                 f"{show.directory}: this show has other figures or other hands than the recorded one "
                 f"('{run.header['show']}'). Name its bundle: --show DIR."
@@ -58,7 +56,7 @@ class Replay:
         parts.live_inbox = self._live = _RecordedLive(run)
         parts.make_by(maker_of(show, parts.motion))
         self._wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
-        self.tick = Tick(parts, self._wearing, Iterations(1, 0, 1), 0.0)
+        self.tick = Tick(parts, self._wearing, 0.0)
 
     @property
     def forced(self) -> int:
@@ -110,8 +108,7 @@ class Replay:
     def _dance_row(self, row: int, comparison: Comparison) -> None:
         recorded = self._run.ticks[row]
         self._link.row = self._live.row = row
-        flags = [recorded["flags"], *(recorded["others_flags"] if len(self._network.puppets) > 1 else ())]
-        self._network.fails = [bool(flag & NOT_FINITE) for flag in flags]
+        self._network.fails = recorded["failed"].tolist()
         slot = Slot(
             int(recorded["tick"]),
             float(recorded["frame_time"]),
@@ -128,7 +125,7 @@ class Replay:
             asked, now, done_then = event["order"], float(event["now"]), bool(event["done"])
             order = Order(asked["name"], tuple(map(float, asked["values"])), asked["text"])
             self._link.answers(order.text, done_then)
-            done, _ = carry_out(order, self.tick.parts, self.tick.iterations, self._wearing, now)
+            done, _ = carry_out(order, self.tick.parts, self.tick.parts.first.iterations, self._wearing, now)
             comparison.note_order(order.name, done_then, done)
 
 
@@ -150,7 +147,7 @@ class _RecordedNetwork(PuppetNetwork):
     fails: for each puppet, whether it failed then; forced: how often it did, and does not here.
     """
 
-    fails: Sequence[bool] = ()
+    fails: Sequence[int] = ()
     forced = 0
 
     def dance(self) -> None:

@@ -14,8 +14,7 @@ from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.runtime_folder import renew_lost
 from appliance.box.show_state import ShowStateReader
 from appliance.dancer.phrase_cache import MEMORY
-from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
-from appliance.sensor.battery_life import BatteryLives
+from appliance.recorder.record import ORDER, SAID, facts_of_run
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.admission import Admission, SecondLook
@@ -100,12 +99,10 @@ class Stage:
         )
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
-        corrects_heading = box.sensors.heading == "auto"
-        self.wearing = SensorFit(self.parts, self.memory, self._say_and_note, corrects_heading)
-        self.batteries = BatteryLives()
+        self.wearing = SensorFit(self.parts, self.memory, self._say_and_note)
         self._resume(TickClock().now())
         late_look_s = box.limits.wait_ms / 1000.0
-        self.tick = Tick(self.parts, self.wearing, self.iterations, latest_start_s, late_look_s)
+        self.tick = Tick(self.parts, self.wearing, latest_start_s, late_look_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         primary, link = self.parts.primary, self.parts.link
@@ -169,7 +166,7 @@ class Stage:
         tick, health = self.tick, self.health
         cost_ms = tick.after(slot)
         left_ms = 1000.0 * (slot.lateness_s + tick.waited_s) + cost_ms
-        late = tick.frame.late or left_ms > self.box.limits.late_ms
+        late = tick.late or left_ms > self.box.limits.late_ms
         health.tick(cost_ms, self.box.limits.tick_budget_ms)
         health.late += late
         health.skipped += slot.skipped
@@ -181,8 +178,7 @@ class Stage:
             self.watch.count_silences(slot.started)
         self.resuming.write_checkpoint(self.reconciler, slot.tick)
         if self.recorder is not None:
-            flags = late * LATE | tick.frame.late * RESENT | tick.network_failed * NOT_FINITE
-            self.recorder.note_tick(slot, tick, flags | self.parts.motion.jumped * JUMPED)
+            self.recorder.note_tick(slot, tick, late)
 
     def _follow_sensor(self, slot: Slot) -> float:
         """The phase lock's correction to the next period, seconds."""
@@ -201,7 +197,7 @@ class Stage:
         if orders or self.reconciler.generation != before:
             words = [self._carry_out(order, now)[1] for order in orders]
             self.reconciler.words = " ".join(filter(None, words))
-            self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
+            self.resuming.write_checkpoint(self.reconciler, self.tick.frames[0].tick)  # before it is reported
             self._publish_health(now)
 
     def _take_orders(self, started: float, monotonic: Callable[[], float]) -> None:
@@ -219,7 +215,7 @@ class Stage:
             self._reconcile(started)  # what was declared before this order was sent comes before it
             done.append((order, *self._carry_out(order, monotonic())))
         if done:
-            self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
+            self.resuming.write_checkpoint(self.reconciler, self.tick.frames[0].tick)  # before it is reported
         if any(not order.quiet for order, _, _ in done):
             self._publish_health(started)  # the next question is answered with it
         for answer in done:
@@ -244,9 +240,7 @@ class Stage:
 
     def _publish_health(self, now: float) -> None:
         """Publish how the box is in the shared frame."""
-        states, wearing = self.parts.link.states(now), self.wearing
-        self.batteries.hear(states, now)
-        roster = roster_lines(states, wearing.neutral_of, wearing.corrected_of, self.batteries.left_s)
+        roster = roster_lines(self.parts.link.states(now), self.wearing.neutral_of)
         age_s, locked = self._sensor_age_s(now), self._is_locked
         fallbacks = self.watch.fallbacks.happened(now)
         self.sharing.publish_health(now, self.health, self.reconciler, age_s, locked, roster, fallbacks)

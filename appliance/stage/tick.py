@@ -13,7 +13,6 @@ from appliance.box.live_pose import LivePose
 from appliance.dancer.puppeteers import HOLD_S
 from appliance.recorder.record import SECTIONS
 from appliance.sensor.link import SensorReading
-from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
 
@@ -34,21 +33,17 @@ class Tick:
         self,
         parts: StageParts,
         wearing: SensorFit,
-        iterations: Iterations,
         latest_start_s: float,
         late_look_s: float = 0.0,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
-        """iterations: of the first puppet; the others have theirs. late_look_s: how long a tick waits for a
-        reading of the primary sensor that is late; 0: not at all.
-        """
+        """late_look_s: how long a tick waits for a late reading of the primary sensor; 0: not at all."""
         self.parts = parts
         self.wearing = wearing
-        self.iterations = parts.first.iterations = iterations
         self.latest_start_s, self.late_look_s = latest_start_s, late_look_s
         self.waited_s = 0.0  # for a late reading, in this tick
-        self.frame, *others = (one.frame for one in parts.puppets)
-        self._others = tuple(others)
+        self.frames = tuple(one.frame for one in parts.puppets)
+        self.late = False  # in this slot the last poses were sent again
         self.readings: Sequence[SensorReading] = ()
         self.live_heard: LivePose | None = None
         self.sections_ms: NDArray[np.float32] = np.zeros(len(SECTIONS), np.float32)
@@ -59,23 +54,22 @@ class Tick:
 
     @property
     def network_failed(self) -> bool:
-        """Whether the network gave the first puppet no sound poses."""
-        return self.parts.first.network_failed
+        """Whether the network gave a puppet no sound poses."""
+        return any(one.network_failed for one in self.parts.puppets)
 
     def run(self, slot: Slot) -> None:
         """Everything from the sensors' datagrams to the receivers'."""
-        parts, frame, ends, now = self.parts, self.frame, self._section_ends, self._monotonic
-        frame.tick, frame.frame_time = slot.tick, slot.deadline
-        frame.late = slot.lateness_s > self.latest_start_s
-        for other in self._others:
-            other.tick, other.frame_time, other.late = frame.tick, frame.frame_time, frame.late
+        parts, ends, now = self.parts, self._section_ends, self._monotonic
+        self.late = slot.lateness_s > self.latest_start_s
+        for frame in self.frames:
+            frame.tick, frame.frame_time, frame.late = slot.tick, slot.deadline, self.late
 
         self.readings = parts.link.drain(slot.started)
         self.waited_s = 0.0
         self.live_heard = parts.hear_live()
         ends[DRAIN] = ends[MOTION] = ends[HANDS] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
 
-        if not frame.late:
+        if not self.late:
             for puppet in parts.puppets:
                 puppet.start(slot.started)
             ends[MOTION] = now()
@@ -84,7 +78,7 @@ class Tick:
         for reading in self.readings:
             self.wearing.hear(reading)
             parts.hear(reading)
-        if not frame.late:
+        if not self.late:
             for puppet in parts.puppets:
                 puppet.pull(slot.started)
             ends[HANDS] = now()
@@ -99,7 +93,7 @@ class Tick:
                 puppet.stand()
             ends[FIGURE] = now()
 
-        parts.outputs.publish_frame(frame, *self._others)
+        parts.outputs.publish_frame(*self.frames)
         ends[SEND] = now()
 
     def warm_up(self) -> None:
@@ -115,7 +109,7 @@ class Tick:
         """Work that can wait until the frame has left: the motion moves on, sensors are answered and looked
         at, times are noted. The cost of what came before, in ms, without the wait for a late reading.
         """
-        if not self.frame.late:
+        if not self.late:
             for puppet in self.parts.puppets:
                 puppet.advance()
             self.parts.liveliness.advance()
@@ -148,7 +142,8 @@ class Tick:
         self.waited_s = self._monotonic() - before
 
     def _name_reading(self) -> None:
-        """The frame names the reading that went into it."""
-        newest, frame = self.parts.newest_primary, self.frame
+        """The frames name the reading that went into them."""
+        newest = self.parts.newest_primary
         if newest is not None:
-            frame.sensor_sequence, frame.sensor_arrival = newest.sequence, newest.arrival
+            for frame in self.frames:
+                frame.sensor_sequence, frame.sensor_arrival = newest.sequence, newest.arrival

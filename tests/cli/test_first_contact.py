@@ -69,7 +69,7 @@ def test_the_first_seconds_show_a_hand_that_leads(tmp_path: Path) -> None:
         said_until(process, "held joints highlighted")
     dance = load_dance(tmp_path / "journal")
     assert dance.holds is not None
-    led = np.flatnonzero(dance.holds.max(axis=1) > 0.5) / dance.recording.fps
+    led = np.flatnonzero(dance.holds.max(axis=(1, 2)) > 0.5) / dance.recordings[0].fps
     assert len(led) and led[0] < 1.7  # standing still for the 1.5 s of a new sensor takes longer
 
 
@@ -87,8 +87,8 @@ def test_the_picture_begins_where_the_hand_leads(
     seconds: float, led_from_s: float | None, begins_s: float
 ) -> None:
     recording = swaying_phrase(seconds)
-    holds = np.zeros((len(recording), len(recording.skeleton)), np.float32)
+    holds = np.zeros((len(recording), 1, len(recording.skeleton)), np.float32)
     if led_from_s is not None:
-        holds[round(50 * led_from_s) :, 2] = 1.0
-    assert pictured_from(RecordedDance(recording, holds, "x")) == pytest.approx(begins_s, abs=0.03)
+        holds[round(50 * led_from_s) :, 0, 2] = 1.0
+    assert pictured_from(RecordedDance((recording,), holds, "x")) == pytest.approx(begins_s, abs=0.03)
     assert PICTURED_S == 10.0

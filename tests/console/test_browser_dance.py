@@ -106,7 +106,7 @@ def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> Non
     ticks = recorded(venue[0]).ticks
     for tick, *root in seen:
         (row,) = ticks[ticks["tick"] == tick]
-        positions, _ = recorded(venue[0]).skeleton.forward_kinematics(row["pose"], row["root"])
+        positions, _ = recorded(venue[0]).skeleton.forward_kinematics(row["pose"][0], row["root"][0])
         np.testing.assert_allclose(root, positions[0], atol=2e-3)
     with tab.expect_download() as download:
         press(tab, "#happened-bvh")

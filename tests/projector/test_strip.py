@@ -121,11 +121,11 @@ def test_without_opengl_a_rehearsal_ends_with_a_filmstrip_and_says_why(
 
 def test_a_part_of_a_dance_counts_from_either_end(tmp_path: Path) -> None:
     dance = load_dance(write_journal(tmp_path / "run.journal"))
-    assert dance.holds is not None and dance.holds.shape == (len(dance.recording), len(FIGURE))
+    assert dance.holds is not None and dance.holds.shape == (len(dance.recordings[0]), 1, len(FIGURE))
     weights = read_journal(tmp_path / "run.journal").ticks["weights"][:, 0]
-    assert np.array_equal(dance.holds[:, FIGURE.index("lShldr")], weights), "as the ticks say"
-    assert len(dance.part(-1.0, 10.0).recording) == 50
-    assert len(dance.part(-100.0, 10.0).recording) == 100
-    assert len(dance.part(0.5, 0.5).recording) == 25
+    assert np.array_equal(dance.holds[:, 0, FIGURE.index("lShldr")], weights), "as the ticks say"
+    assert len(dance.part(-1.0, 10.0).recordings[0]) == 50
+    assert len(dance.part(-100.0, 10.0).recordings[0]) == 100
+    assert len(dance.part(0.5, 0.5).recordings[0]) == 25
     with pytest.raises(StageError, match="nothing was danced after second 2"):
         dance.part(2.0, 1.0)

@@ -10,7 +10,7 @@ from appliance.box.orders import Order
 from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.mirror import Mirror
 from appliance.levers.show_state import ShowState
-from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
+from appliance.recorder.record import ORDER, facts_of_run
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
@@ -39,9 +39,10 @@ class Night:
         self.parts = assemble(self.show, BOX)
         self.heard = self.parts.link = _Heard()
         self.wearing = SensorFit(self.parts, SensorMemory(None, self.said.append), self.said.append)
-        self.tick = Tick(self.parts, self.wearing, Iterations(3, 2, 10), LATEST_START_S)
+        self.parts.first.iterations = Iterations(3, 2, 10)
+        self.tick = Tick(self.parts, self.wearing, LATEST_START_S)
         self._declared = _Declared(self.show.config.name)
-        name, iterations = self.show.config.name, self.tick.iterations
+        name, iterations = self.show.config.name, self.parts.first.iterations
         self.reconciler = Reconciler(name, self.parts, iterations, self._declared)
         self.recorder = Recorder(runtime, facts_of_run(self.show, list(self.parts.worn)))
         self.slot = Slot(-1, begins_at, begins_at)
@@ -59,7 +60,7 @@ class Night:
             self.heard.coming = [] if came is None else [came]
             self.tick.run(self.slot)
             self.tick.after(self.slot)
-            self.recorder.note_tick(self.slot, self.tick, self._flags())
+            self.recorder.note_tick(self.slot, self.tick, self.tick.late)
             if self.recorder.wants_keyframe:
                 self.recorder.keyframe(self.tick)
 
@@ -69,14 +70,14 @@ class Night:
 
     def command(self, address: str, *values: float, text: str = "") -> None:
         """What show control declares at a command; the dance follows after the last tick."""
-        now, facts = self.slot.started, facts_of(self.show, None, self.tick.iterations, 0.0)
+        now, facts = self.slot.started, facts_of(self.show, None, self.parts.first.iterations, 0.0)
         command = Command(address, values, text)
         self._declared.now, _ = declare(self._declared.now, command, facts, now)
         for order in self.reconciler.pending(now):
             self._carry_out(order, now)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        done, words = carry_out(order, self.parts, self.tick.iterations, self.wearing, now)
+        done, words = carry_out(order, self.parts, self.parts.first.iterations, self.wearing, now)
         asked = {"name": order.name, "values": order.values, "text": order.text}
         self.recorder.event(ORDER, now, order=asked, done=done, words=words)
         return done, words
@@ -89,10 +90,6 @@ class Night:
         """The folder, once all that was noted is in it."""
         self.mirror(folder).last_turn(0.0)
         return folder
-
-    def _flags(self) -> int:
-        flags = self.tick.frame.late * (LATE | RESENT) | self.tick.network_failed * NOT_FINITE
-        return flags | self.parts.motion.jumped * JUMPED
 
 
 def reading(

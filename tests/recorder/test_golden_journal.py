@@ -56,7 +56,7 @@ def test_it_tells_what_happened(runs: tuple[Run, ...]) -> None:
     weights = before.ticks["weights"][:, 0]
     assert weights[SILENT.start] == 1.0 and weights[SILENT.stop - 1] < 0.05  # given back over a second
     assert [event["order"]["name"] for _, event in before.events] == ["neutral", "iterations", "iterations"]
-    assert load_dance(GOLDEN).part(-1.0, 1.0).recording.poses.shape == (50, len(FIGURE), 4)
+    assert load_dance(GOLDEN).part(-1.0, 1.0).recordings[0].poses.shape == (50, len(FIGURE), 4)
 
 
 def test_while_nothing_could_be_danced_the_last_good_pose_stood(runs: tuple[Run, ...]) -> None:

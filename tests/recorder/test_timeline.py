@@ -61,7 +61,7 @@ def test_a_stretch_is_danced_as_it_was_recorded(run: Run) -> None:
     tick, _, count = struct.unpack_from("<dII", frames[7])
     assert count == joints
     (row,) = run.ticks[run.ticks["tick"] == tick]
-    positions, world = run.skeleton.forward_kinematics(row["pose"], row["root"])
+    positions, world = run.skeleton.forward_kinematics(row["pose"][0], row["root"][0])
     numbers = np.frombuffer(frames[7], "<f4", offset=16)
     np.testing.assert_allclose(numbers[: 4 * joints].reshape(-1, 4), world, atol=1e-6)
     np.testing.assert_allclose(numbers[4 * joints : 7 * joints].reshape(-1, 3), positions, atol=1e-6)

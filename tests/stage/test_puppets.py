@@ -122,15 +122,15 @@ def test_their_journal_dances_again_bit_for_bit(night: Night, tmp_path: Path) ->
         danced = sum(1 for _ in Replay(run, load_show(tmp_path / "show")).dance(comparison, from_s))
         assert danced > 200 and comparison.first is None
     drawn = load_dance(tmp_path / "kept").part(2.0, 1.0)
-    assert len(drawn.others) == 3 and len(drawn.others[0]) == 50
-    assert np.array_equal(drawn.others[1].roots, run.ticks["others_root"][100:150, 1])
+    assert [len(one) for one in drawn.recordings] == [50] * 4
+    assert np.array_equal(drawn.recordings[2].roots, run.ticks["root"][100:150, 2])
     assert drawn.names == ("left", "right", "late", "slow") and drawn.start_s == pytest.approx(2.0)
-    assert np.array_equal(drawn.of_puppet("late").poses, drawn.others[1].poses)
-    assert drawn.of_puppet(None) is drawn.recording
+    assert np.array_equal(drawn.of_puppet("late").poses, drawn.recordings[2].poses)
+    assert drawn.of_puppet(None) is drawn.recordings[0]
     with pytest.raises(StageError, match=r"no puppet 'nobody' danced. There are left, right, late, slow"):
         drawn.of_puppet("nobody")
     run = replace(run, ticks=run.ticks.copy())
-    run.ticks["others_pose"][300, 2, 0] = [0.0, 1.0, 0.0, 0.0]
+    run.ticks["pose"][300, 3, 0] = [0.0, 1.0, 0.0, 0.0]
     comparison = Comparison(float(run.ticks["frame_time"][0]), 0.0)
     for _ in Replay(run, load_show(tmp_path / "show")).dance(comparison):
         pass
@@ -165,7 +165,7 @@ def test_all_of_them_count_towards_the_budget(tmp_path: Path) -> None:
 
 
 def test_the_shared_frame_has_room_for_them(night: Night, tmp_path: Path) -> None:
-    facts = facts_of(night.show, None, night.tick.iterations, 0.0)
+    facts = facts_of(night.show, None, night.parts.first.iterations, 0.0)
     writer = FrameWriter(tmp_path / "run", facts)
     night.parts.outputs.share(writer)
     night.dance(5, reading(STILL))

@@ -25,7 +25,8 @@ from tests.stage.shows import BOX
 
 @pytest.fixture
 def tick(parts: StageParts, iterations: Iterations) -> Tick:
-    return Tick(parts, SensorFit(parts, SensorMemory(None, print), print), iterations, 1.0)
+    parts.first.iterations = iterations
+    return Tick(parts, SensorFit(parts, SensorMemory(None, print), print), 1.0)
 
 
 def danced(tick: Tick, ticks: int, begin: int = 0) -> np.ndarray:
@@ -34,7 +35,7 @@ def danced(tick: Tick, ticks: int, begin: int = 0) -> np.ndarray:
     for number in range(begin, begin + ticks):
         slot = Slot(number, 10 + 0.02 * number, 10 + 0.02 * number, 0)
         tick.run(slot)
-        poses.append(tick.frame.pose.copy())
+        poses.append(tick.frames[0].pose.copy())
         tick.after(slot)
     return np.array(poses)
 

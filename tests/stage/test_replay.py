@@ -162,7 +162,7 @@ def test_what_was_lost_in_between_is_left_out_and_the_rest_dances_on(run: Run, s
 
 def test_the_first_tick_that_differs_is_named_with_its_joint(run: Run, show: Path) -> None:
     ticks = run.ticks.copy()
-    ticks["pose"][777, 3] = (0.8, 0.6, 0.0, 0.0)
+    ticks["pose"][777, 0, 3] = (0.8, 0.6, 0.0, 0.0)
     _, comparison = danced(Run(run.header, ticks, run.tick_numbers, run.events, run.keyframes), show)
     assert comparison.first is not None
     assert (comparison.first.tick, comparison.first.joint) == (777, "lForeArm")

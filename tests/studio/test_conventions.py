@@ -94,9 +94,9 @@ def test_a_system_s_recordings_become_a_show_that_dances(
     light(show, system.name("left hand"), hold=arm)
     danced, avatar = played(tmp_path, show, bunraku)
     assert danced.header["hands"][0]["joint"] == arm
-    holds = holds_of(danced.header, danced.ticks)[-1]
+    holds = holds_of(danced.header, danced.ticks)[-1, 0]
     assert danced.skeleton.names[int(np.argmax(holds))] == arm and np.count_nonzero(holds) == 1
-    poses, roots = danced.ticks["pose"].astype(float), danced.ticks["root"].astype(float)
+    poses, roots = danced.ticks["pose"][:, 0].astype(float), danced.ticks["root"][:, 0].astype(float)
     assert_a_dancer(danced.skeleton, poses, roots)
     assert (danced.skeleton.stance is not None) == (convention == "LAFAN")
     assert_an_avatar_like(avatar, danced.skeleton, poses[-1], roots[-1])

@@ -83,7 +83,7 @@ def test_a_sensor_switched_on_is_used_and_standing_still_gives_the_neutral_pose(
         assert box.end() == 0
     ticks = read_journal(tmp_path / "run.journal").ticks
     standing = ticks[(ticks["sensor_sequence"] >= still_from) & (ticks["sensor_sequence"] <= still_until)]
-    assert np.abs(standing["pose"][:, SHOULDER, 0]).min() > 0.999
+    assert np.abs(standing["pose"][:, 0, SHOULDER, 0]).min() > 0.999
     # The joint turns as the hand does from its neutral pose, about the same axes.
     dancing = ticks[ticks["sensor_sequence"] > still_until + 50]
     hands = np.array([sent[int(number)].sample.orientation for number in dancing["sensor_sequence"]])
