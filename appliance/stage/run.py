@@ -15,6 +15,7 @@ from appliance.box.runtime_folder import renew_lost
 from appliance.box.show_state import ShowStateReader
 from appliance.dancer.phrase_cache import MEMORY
 from appliance.recorder.record import ORDER, SAID, facts_of_run
+from appliance.sensor.battery_life import BatteryLives
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.admission import Admission, SecondLook
@@ -99,7 +100,9 @@ class Stage:
         )
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
-        self.wearing = SensorFit(self.parts, self.memory, self._say_and_note)
+        corrects_heading = box.sensors.heading == "auto"
+        self.wearing = SensorFit(self.parts, self.memory, self._say_and_note, corrects_heading)
+        self.batteries = BatteryLives()
         self._resume(TickClock().now())
         late_look_s = box.limits.wait_ms / 1000.0
         self.tick = Tick(self.parts, self.wearing, latest_start_s, late_look_s)
@@ -240,7 +243,9 @@ class Stage:
 
     def _publish_health(self, now: float) -> None:
         """Publish how the box is in the shared frame."""
-        roster = roster_lines(self.parts.link.states(now), self.wearing.neutral_of)
+        states, wearing = self.parts.link.states(now), self.wearing
+        self.batteries.hear(states, now)
+        roster = roster_lines(states, wearing.neutral_of, wearing.corrected_of, self.batteries.left_s)
         age_s, locked = self._sensor_age_s(now), self._is_locked
         fallbacks = self.watch.fallbacks.happened(now)
         self.sharing.publish_health(now, self.health, self.reconciler, age_s, locked, roster, fallbacks)
