@@ -41,7 +41,7 @@ _BACK: Vector = (0.0, 0.0, -1.0)
 _LEFT: Vector = (1.0, 0.0, 0.0)
 # Between these angles an elbow or a knee begins to say how the limb above is turned about itself.
 _STRAIGHT, _BENT = math.radians(8.0), math.radians(35.0)
-_LEAST_BEND = math.radians(5.0)  # of an elbow in the T-pose, that shows the way in which it bends
+_LEAST_BEND = math.radians(5.0)  # an elbow bent so far in the T-pose shows the way in which it bends
 _MOST_TWIST = 1.5 * math.pi
 _LIMBS = (
     ("UpperArm", "LowerArm", "shoulder", "elbow", "wrist"),
@@ -68,7 +68,7 @@ class PointFit:
         self._twists: dict[str, float] = {}
 
     def begin(self) -> None:
-        """What comes next does not go on from what came before."""
+        """Forget the frames before: the next ones are of another dancer."""
         self._twists.clear()
 
     def turns(self, points: Points) -> dict[str, Quaternion]:

@@ -15,62 +15,46 @@ class Layout(NamedTuple):
     is_y_down: bool = False
 
 
+_SIDES = {"l.": ("left",), "r.": ("right",), "*.": ("left", "right")}
+_LIMBS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle")}
+
+
 def _parts(words: str) -> tuple[str, ...]:
-    """'-' for a point that says nothing; l. and r. stand for left and right."""
-    return tuple(
-        word.replace("-", "").replace("l.", "left ").replace("r.", "right ") for word in words.split()
-    )
+    """'-' says nothing; l. and r. are left and right, *. is both in turn; arm and leg have three points."""
+    found: list[str] = []
+    for word in words.split():
+        sides, part = _SIDES.get(word[:2], ("",)), word[2:] if word[:2] in _SIDES else word.strip("-")
+        found += [f"{side} {one}".strip() for side in sides for one in _LIMBS.get(part, (part,))]
+    return tuple(found)
 
 
+_KINECT = (
+    *_parts("- - chest - - l.arm l.hand - l.thumb - r.arm r.hand - r.thumb"),
+    *_parts("l.leg l.toe r.leg r.toe - nose l.eye l.ear r.eye r.ear"),
+)
 LAYOUTS = {
     # The order of COCO's key points (cocodataset.org), as most camera networks have it.
-    "coco": Layout(
-        "COCO",
-        _parts(
-            "nose l.eye r.eye l.ear r.ear l.shoulder r.shoulder l.elbow r.elbow l.wrist r.wrist "
-            "l.hip r.hip l.knee r.knee l.ankle r.ankle"
-        ),
-    ),
+    "coco": Layout("COCO", _parts("nose *.eye *.ear *.shoulder *.elbow *.wrist *.hip *.knee *.ankle")),
     # Human3.6M's 17 joints, as networks send them that lift a picture's points into the room.
-    "h36m": Layout(
-        "Human3.6M",
-        _parts(
-            "- r.hip r.knee r.ankle l.hip l.knee l.ankle chest - nose head "
-            "l.shoulder l.elbow l.wrist r.shoulder r.elbow r.wrist"
-        ),
-    ),
+    "h36m": Layout("Human3.6M", _parts("- r.leg l.leg chest - nose head l.arm r.arm")),
     # Azure Kinect Body Tracking SDK, k4abt_joint_id_t.
-    "kinect": Layout(
-        "Azure Kinect",
-        _parts(
-            "- - chest - - l.shoulder l.elbow l.wrist l.hand - l.thumb - r.shoulder r.elbow r.wrist r.hand - "
-            "r.thumb l.hip l.knee l.ankle l.toe r.hip r.knee r.ankle r.toe - nose l.eye l.ear r.eye r.ear"
-        ),
-        is_y_down=True,
-    ),
+    "kinect": Layout("Azure Kinect", _KINECT, is_y_down=True),
     # MediaPipe's pose landmarks (BlazePose GHUM).
     "mediapipe": Layout(
         "MediaPipe",
         _parts(
-            "nose - l.eye - - r.eye - l.ear r.ear - - l.shoulder r.shoulder l.elbow r.elbow l.wrist r.wrist "
-            "l.little r.little l.index r.index - - l.hip r.hip l.knee r.knee l.ankle r.ankle - - l.toe r.toe"
+            "nose - l.eye - - r.eye - *.ear - - *.shoulder *.elbow *.wrist *.little *.index - - "
+            "*.hip *.knee *.ankle - - *.toe"
         ),
         is_y_down=True,
     ),
     # Stereolabs' ZED SDK, BODY_34_PARTS and BODY_38_PARTS.
-    "zed34": Layout(
-        "ZED 34",
-        _parts(
-            "- - chest - - l.shoulder l.elbow l.wrist l.hand - l.thumb - r.shoulder r.elbow r.wrist r.hand - "
-            "r.thumb l.hip l.knee l.ankle l.toe r.hip r.knee r.ankle r.toe - nose l.eye l.ear r.eye r.ear - -"
-        ),
-    ),
+    "zed34": Layout("ZED 34", (*_KINECT, "", "")),
     "zed38": Layout(
         "ZED 38",
         _parts(
-            "- - - chest - nose l.eye r.eye l.ear r.ear - - l.shoulder r.shoulder l.elbow r.elbow l.wrist "
-            "r.wrist l.hip r.hip l.knee r.knee l.ankle r.ankle l.toe r.toe - - - - - - l.index r.index - - "
-            "l.little r.little"
+            "- - - chest - nose *.eye *.ear - - *.shoulder *.elbow *.wrist *.hip *.knee *.ankle *.toe "
+            "- - - - - - *.index - - *.little"
         ),
     ),
 }

@@ -64,7 +64,7 @@ def swing(start: Vector, end: Vector) -> Quaternion:
 
 
 def twist(axis: Vector, start: Vector, end: Vector) -> float | None:
-    """Radians about a unit axis from one vector to another, seen along it; None: one lies on the axis."""
+    """Radians about a unit axis from one vector to another, seen along it; None: one is parallel to it."""
     a, b = unit(_beside(axis, start)), unit(_beside(axis, end))
     return None if a is None or b is None else math.atan2(dot(axis, cross(a, b)), dot(a, b))
 

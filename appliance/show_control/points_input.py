@@ -12,7 +12,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.pose.turns import Quaternion, Vector
 from appliance.show_control.figure_pose import HIPS, FigurePose
 
-_FARTHEST = 1e5  # of a point, in the program's own unit: 100 m in millimetres
+_FARTHEST = 1e5  # coordinate of a point, in any unit: 100 m in millimetres
 _SILENT_S = 2.0  # after which a stream is a new one: its axes and its size are found anew
 _LEAST_S = 0.0035  # between two frames: 250 a second, and a flood costs no more
 _SIZED_FRAMES = 100  # in which the size is found
@@ -40,7 +40,7 @@ class PointsInput:
             self._begin()
         points: dict[str, Vector] = {}
         for part, x, y, z in zip(self.layout.parts, numbers[::3], numbers[1::3], numbers[2::3], strict=True):
-            if part and (x or y or z) and max(abs(x), abs(y), abs(z)) < _FARTHEST:  # false where one is none
+            if part and (x or y or z) and max(abs(x), abs(y), abs(z)) < _FARTHEST:  # false for NaN
                 points[part] = x, y, z
         if missing := [part for part in TRUNK if part not in points]:
             raise ValueError(self._refusal(f"not seen: {', '.join(missing)}"))
@@ -74,8 +74,8 @@ class PointsInput:
 
     def _refusal(self, what: str) -> str:
         return (
-            f"Of {self.layout.program}'s {len(self.layout.parts)} points, {what}: the figure does not "
-            "follow. Let the camera see hips and shoulders."
+            f"{self.layout.program}'s {len(self.layout.parts)} points, {what}: the figure does not follow. "
+            "Let the camera see hips and shoulders."
         )
 
 

@@ -99,6 +99,49 @@ def test_the_pose_comes_back_from_its_points(layout: str, chance: random.Random)
 
 
 @pytest.mark.parametrize(
+    ("layout", "numbers"),
+    [  # as the programs' own enumerations have them
+        (
+            "coco",
+            {
+                0: "nose",
+                3: "left ear",
+                5: "left shoulder",
+                10: "right wrist",
+                11: "left hip",
+                16: "right ankle",
+            },
+        ),
+        (
+            "h36m",
+            {1: "right hip", 6: "left ankle", 8: "", 10: "head", 11: "left shoulder", 16: "right wrist"},
+        ),
+        (
+            "kinect",
+            {5: "left shoulder", 10: "left thumb", 14: "right wrist", 18: "left hip", 25: "right toe"},
+        ),
+        ("kinect", {27: "nose", 29: "left ear", 30: "right eye", 31: "right ear"}),
+        ("mediapipe", {0: "nose", 7: "left ear", 11: "left shoulder", 16: "right wrist", 17: "left little"}),
+        (
+            "mediapipe",
+            {20: "right index", 23: "left hip", 28: "right ankle", 31: "left toe", 32: "right toe"},
+        ),
+        (
+            "zed34",
+            {2: "chest", 7: "left wrist", 17: "right thumb", 22: "right hip", 27: "nose", 31: "right ear"},
+        ),
+        (
+            "zed38",
+            {3: "chest", 5: "nose", 9: "right ear", 12: "left shoulder", 17: "right wrist", 18: "left hip"},
+        ),
+        ("zed38", {23: "right ankle", 24: "left toe", 32: "left index", 37: "right little"}),
+    ],
+)
+def test_the_points_are_numbered_as_the_programs_number_them(layout: str, numbers: dict[int, str]) -> None:
+    assert {number: LAYOUTS[layout].parts[number] for number in numbers} == numbers
+
+
+@pytest.mark.parametrize(
     "axes",
     [
         lambda x, y, z: (x, y, z),
