@@ -31,6 +31,7 @@ def with_phone(show: Show, box: BoxConfig) -> BoxConfig:
 
     Raises StageError where the show has no sensor, the box no page, or this machine no openssl.
     """
+    from appliance.console.phone_address import is_loopback
     from appliance.show.foreign_sensors import ForeignSensorConfig
 
     worn = [hand.sensor for _, hand in show.config.hands_at if hand.sensor]
@@ -51,8 +52,12 @@ def with_phone(show: Show, box: BoxConfig) -> BoxConfig:
         others = [one for one in sensors.foreign if one.name != worn[0]]
         phone = ForeignSensorConfig.model_validate({"name": worn[0], "from": "phone"})
         sensors = sensors.model_copy(update={"foreign": [*others, phone]})
-    open_to = {} if console.viewers else {"host": _HOST, "viewers": own_networks()[:_MOST_NETWORKS]}
-    console = console.model_copy(update={"https": True, **open_to})
+    opened = {
+        "https": True,
+        "host": _HOST if is_loopback(console.host) else console.host,
+        "viewers": console.viewers or own_networks()[:_MOST_NETWORKS],
+    }
+    console = console.model_copy(update=opened)
     return box.model_copy(update={"sensors": sensors, "console": console})
 
 
@@ -86,7 +91,7 @@ def invitation(codes: JoinCodes, origin: str, name: str, with_picture: bool) -> 
     )
 
 
-def _blocks(squares: list[str], margin: int = 2) -> Iterator[str]:
+def _blocks(squares: list[str], margin: int = 4) -> Iterator[str]:
     """Half a character for each square, light on dark: a terminal's usual colours do not matter."""
     width = len(squares[0]) + 2 * margin
     empty = ["0" * width] * margin

@@ -21,7 +21,7 @@ _LARGEST = 1 << 14
 
 @dataclass(frozen=True)
 class _Admission:
-    """A sensor's code and its phone. until: Unix seconds; digest: of the pass of the phone that used the last code."""
+    """A sensor's code and its phone. until: Unix seconds; digest: of the pass that the last code became."""
 
     name: str
     code: str = ""

@@ -71,6 +71,16 @@ class Phone:
         press(self.tab, f'[data-where="{where}"]')
         press(self.tab, "#begin")
 
+    def see(self, state: str) -> None:
+        """The phone is locked, or another app is opened; or this page is back."""
+        self.tab.evaluate(
+            """(state) => {
+              Object.defineProperty(document, "visibilityState", { value: state, configurable: true });
+              document.dispatchEvent(new Event("visibilitychange"));
+            }""",
+            state,
+        )
+
     def await_lamp(self, lamp: str) -> None:
         expect(self.tab.locator("body")).to_have_attribute("data-lamp", lamp)
 
@@ -115,6 +125,13 @@ def test_a_phone_holds_a_joint_until_its_page_is_closed(
     wait_until(lambda: angle(stage, TURN_DEGREES) < NEAR, lambda: f"{angle(stage, TURN_DEGREES)}")
     phone.take_neutral_pose()
     wait_until(lambda: angle(stage, 0.0) < NEAR, lambda: f"{angle(stage, 0.0)}")
+    phone.see("hidden")
+    wait_until(lambda: held(stage) < 1.0)
+    phone.see("visible")
+    wait_until(lambda: held(stage) == 1.0)
+    phone.tab.reload()
+    phone.begin()
+    phone.await_lamp("on")
     assert not phone.errors
     phone.tab.close(run_before_unload=True)
     wait_until(lambda: not stage[1].get("/api/phones").value[0]["taken"])

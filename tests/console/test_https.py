@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import http.client
 import json
+import re
 import socket
 import ssl
 from pathlib import Path
@@ -12,8 +13,16 @@ from pathlib import Path
 import pytest
 import yaml
 
-from appliance.console.certificate import FILE, certificate_in, fingerprint, https_context
+from appliance.console.certificate import (
+    FILE,
+    authority_certificate,
+    certificate_in,
+    fingerprint,
+    https_context,
+)
 from hw_sim.peers import HOST, free_ports
+from tests.bundles import write_show
+from tests.system.box import playing
 from tests.system.processes import BUNRAKU, Process, run_bunraku, wait_until
 
 
@@ -51,6 +60,38 @@ def test_a_box_has_one_certificate_and_the_same_rules_over_https(tmp_path: Path)
         process.start()
         assert wait_until(lambda: served(port), lambda: process.words) == first
     assert (tmp_path / "state" / FILE).stat().st_mode & 0o077 == 0
+
+
+def test_one_command_offers_a_phone_the_page_and_what_makes_it_trusted(tmp_path: Path) -> None:
+    """The authority that a phone installs is enough to trust the box, and stays when its address changes."""
+    (port,) = free_ports(1, socket.SOCK_STREAM)
+    show, console = write_show(tmp_path / "show"), {"port": port, "names": ["bunraku.hall"]}
+    with playing(show, tmp_path, "--emulate", "--phone", settings={"console": console}) as box:
+        box.await_words("Another phone: bunraku console phone NAME")
+        code = re.search(r"https://\S+/phone#left-wrist=(\S+)", box.words)
+        assert code is not None and wait_until(lambda: served(port), lambda: box.words)
+        anyone = ssl._create_unverified_context()
+        unknown = http.client.HTTPSConnection(HOST, port, context=anyone, timeout=60)
+        unknown.request("GET", "/bunraku.crt")
+        answer = unknown.getresponse()
+        assert answer.headers["Content-Type"] == "application/x-x509-ca-cert"
+        trusted = ssl.create_default_context(cadata=answer.read())
+        unknown.close()
+        page = http.client.HTTPSConnection(HOST, port, context=trusted, timeout=60)
+        said = json.dumps({"name": "left-wrist", "where": "hand", "code": code[1]})
+        for status in (200, 409):
+            page.request("POST", "/api/phones/join", said, {"Origin": f"https://{HOST}:{port}"})
+            answer = page.getresponse()
+            assert answer.status == status, answer.read()
+            answer.read()
+        page.close()
+    first = certificate_in(tmp_path, ["10.0.0.5"])
+    authority, before = authority_certificate(tmp_path), fingerprint(first)
+    assert fingerprint(certificate_in(tmp_path, [])) == before, "it has all these names already"
+    assert fingerprint(certificate_in(tmp_path, ["192.168.7.7"])) != before
+    assert authority_certificate(tmp_path) == authority
+    certificate_in(tmp_path, ["new.hall"])
+    assert authority_certificate(tmp_path) != authority, "it may sign the names of this box only"
 
 
 def test_what_cannot_be_used_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
