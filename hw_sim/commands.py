@@ -46,6 +46,7 @@ class Imu(StrEnum):
 
     bno055 = "bno055"
     bno085 = "bno085"
+    lsm6dsv = "lsm6dsv"
 
 
 @app.command()

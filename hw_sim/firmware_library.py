@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple, TypeAlias, get_type_hints
 from hw_sim.motions import Quaternion
 
 LIBRARY = Path(__file__).resolve().parents[1] / "build" / "firmware" / "libwearable.so"
-IMUS = ("bno055", "bno085")  # the chips that can be wired
+IMUS = ("bno055", "bno085", "lsm6dsv")  # the chips that can be wired
 TO_ALL = 0xFFFFFFFF  # the address of a broadcast
 LARGEST_DATAGRAM = 512
 U64: TypeAlias = Annotated[int, c_uint64]

@@ -39,7 +39,7 @@ bool find_fault(const std::string& name, ImuFault& fault) {
 }  // namespace
 
 bool find_chip(const std::string& name, Wired& wired) {
-  constexpr const char* kChips[] = {"bno055", "bno085"};
+  constexpr const char* kChips[] = {"bno055", "bno085", "lsm6dsv"};
   for (size_t number = 0; number < std::size(kChips); ++number) {
     if (name != kChips[number]) continue;
     wired = static_cast<Wired>(number);

@@ -28,8 +28,8 @@ typedef struct {
   uint8_t has_imu, has_profile, calibration, taps, recoveries, rate_hz, battery;
 } wearable_status;
 
-/* flash: an image from wearable_flash_image, or null for a new board. imu: the chip that is wired, "bno055" or
-   "bno085". Switched off at first. Null when the bytes are no image, or when there is no such chip. */
+/* flash: an image from wearable_flash_image, or null for a new board. imu: the chip that is wired, "bno055",
+   "bno085" or "lsm6dsv". Switched off at first. Null when the bytes are no image, or when there is no such chip. */
 wearable_world* wearable_create(const uint8_t* flash, uint32_t flash_bytes, uint64_t seed, uint64_t start_us,
                                 const char* imu);
 void wearable_destroy(wearable_world* world);

@@ -5,6 +5,7 @@
 
 #include "bno055_model.h"
 #include "bno085_model.h"
+#include "lsm6dsv_model.h"
 
 namespace bunraku {
 namespace {
@@ -15,6 +16,7 @@ constexpr uint64_t kBootUs = 30'000;         // from power to begin(), by the bo
 uint64_t lot(uint64_t seed, uint64_t which) { return Random(seed * 8 + which).next(); }
 
 std::unique_ptr<ImuModel> chip_of(Wired wired, VirtualClock& clock, uint64_t seed) {
+  if (wired == Wired::kLsm6dsv) return std::make_unique<Lsm6dsvModel>(clock, seed);
   if (wired == Wired::kBno085) return std::make_unique<Bno085Model>(clock, seed);
   return std::make_unique<Bno055Model>(clock, seed);
 }

@@ -23,7 +23,7 @@ struct WorldCounts {
 };
 
 // Which chip is wired. The firmware of the MKR boards drives a BNO055; that of the ESP32 boards searches for its chip.
-enum class Wired : uint8_t { kBno055, kBno085 };
+enum class Wired : uint8_t { kBno055, kBno085, kLsm6dsv };
 
 class World {
  public:

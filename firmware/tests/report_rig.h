@@ -7,6 +7,7 @@
 #include "dancing_arm.h"
 #include "imu.h"
 #include "imu_model.h"
+#include "rotation.h"
 #include "schedule.h"
 
 namespace bunraku {
@@ -60,11 +61,19 @@ struct ReportRig {
     const uint32_t age_us = clock.micros() - sample.measured_us;
     oldest_us = std::max(oldest_us, age_us);
     const Quaternion truth = model.fused(clock.now_us() - age_us, field);
-    worst_degrees = std::max(worst_degrees, degrees_between(truth, quaternion(sample.orientation)));
+    const Quaternion said = quaternion(sample.orientation);
+    if (is_heading_free && (readings == 1 || imu.recoveries() != recoveries)) align(truth, said);
+    worst_degrees = std::max(worst_degrees, degrees_between(truth, product(about_z(heading_offset), said)));
     if (starts != 0 && starts != model.counts().fusion_starts) CHECK(imu.recoveries() != recoveries);
     if (starts == model.counts().fusion_starts) CHECK(imu.recoveries() == recoveries);
     starts = model.counts().fusion_starts;
     recoveries = imu.recoveries();
+  }
+
+  // Where the board fuses, its heading is nobody's choice: the first reading says which it is.
+  void align(const Quaternion& truth, const Quaternion& said) {
+    const Quaternion apart = product(truth, {said[0], -said[1], -said[2], -said[3]});
+    heading_offset = 2 * std::atan2(apart[3], apart[0]);
   }
 
   // Rules that every fault must leave intact; `slack_degrees`: the error that a damaged byte may cause.
@@ -82,6 +91,8 @@ struct ReportRig {
   Schedule schedule;
   Sample sample = {};
   bool field = false;
+  bool is_heading_free = false;
+  double heading_offset = 0;
   uint32_t readings = 0, accelerations = 0;
   int hardest = 0;
   uint32_t most_transactions = 0, starts = 0, oldest_us = 0;

@@ -15,13 +15,13 @@
 namespace bunraku {
 namespace {
 
-using Rig = ReportRig<Bno085, Bno085Model>;
+using HubRig = ReportRig<Bno085, Bno085Model>;
 
 }  // namespace
 
 TEST_CASE("BNO085: from power-on to the first reading, whatever its seed and the clock's wrap") {
   for (uint64_t seed = 1; seed <= 20; ++seed) {
-    Rig rig(seed, seed % 2 == 0 ? 0xFFFFFFFFu - 20000 * seed : 1000);
+    HubRig rig(seed, seed % 2 == 0 ? 0xFFFFFFFFu - 20000 * seed : 1000);
     rig.model.set_motion(dance);
     rig.power_on();
     CHECK(rig.run_until_reading() < 0.4);
@@ -32,15 +32,15 @@ TEST_CASE("BNO085: from power-on to the first reading, whatever its seed and the
     rig.run(1);
     rig.check_manners();
   }
-  Rig one(1), other(2);
-  for (Rig* rig : {&one, &other}) rig->power_on(), rig->run(1);
+  HubRig one(1), other(2);
+  for (HubRig* rig : {&one, &other}) rig->power_on(), rig->run(1);
   CHECK(memcmp(one.imu.unique_id(), other.imu.unique_id(), kImuIdBytes) != 0);
 }
 
 TEST_CASE("BNO085: 50 and 100 readings a second, young, and 100 accelerations") {
   for (const uint32_t period_us : {20000u, 10000u}) {
-    for (const ImuSettings& settings : {Rig::kPlain, Rig::kNdof}) {
-      Rig rig;
+    for (const ImuSettings& settings : {HubRig::kPlain, HubRig::kNdof}) {
+      HubRig rig;
       rig.model.set_motion(dance);
       rig.power_on(settings, period_us);
       rig.run(1);
@@ -62,7 +62,7 @@ TEST_CASE("BNO085: 50 and 100 readings a second, young, and 100 accelerations") 
 }
 
 TEST_CASE("BNO085: a knock reaches the taps") {
-  Rig rig;
+  HubRig rig;
   rig.power_on();
   rig.run(2);
   CHECK(rig.hardest < 10);
@@ -72,12 +72,12 @@ TEST_CASE("BNO085: a knock reaches the taps") {
 }
 
 TEST_CASE("BNO085: the board restarts, the hub does not: its heading is kept; other settings are another fusion") {
-  Rig rig;
+  HubRig rig;
   rig.model.set_motion(dance);
   rig.power_on();
   rig.run(3);
   Bno085 restarted(rig.model);
-  restarted.start(Rig::kPlain, rig.clock.micros());
+  restarted.start(HubRig::kPlain, rig.clock.micros());
   const uint64_t begun_us = rig.clock.now_us();
   while (!restarted.is_running() && rig.clock.now_us() < begun_us + 1000000) {
     restarted.step(rig.clock.micros());
@@ -85,7 +85,7 @@ TEST_CASE("BNO085: the board restarts, the hub does not: its heading is kept; ot
   }
   CHECK(rig.clock.now_us() - begun_us < 100000);
   CHECK(restarted.recoveries() == 0);
-  restarted.start(Rig::kNdof, rig.clock.micros());
+  restarted.start(HubRig::kNdof, rig.clock.micros());
   for (int i = 0; i < 1000; ++i) restarted.step(rig.clock.micros()), rig.clock.advance(300);
   CHECK(restarted.is_running());
   CHECK(restarted.recoveries() == 1);
@@ -126,7 +126,7 @@ TEST_CASE("BNO085: no hub: it says so, and takes one that comes later, at either
     Bno085Model model(clock, 3, address);
     Bno085 imu(model);
     model.power_off();
-    imu.start(Rig::kPlain, clock.micros());
+    imu.start(HubRig::kPlain, clock.micros());
     const auto run_until = [&](auto is_so) {
       const uint64_t begun_us = clock.now_us();
       while (!is_so() && clock.now_us() < begun_us + 5000000) imu.step(clock.micros()), clock.advance(300);
@@ -145,7 +145,7 @@ TEST_CASE("BNO085: short trouble on the bus costs readings, not the heading") {
     for (const uint32_t times : {1u, 2u, 5u}) {
       CAPTURE(static_cast<int>(fault));
       CAPTURE(times);
-      Rig rig(times);
+      HubRig rig(times);
       rig.model.set_motion(dance);
       rig.power_on();
       rig.run(3);
@@ -171,9 +171,9 @@ TEST_CASE("BNO085: a hub that lost its fusion is brought back, and the lost head
                                  Trouble{ImuFault::kSilentConfig, 0.6, &Bno085Counts::silences},
                                  Trouble{ImuFault::kFusionError, 4.0, &Bno085Counts::resets},
                                  Trouble{ImuFault::kFrozen, 4.0, &Bno085Counts::resets}}) {
-    for (const ImuSettings& settings : {Rig::kPlain, Rig::kNdof}) {
+    for (const ImuSettings& settings : {HubRig::kPlain, HubRig::kNdof}) {
       CAPTURE(static_cast<int>(trouble.fault));
-      Rig rig(9);
+      HubRig rig(9);
       rig.model.set_motion(dance);
       rig.power_on(settings);
       rig.run(3);
@@ -195,7 +195,7 @@ TEST_CASE("BNO085: with trouble in one transaction of twenty it dances on, and b
   for (const ImuFault fault :
        {ImuFault::kNack, ImuFault::kStuckBus, ImuFault::kZeroRead, ImuFault::kTornRead, ImuFault::kFlippedBit}) {
     CAPTURE(static_cast<int>(fault));
-    Rig rig(12);
+    HubRig rig(12);
     rig.model.set_motion(dance);
     rig.power_on();
     rig.run(2);
@@ -209,7 +209,7 @@ TEST_CASE("BNO085: with trouble in one transaction of twenty it dances on, and b
 
 TEST_CASE("BNO085: a loop that stalls gets the newest orientation, and takes no stall for silence") {
   for (const uint32_t loop_us : {50u, 4000u, 60000u}) {
-    Rig rig;
+    HubRig rig;
     rig.model.set_motion(dance);
     rig.power_on();
     rig.run(10, loop_us);
@@ -217,7 +217,7 @@ TEST_CASE("BNO085: a loop that stalls gets the newest orientation, and takes no 
     CHECK(rig.imu.recoveries() == 0);
     CHECK(rig.imu.counts().silences == 0);
   }
-  Rig rig;
+  HubRig rig;
   rig.power_on();
   rig.run(2);
   rig.clock.advance(10000000);  // a join
@@ -228,7 +228,7 @@ TEST_CASE("BNO085: a loop that stalls gets the newest orientation, and takes no 
 }
 
 TEST_CASE("BNO085: it saves its calibration in its own flash, and the next power-on finds it there") {
-  Rig rig(4);
+  HubRig rig(4);
   rig.model.set_motion(dance);
   rig.power_on();
   rig.run(5);
@@ -249,7 +249,7 @@ TEST_CASE("BNO085: it saves its calibration in its own flash, and the next power
   CHECK_FALSE(rig.imu.use_profile(bytes));
   Bno085 restarted(rig.model);
   rig.model.power_on();
-  restarted.start(Rig::kPlain, rig.clock.micros());
+  restarted.start(HubRig::kPlain, rig.clock.micros());
   for (int i = 0; i < 10000; ++i) restarted.step(rig.clock.micros()), rig.clock.advance(300);
   CHECK(restarted.has_profile());
   CHECK(restarted.is_calibrated());

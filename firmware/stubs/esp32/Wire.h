@@ -9,7 +9,7 @@ class TwoWire {
   bool begin();
   bool end();
   bool setClock(uint32_t hertz);
-  void setTimeOut(uint16_t timeout_ms);  // of a transaction; 50 ms by itself
+  void setTimeOut(uint16_t timeout_ms);  // limits a transaction; 50 ms at first
   void beginTransmission(uint8_t address);
   uint8_t endTransmission(bool sends_stop);  // without a stop nothing is sent before requestFrom()
   size_t requestFrom(uint8_t address, size_t quantity, bool sends_stop);

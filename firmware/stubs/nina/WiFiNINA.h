@@ -17,6 +17,7 @@ class WiFiClass {
   static const char* firmwareVersion();
   int32_t RSSI();
   void noLowPowerMode();
-  void setTimeout(unsigned long timeout_ms);  // of begin(), which looks every five seconds; 0: it returns at once
+  void setTimeout(
+      unsigned long timeout_ms);  // limits begin(), which looks every five seconds; 0: it returns at once
 };
 extern WiFiClass WiFi;

@@ -4,18 +4,20 @@
 #include "bno055.h"
 #include "bno085.h"
 #include "imu_search.h"
+#include "lsm6dsv.h"
 
 namespace bunraku {
 
 class AnyImu final {
  public:
-  explicit AnyImu(I2cBus& bus) : bno055_(bus), bno085_(bus) {}
+  explicit AnyImu(I2cBus& bus) : bno055_(bus), bno085_(bus), lsm6dsv_(bus) {}
   operator Imu&() { return search_; }
 
  private:
   Bno055 bno055_;
   Bno085 bno085_;
-  Imu* all_[2] = {&bno055_, &bno085_};
+  Lsm6dsv lsm6dsv_;
+  Imu* all_[3] = {&bno055_, &bno085_, &lsm6dsv_};
   ImuSearch search_{all_};
 };
 

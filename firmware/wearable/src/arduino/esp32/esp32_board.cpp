@@ -34,7 +34,7 @@ void Esp32Lamp::begin() {
 
 void Esp32Lamp::set(bool is_on) { digitalWrite(LED_BUILTIN, is_on != kIsLampInverted ? HIGH : LOW); }
 
-// The core starts the watchdog with another time-out and its own idle tasks; here the loop alone is watched.
+// The Arduino core starts the watchdog for its idle tasks, with another time-out; here it watches only the loop.
 void Esp32Board::begin() {
   esp_task_wdt_config_t config = {};
   config.timeout_ms = kWatchdogMs;

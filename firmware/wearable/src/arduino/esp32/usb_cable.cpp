@@ -1,4 +1,4 @@
-// USB serial of an ESP32-S3 board. Written is only what has room: the core's write() would wait for it.
+// USB serial of an ESP32-S3 board. It writes no more than there is room for: the Arduino core would wait for room.
 #include "../board.h"
 #ifdef BUNRAKU_ESP32
 
