@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import median
 
 from appliance.pose.point_axes import PointAxes
 from appliance.pose.point_fit import TRUNK, PointFit
@@ -55,10 +56,9 @@ class PointsInput:
 
     def _root(self, points: dict[str, Vector], turns: dict[str, Quaternion]) -> Vector:
         """Where the hips are. Where the program counts from them, as high as the legs carry them."""
-        scale = self._fit.scale(points) or 1.0
-        if self._sized < _SIZED_FRAMES:
-            self._sized += 1
-            self._scale += (scale - self._scale) / self._sized
+        if len(self._sizes) < _SIZED_FRAMES and (size := self._fit.scale(points)):
+            self._sizes.append(size)
+            self._scale = median(self._sizes)
         x, y, z = self._fit.root(points, turns[HIPS], self._scale)
         middle = self._fit.root(points, turns[HIPS], 0.0)
         self._is_centred &= math.dist((x, y, z), middle) < _CENTRED
@@ -70,7 +70,8 @@ class PointsInput:
     def _begin(self) -> None:
         self._fit.begin()
         self._axes = PointAxes(self.layout.is_y_down)
-        self._scale, self._sized, self._is_centred = 1.0, 0, True
+        self._sizes: list[float] = []
+        self._scale, self._is_centred = 1.0, True
 
     def _refusal(self, what: str) -> str:
         return (

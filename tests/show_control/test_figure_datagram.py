@@ -17,9 +17,11 @@ from appliance.box.live_pose import LivePose, LivePoseReader
 from appliance.levers.sources import LIVE
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
+from appliance.pose.possible import FARTHEST_M
 from appliance.pose.quaternion import Array
 from appliance.pose.t_pose import humanoid_rest
 from appliance.show.programs import MOCOPI_BONES
+from appliance.show_control.figure_datagram import turns_in
 from appliance.show_control.intake import LIVE_WAITING
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts, until
 from tests.show_control.fuzz import bundle, message
@@ -192,6 +194,23 @@ def test_a_damaged_datagram_is_refused_in_words(
     assert reader.read() is None
     told = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
     assert told and told[0][4] == 1
+
+
+@pytest.mark.parametrize("program", [xsens, mocopi])
+def test_whatever_bytes_come_there_is_a_figure_or_a_sentence(program, chance: random.Random) -> None:
+    whole = program(true_turns(0)[1])
+    for _ in range(2000):
+        received = bytearray(whole[: chance.choice((len(whole), chance.randrange(8, len(whole))))])
+        for place in chance.sample(range(8, len(received)), min(chance.randrange(8), len(received) - 8)):
+            received[place] = chance.randrange(256)
+        try:
+            figure = turns_in(bytes(received))
+        except ValueError:
+            continue
+        if figure is not None:
+            turns, hips = np.array(list(figure.turns.values())), np.array(figure.hips)
+            assert np.linalg.norm(turns, axis=1) == pytest.approx(1.0)
+            assert np.isnan(hips).all() or np.abs(hips).max() <= FARTHEST_M
 
 
 def test_other_persons_and_other_datagrams_of_mvn_are_passed_over(

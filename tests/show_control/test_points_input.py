@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import random
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -136,6 +138,31 @@ def test_a_program_that_also_sends_rotations_of_its_own_joints_is_taken_by_its_p
     stand(asker, reader, "zed38")
     asker.tell(ROTATIONS, *[1.0, 0.0, 0.0, 0.0] * 38)
     assert asker.ask("/ping") == ["/pong"]
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_whatever_numbers_come_there_is_a_pose_or_a_sentence(layout: str, chance: random.Random) -> None:
+    points, now, poses = PointsInput(FIGURE, FigurePose(FIGURE), layout), 0.0, 0
+    odd = (0.0, math.nan, math.inf, -math.inf, 1e-300, 1e30, -1e5, 1e5, 1.0)
+    for frame in chance.sample(range(len(PHRASE.poses)), 200):
+        now += chance.choice((0.0, 0.02, 3.0, -1.0))
+        numbers = camera(layout, PHRASE.poses[frame].astype(float), [0.0, 0.9, 0.0])
+        for place in chance.sample(range(len(numbers)), chance.choice((0, 3, 10, len(numbers)))):
+            numbers[place] = chance.choice(odd)
+        if chance.random() < 0.2:
+            numbers[chance.randrange(3) :: 3] = [0.0] * (len(numbers) // 3)  # a picture, without depth
+        try:
+            whole = points.hear(numbers, now)
+        except ValueError as error:
+            assert "the figure does not follow" in str(error)
+            continue
+        if whole is not None:
+            rotations = np.array(whole[1]).reshape(-1, 4)
+            known = np.isfinite(rotations).all(axis=1)
+            assert np.isnan(rotations[~known]).all()
+            assert np.linalg.norm(rotations[known], axis=1) == pytest.approx(1.0)
+            poses += 1
+    assert poses
 
 
 def test_points_that_come_too_fast_cost_nothing_and_a_new_stream_is_measured_anew() -> None:
