@@ -89,13 +89,19 @@ class _Place:
         self.sensor.switch_on()
         return self.session
 
-    def hear(self, message: dict[str, Any], now: float) -> str:
-        """Take a message; what is wrong with it, in one word of the page, or ""."""
+    def hear(self, message: dict[str, Any], now: float, skipped: int) -> str:
+        """Take a message; what is wrong with it, in one word of the page, or "".
+
+        skipped: messages before it that were too close to each other to be read.
+        """
         if now - self._second >= 1.0:
             self._second, self._in_second = now, 0
-        self._in_second += 1
-        if self._in_second > MOST_A_SECOND and now - self._heard < _CLOSEST_S:
-            return self._refuse("too_fast")
+        self._in_second += 1 + skipped
+        is_flood = self._in_second > MOST_A_SECOND
+        if is_flood:
+            self.counts["too_fast"] += 1 + skipped
+            if now - self._heard < _CLOSEST_S:
+                return "too_fast"
         self._heard = now
         told = _numbers([message.get("t"), message.get("taps", 0)], 1e15)
         if len(told) != 2:
@@ -117,7 +123,9 @@ class _Place:
         battery = message.get("battery")
         level = battery if type(battery) is int and 0 <= battery <= 100 else BATTERY_UNKNOWN
         self.sensor.take(multiplied(from_device_angles(*angles), self.front), now, level)
-        return self._refuse("clock_back") if runs_back else ""
+        if runs_back:
+            return self._refuse("clock_back")
+        return "too_fast" if is_flood else ""
 
     def _refuse(self, why: str) -> str:
         """Count it."""
@@ -262,11 +270,13 @@ class Phones:
         await phone.prepare(request)
         newest: dict[str, Any] = {}
         answered_at = heard_at = -math.inf
+        skipped = 0
         with contextlib.suppress(TimeoutError, ConnectionError):
             async for message in phone:
                 now = time.monotonic()
                 if now - heard_at < _FLOOD_S and answered_at > -math.inf:
-                    continue  # a flood costs no more than this
+                    skipped += 1  # a flood costs no more than this
+                    continue
                 heard_at = now
                 values = _object(message.data) if message.type == WSMsgType.TEXT else None
                 place = None if values is None else self._of_session(values.get("session"))
@@ -274,15 +284,15 @@ class Phones:
                     await phone.close(code=1008, message=b"no sensor of this page")
                     break
                 self._know(request, watches=True)
-                answer = self._hear(place, values)
+                answer, skipped = self._hear(place, values, skipped), 0
                 if answer != newest or now - answered_at >= _ANSWER_EACH_S:
                     newest, answered_at = answer, now
                     await phone.send_str(json.dumps(answer))
         return phone
 
-    def _hear(self, place: _Place, message: dict[str, Any]) -> dict[str, Any]:
+    def _hear(self, place: _Place, message: dict[str, Any], skipped: int = 0) -> dict[str, Any]:
         now = time.monotonic()
-        if why := place.hear(message, now):
+        if why := place.hear(message, now, skipped):
             self._fallbacks.count(PHONE_REFUSED.name, now)
             troubled = [one.name for one in self._places.values() if one.counts.keys() - {"late"}]
             self._fallbacks.concern(PHONE_REFUSED.name, troubled)
