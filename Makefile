@@ -52,6 +52,7 @@ SIGNING = $(if $(KEY),--key '$(KEY)') $(if $(NEXT_KEY),--next-key '$(NEXT_KEY)')
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 	@echo "  make run ARGS='--seconds 10' passes options on; make run ARGS= dances until Ctrl-C"
+	@echo "  make run ARGS=--phone prints a QR code: scan it, and your phone is the sensor"
 	@echo "  make test TEST_ARGS='--seed 5 tests/cli' passes options to pytest; test-long is pytest --long"
 
 run: $(VENV)/.ready-to-run ## dance with an emulated sensor, in a window or into a picture
