@@ -101,8 +101,9 @@ def test_its_readings_are_believed_and_say_how_the_hand_stands(imu: str) -> None
 class ScriptedBox:
     """Assigns every hello to the same session and beats each second: a box without chance."""
 
-    def __init__(self) -> None:
+    def __init__(self, rate_hz: int = 50) -> None:
         self._tagger = wire.Tagger(KEY.key)
+        self._rate_hz = rate_hz
         self._sequence = 0
         self._boot_nonce = 0
 
@@ -112,7 +113,7 @@ class ScriptedBox:
             return None
         self._sequence += 1
         head = device, self._boot_nonce, 0x5E55, self._sequence
-        return wire.pack(wire.Assignment(*head, sequence, 0, 50, wire.LED_ON), self._tagger)
+        return wire.pack(wire.Assignment(*head, sequence, 0, self._rate_hz, wire.LED_ON), self._tagger)
 
     def heartbeat(self) -> bytes:
         self._sequence += 1
@@ -120,9 +121,11 @@ class ScriptedBox:
         return wire.pack(wire.Heartbeat(*head, 0, 0, wire.LED_SLOW), self._tagger)
 
 
-def course(seed: int, lane: Lane = Lane.NETWORK, seconds: int = 12) -> tuple[FirmwareSensor, list[Outgoing]]:
-    """A device alone with a scripted box, and all that it sent."""
-    one, box, sent = device(seed=seed), ScriptedBox(), []
+def course(
+    seed: int, lane: Lane = Lane.NETWORK, seconds: int = 12, rate_hz: int = 50, imu: str = IMUS[0]
+) -> tuple[FirmwareSensor, list[Outgoing]]:
+    """A device without other sensors and a scripted box, and all that it sent."""
+    one, box, sent = device(seed=seed, imu=imu), ScriptedBox(rate_hz), []
     one.start(50.0)
     one.connect(lane, True, 50.0)
     for step in range(1, 100 * seconds):
@@ -142,6 +145,18 @@ def test_the_same_seed_gives_the_same_bytes_at_the_same_times() -> None:
     assert sum(packet.sample is not None for packet in first) > 400
     assert first == second
     assert first != other
+
+
+@pytest.mark.parametrize("imu", IMUS)
+@pytest.mark.parametrize("rate_hz", [50, 100])
+def test_each_inertial_unit_gives_as_many_readings_as_the_box_asks_for(imu: str, rate_hz: int) -> None:
+    one, sent = course(5, Lane.CABLE, seconds=10, rate_hz=rate_hz, imu=imu)
+    one.close()
+    at = [packet.sample.sampled_at for packet in sent if packet.sample is not None]
+    dancing = [late - early for early, late in pairwise(at) if early > 55.0]
+    assert len(dancing) > 4.5 * rate_hz
+    assert max(dancing) < 1.7 / rate_hz
+    assert abs(sum(dancing) / len(dancing) - 1 / rate_hz) < 0.01 / rate_hz
 
 
 def test_over_a_cable_it_is_there_at_once_and_the_lamp_does_what_the_box_wants() -> None:
