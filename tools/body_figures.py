@@ -32,7 +32,7 @@ def print_figures(journal: Path, show: Path) -> None:
         )
 
     row("phrase", phrase)
-    row("danced", load_dance(journal).recording)
+    row("danced", load_dance(journal).of_puppet(None))
 
 
 if __name__ == "__main__":

@@ -95,5 +95,5 @@ def test_every_command_turns_a_dance_as_inspect_says(tmp_path: Path, bunraku: Co
         assert ahead(read_bvh(out)) > 0.9
         bunraku(*command, "--facing", "z")
         assert ahead(read_bvh(out)) < -0.9
-    assert ahead(load_dance(file).recording) > 0.9
-    assert ahead(load_dance(file, ReadingOptions(facing={"*": "z"})).recording) < -0.9
+    assert ahead(load_dance(file).of_puppet(None)) > 0.9
+    assert ahead(load_dance(file, ReadingOptions(facing={"*": "z"})).of_puppet(None)) < -0.9
