@@ -14,9 +14,8 @@ _HINTED, _SETTLED, _MOST = 0.2, 3.0, 10.0  # evidence that the points are mirror
 _TURNED_ROUND = math.cos(math.radians(120.0))
 _LONGEST_GAP_S = 0.1  # between two frames; in a longer one a dancer may turn round
 _LONGEST_MIX_UP_S = 0.3  # a figure that is turned round for longer has turned round
-_TURNS: dict[
-    str, Callable[[float, float, float], Vector]
-] = {  # where the program's up is: the box's x, y, z of its x, y, z, as a proper rotation
+_Turn = Callable[[float, float, float], Vector]
+_TURNS: dict[str, _Turn] = {  # by the program's axis that is up: a turn into the box's axes
     "+y": lambda x, y, z: (x, y, z),
     "-y": lambda x, y, z: (x, -y, -z),
     "+z": lambda x, y, z: (x, z, -y),

@@ -87,7 +87,7 @@ class MotionConfig(Section):
     )
     live: bool = key(
         "Whether a live dancer's motion capture may take the phrase's place: cues and `/phrase` call it "
-        "`live`. It comes to the control port as `/mocap/0/joint/rot_local` (docs/osc.md).",
+        "`live`. docs/osc.md lists the programs that may send it.",
         False,
     )
     vary: VaryConfig | None = key("The source `vary`: the phrase danced anew at every return.", None)
