@@ -44,16 +44,17 @@ def draw(out: str) -> None:
 def _danced(gain: float) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
     show = load_show(default_show_path())
     parts = assemble(show, BOX)
-    springs = parts.first.springs
+    springs = parts.led.springs
     if springs is None:
         raise SystemExit("The default show has no springs among its hands.")
-    springs.enabled, parts.motion.rate = True, 0.0
+    springs.enabled, parts.led.motion.rate = True, 0.0
     springs.call("strings", kicks=False)
     springs.turn("wind", (0.0, 0.0, 0.0))
     springs.turn("feedback", (gain,))
     instrument = Instrument(show.skeleton, show.config.strings or StringsConfig(), SoundConfig())
     instrument.level = 1.0
-    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), Iterations(10, 9, 10), TICK_S)
+    parts.led.iterations = Iterations(10, 9, 10)
+    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), TICK_S)
     way, heard = [], []
     for number in range(round(SECONDS / TICK_S)):
         if number == round(KICK_S / TICK_S):
@@ -61,7 +62,7 @@ def _danced(gain: float) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
         slot = Slot(number, number * TICK_S, number * TICK_S, 0)
         tick.run(slot)
         tick.after(slot)
-        positions = tick.frame.positions
+        positions = tick.frames[0].positions
         way.append(float(positions[show.skeleton.index(HAND), 0]))
         instrument.dance(positions, slot.deadline)
         heard.append(instrument.render(960))

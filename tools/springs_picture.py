@@ -42,19 +42,20 @@ def draw(out: Path) -> None:
 def _strip(out: Path, setting: str) -> Path:
     show = load_show(default_show_path())
     parts = assemble(show, BOX)
-    springs = parts.first.springs
+    springs = parts.led.springs
     if springs is None:
         raise SystemExit("The default show has no springs among its hands.")
     springs.settings, springs.enabled = {one.name: one for one in built_in()}, bool(setting)
     springs.call(setting or "loose")
-    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), Iterations(10, 9, 10), TICK_S)
+    parts.led.iterations = Iterations(10, 9, 10)
+    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), TICK_S)
     poses, roots = [], []
     for number in range(round((BEFORE_S + SECONDS) / TICK_S)):
         slot = Slot(number, number * TICK_S, number * TICK_S, 0)
         tick.run(slot)
         tick.after(slot)
-        poses.append(tick.frame.pose.copy())
-        roots.append(tick.frame.root.copy())
+        poses.append(tick.frames[0].pose.copy())
+        roots.append(tick.frames[0].root.copy())
     parts.close()
     begin = round(BEFORE_S / TICK_S)
     title = f"springs: {setting}" if setting else "without springs"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,24 +17,29 @@ LARGEST = 4000  # bytes of a packed checkpoint; one slot on the disk is a page o
 PLACE = Record("place", "place", LARGEST)
 FILE = PLACE.name
 
-_NUMBERS = struct.Struct("<q9d4HBB")
-_OTHER = struct.Struct("<9d2H")  # another puppet: its places as above, its iterations
-_ENDED = 1
+_FORMAT = b"2\0"  # of another release: no place
+_SHOW = struct.Struct("<qd2H3B")  # tick, rate, restarts, power cuts, ended, tries, puppets
+_STANDING = struct.Struct("<8d2H")  # position, excerpt, standing, strayed, iterations
 _MOST = 0xFFFF
 _MOST_NUMBER = 1 << 62  # ticks and seeds may get this large; seconds and parameters stay far below
 
 
 class Standing(NamedTuple):
-    """Where another puppet than the first is, right before the next tick; the same words as Checkpoint's."""
+    """Where a puppet is, right before the next tick.
+
+    phrase, position_s: which pose comes next; excerpt: first and last second of the part that plays;
+    standing: where the phrase's root stands on the stage, x, z (metres), heading (radians about +Y); strayed:
+    how far grounding has moved the figure from there (metres); let_go: joints whose hands have let go; made:
+    number of what was made ahead and is danced, whose seconds position_s then counts, else 0.
+    """
 
     phrase: str
     position_s: float
     excerpt: tuple[float, float]
-    rate: float
-    standing: tuple[float, float, float]  # x, z, heading
-    strayed: tuple[float, float]
-    coding: int
-    interaction: int
+    standing: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    strayed: tuple[float, float] = (0.0, 0.0)
+    coding: int = 1
+    interaction: int = 0
     let_go: tuple[str, ...] = ()
     made: int = 0
 
@@ -43,31 +48,18 @@ class Standing(NamedTuple):
 class Checkpoint:
     """Where a show is, right before its next tick.
 
-    phrase, position_s: which pose comes next; excerpt: first and last second of the part that plays;
-    rate: its speed while the show goes; x, z (metres), heading (radians about +Y): where the phrase's root
-    stands on the stage; strayed: how far grounding has moved the figure from there (metres); let_go: joints
-    whose hands have let go; source: what is to take the phrase's place, else ""; applied: the generation of
-    the show state that all this follows; boot: the machine's boot id; tick: of the last frame; restarts,
-    power_cuts: how often the show went on after one; ended: the show was ended as it should; tries: starts
-    from here that produced no frame; others: the puppets beside the first; motion: parts of the show state
-    for the generator, by name, with their values; made: number of what was made ahead and is danced, whose
-    seconds position_s then counts, else 0; liveliness: the level that was asked for last, the seed of the
-    noise, and the absolute tick of this stage's tick 0; None: of another release.
+    rate: speed of its phrases while the show goes; source: what is to take the phrase's place, else "";
+    applied: the generation of the show state that all this follows; boot: the machine's boot id; tick: of the
+    last frame; restarts, power_cuts: how often the show went on after one; ended: the show was ended as it
+    should; tries: starts from here that produced no frame; motion: parts of the show state for the generator,
+    by name, with their values; liveliness: the level that was asked for last, the seed of the noise, and the
+    absolute tick of this stage's tick 0.
     """
 
     show: str
-    phrase: str
-    position_s: float
-    excerpt: tuple[float, float]
+    puppets: tuple[Standing, ...]
     rate: float = 1.0
-    x: float = 0.0
-    z: float = 0.0
-    heading: float = 0.0
-    strayed: tuple[float, float] = (0.0, 0.0)
-    coding: int = 1
-    interaction: int = 0
     cue: str = ""
-    let_go: tuple[str, ...] = ()
     boot: str = ""
     tick: int = 0
     restarts: int = 0
@@ -76,40 +68,25 @@ class Checkpoint:
     tries: int = 0
     applied: int = 0
     source: str = ""
-    others: tuple[Standing, ...] = ()
     motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    made: int = 0
-    liveliness: tuple[float, int, int] | None = None
+    liveliness: tuple[float, int, int] = (1.0, 0, 0)
 
 
 def packed(place: Checkpoint) -> bytes:
     """A place as bytes, at most LARGEST; raises ValueError for names that are longer than that."""
-    numbers = _NUMBERS.pack(
-        place.tick,
-        place.position_s,
-        *place.excerpt,
-        place.rate,
-        place.x,
-        place.z,
-        place.heading,
-        *place.strayed,
-        place.coding,
-        place.interaction,
-        min(place.restarts, _MOST),
-        min(place.power_cuts, _MOST),
-        _ENDED * place.ended,
-        place.tries,
-    )
-    others = tuple([(other.phrase, other.let_go, other.made) for other in place.others])
-    payload = numbers + _names(
-        *(place.show, place.phrase, place.cue, place.let_go, place.boot, place.applied, place.source),
-        *(others, place.motion, place.made, place.liveliness),
-    )
-    payload += b"\0" if others else b""
-    for one in place.others:
-        payload += _OTHER.pack(
-            one.position_s, *one.excerpt, one.rate, *one.standing, *one.strayed, one.coding, one.interaction
+    counts = min(place.restarts, _MOST), min(place.power_cuts, _MOST), place.ended, place.tries
+    parts = [_FORMAT, _SHOW.pack(place.tick, place.rate, *counts, len(place.puppets))]
+    parts += [
+        _STANDING.pack(one.position_s, *one.excerpt, *one.standing, *one.strayed, one.coding, one.interaction)
+        for one in place.puppets
+    ]
+    parts.append(
+        _names(
+            *(place.show, place.cue, place.boot, place.applied, place.source, place.motion, place.liveliness),
+            tuple([(one.phrase, one.let_go, one.made) for one in place.puppets]),
         )
+    )
+    payload = b"".join(parts)
     if len(payload) > LARGEST and place.motion:
         return packed(replace(place, motion=()))  # the place counts for more
     if len(payload) > LARGEST:
@@ -120,49 +97,40 @@ def packed(place: Checkpoint) -> bytes:
 def unpacked(payload: bytes) -> Checkpoint | None:
     """The place in these bytes; None for an unknown format and for numbers that no stage can have."""
     try:
-        tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
-            _NUMBERS.unpack_from(payload)
+        if not payload.startswith(_FORMAT):
+            return None
+        at = len(_FORMAT)
+        tick, rate, restarts, power_cuts, ended, tries, puppets = _SHOW.unpack_from(payload, at)
+        names_at = at + _SHOW.size + puppets * _STANDING.size
+        show, cue, boot, applied, source, motion, (level, seed, begins_at), names = plain_json(
+            payload[names_at:]
         )
-        names, numbers_of_others = _split(payload)
-        show, phrase, cue, let_go, boot, applied, *later = plain_json(names)
+        numbers = _STANDING.iter_unpack(payload[at + _SHOW.size : names_at])
         place = Checkpoint(
             str(show),
-            str(phrase),
-            position_s,
-            (start_s, end_s),
+            tuple(_standing(*one) for one in zip(names, numbers, strict=True)),
             rate,
-            x,
-            z,
-            heading,
-            (strayed_x, strayed_z),
-            small[0],
-            small[1],
             str(cue),
-            tuple(str(joint) for joint in let_go),
             str(boot),
             tick,
-            small[2],
-            small[3],
-            bool(small[4] & _ENDED),
-            small[5],
+            restarts,
+            power_cuts,
+            bool(ended),
+            tries,
             int(applied),
-            str(later[0]) if later else "",
-            tuple(map(_standing, *later[1:2], numbers_of_others)) if later[1:] else (),
-            tuple((str(name), tuple(map(float, values))) for name, values in later[2]) if later[2:] else (),
-            int(later[3]) if later[3:] else 0,
-            _liveliness(*later[4]) if later[4:] and later[4] else None,
+            str(source),
+            tuple((str(name), tuple(map(float, values))) for name, values in motion),
+            (float(level), int(seed), int(begins_at)),
         )
     except (struct.error, ValueError, TypeError, OverflowError):
         return None
-    metres = [x, z, strayed_x, strayed_z]
-    numbers = [*(place.liveliness or ()), position_s, start_s, end_s, rate, heading, tick, place.made]
-    for one in place.others:
-        metres += [*one.standing[:2], *one.strayed]
-        numbers += [one.position_s, *one.excerpt, one.rate, one.standing[2], one.made]
-    for _, values in place.motion:
-        numbers += values
-    is_possible = _are_within(metres, FARTHEST_ON_STAGE_M) and _are_within(numbers, _MOST_NUMBER)
-    return place if is_possible else None
+    metres: list[float] = []
+    others: list[float] = [*place.liveliness, rate, tick, *(n for _, values in place.motion for n in values)]
+    for puppet in place.puppets:
+        metres += [*puppet.standing[:2], *puppet.strayed]
+        others += [puppet.position_s, *puppet.excerpt, puppet.standing[2], puppet.made]
+    is_possible = place.puppets and _are_within(metres, FARTHEST_ON_STAGE_M)
+    return place if is_possible and _are_within(others, _MOST_NUMBER) else None
 
 
 def _are_within(numbers: Iterable[float], most: float) -> bool:
@@ -170,30 +138,19 @@ def _are_within(numbers: Iterable[float], most: float) -> bool:
     return all(-most <= number <= most for number in numbers)
 
 
-def _split(payload: bytes) -> tuple[bytes, list[tuple[float, ...]]]:
-    """The names in a packed checkpoint, JSON without a zero byte, and the numbers of the other puppets."""
-    names, _, behind = payload[_NUMBERS.size :].partition(b"\0")
-    return names, list(_OTHER.iter_unpack(behind))
-
-
-def _liveliness(level: Any, seed: Any, begins_at: Any) -> tuple[float, int, int]:
-    return float(level), int(seed), int(begins_at)
-
-
-def _standing(names: list[Any], numbers: tuple[float, ...]) -> Standing:
-    position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, coding, interaction = numbers
-    phrase, let_go, *made = names
+def _standing(names: Sequence[Any], numbers: tuple[float, ...]) -> Standing:
+    phrase, let_go, made = names
+    position_s, start_s, end_s, x, z, heading, strayed_x, strayed_z, coding, interaction = numbers
     return Standing(
         str(phrase),
         position_s,
         (start_s, end_s),
-        rate,
         (x, z, heading),
         (strayed_x, strayed_z),
         int(coding),
         int(interaction),
         tuple(map(str, let_go)),
-        int(*made),
+        int(made),
     )
 
 

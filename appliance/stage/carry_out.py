@@ -28,7 +28,6 @@ from appliance.pose import quaternion
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink
 from appliance.show.config_error import did_you_mean
-from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
 
@@ -36,25 +35,23 @@ SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
 STROBE_S = 10.0
 
 Outcome = tuple[bool, str]
-Effect = Callable[[Order, StageParts, Iterations], str]  # a sentence, or nothing; raises ValueError
+Effect = Callable[[Order, StageParts], str]  # a sentence, or nothing; raises ValueError
 
 
-def carry_out(
-    order: Order, parts: StageParts, iterations: Iterations, wearing: SensorFit, now: float
-) -> Outcome:
+def carry_out(order: Order, parts: StageParts, wearing: SensorFit, now: float) -> Outcome:
     """Carry out any order: whether it was done, and a sentence where there is something to say about it."""
     if order.name in SENSOR_ORDERS:
         return obey_for_sensors(order, parts, wearing, now)
-    return obey(order, parts, iterations)
+    return obey(order, parts)
 
 
-def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
+def obey(order: Order, parts: StageParts) -> Outcome:
     """Carry out an order that is not about sensors."""
     effect = EFFECTS.get(order.name)
     if effect is None:
         return False, f"The stage knows no order '{order.name}'."
     try:
-        return True, effect(order, parts, iterations)
+        return True, effect(order, parts)
     except ValueError as error:
         return False, str(error)
 
@@ -105,68 +102,69 @@ def _require_heard(names: list[str], link: SensorLink, now: float) -> None:
         raise ValueError(f"Sensor {', '.join(names)} is silent. Switch it on, and look at its battery.")
 
 
-def _iterate(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _iterate(order: Order, parts: StageParts) -> str:
     (coding, interaction), seconds = ITERATIONS.given(order.text, order.values)
+    iterations = parts.led.iterations
     words = iterations.ask(coding, interaction, seconds)
-    if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
+    if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.led.hands.puppeteers):
         words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
     return words
 
 
-def _allow(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _allow(order: Order, parts: StageParts) -> str:
     for puppet in parts.puppets:
         puppet.iterations.allow(int(order.values[0]))
     return ""
 
 
-def _enliven(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _enliven(order: Order, parts: StageParts) -> str:
     parts.liveliness.ask(*LIVELINESS.given(order.text, order.values))
     return ""
 
 
-def _change_seed(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _change_seed(order: Order, parts: StageParts) -> str:
     parts.liveliness.change_seed(SEED.given(order.text, order.values)[0])
     return ""
 
 
-def _play(order: Order, parts: StageParts, iterations: Iterations) -> str:
-    return parts.first.play(order.text, *order.values)  # without a fade: the show's
+def _play(order: Order, parts: StageParts) -> str:
+    return parts.led.play(order.text, *order.values)  # without a fade: the show's
 
 
-def _set_rate(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _set_rate(order: Order, parts: StageParts) -> str:
     for puppet in parts.puppets:
         puppet.motion.rate = order.values[0]
     return ""
 
 
-def _jump(order: Order, parts: StageParts, iterations: Iterations) -> str:
-    parts.motion.jump(order.values[0])
+def _jump(order: Order, parts: StageParts) -> str:
+    parts.led.motion.jump(order.values[0])
     return ""
 
 
-def _excerpt(order: Order, parts: StageParts, iterations: Iterations) -> str:
-    parts.motion.excerpt(*order.values)
+def _excerpt(order: Order, parts: StageParts) -> str:
+    parts.led.motion.excerpt(*order.values)
     return ""
 
 
-def _note(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _note(order: Order, parts: StageParts) -> str:
     return ""  # each part of a cue is an order; the journal notes its name
 
 
-def _enable(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _enable(order: Order, parts: StageParts) -> str:
     """Let a hand hold or let go; one by OSC that was told nothing yet holds its joint where it is."""
     holds, _ = HAND.given(order.text, order.values)
-    for puppeteer in parts.hands.puppeteers:
+    for puppeteer in parts.led.hands.puppeteers:
         if puppeteer.joint == order.text:
             puppeteer.enabled = holds
             if puppeteer.enabled and isinstance(puppeteer, Remote):
                 puppeteer.hold_here(_orientation(puppeteer.joint, parts).tolist())
             if puppeteer.enabled and isinstance(puppeteer, RemotePlace):
-                puppeteer.hold_here(parts.first.frame.positions[puppeteer.number].tolist())
+                puppeteer.hold_here(parts.led.frame.positions[puppeteer.number].tolist())
     return ""
 
 
-def _dance_made(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _dance_made(order: Order, parts: StageParts) -> str:
     """Let a puppet go over to what the generator made for it; the first, where no number follows the fade."""
     fade_s, *number = order.values
     parts.puppets[int(number[0]) if number else 0].play_made(order.text, fade_s)
@@ -176,16 +174,16 @@ def _dance_made(order: Order, parts: StageParts, iterations: Iterations) -> str:
 def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
     """Where a joint is now, local to its parent; before the first tick where the phrase has it."""
     place = parts.skeleton.index(joint)
-    parent, world = parts.skeleton.parents[place], parts.first.grounding.figure.world
+    parent, world = parts.skeleton.parents[place], parts.led.grounding.figure.world
     here: quaternion.Array = world[place]
     if not here.any():
-        here = parts.motion.window()[0][place]
+        here = parts.led.motion.window()[0][place]
     elif parent >= 0:
         here = quaternion.multiply(quaternion.inverse(world[parent]), here)
     return here
 
 
-def _gate(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _gate(order: Order, parts: StageParts) -> str:
     """Whether the strings of all puppets drive their joints."""
     opened, seconds = order.values
     for springs in parts.springs:
@@ -193,7 +191,7 @@ def _gate(order: Order, parts: StageParts, iterations: Iterations) -> str:
     return ""
 
 
-def _call_springs(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _call_springs(order: Order, parts: StageParts) -> str:
     springs = _springs(parts)
     setting, seconds = SPRINGS.given(order.text, order.values)
     if setting not in springs.settings:
@@ -203,7 +201,7 @@ def _call_springs(order: Order, parts: StageParts, iterations: Iterations) -> st
 
 
 def _turn(knob: Lever[float]) -> Effect:
-    def turn(order: Order, parts: StageParts, iterations: Iterations) -> str:
+    def turn(order: Order, parts: StageParts) -> str:
         value, seconds = knob.given(order.text, order.values)
         _springs(parts).turn(knob.name, (value,), seconds)
         return ""
@@ -211,24 +209,24 @@ def _turn(knob: Lever[float]) -> Effect:
     return turn
 
 
-def _blow(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _blow(order: Order, parts: StageParts) -> str:
     _springs(parts).turn(WIND.name, WIND.given(order.text, order.values)[0])
     return ""
 
 
-def _kick(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _kick(order: Order, parts: StageParts) -> str:
     _springs(parts).kick(order.values)
     return ""
 
 
 def _springs(parts: StageParts) -> Springs:
     """The first puppet's. Raises ValueError where it has none."""
-    if parts.first.springs is None:
+    if parts.led.springs is None:
         raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")
-    return parts.first.springs
+    return parts.led.springs
 
 
-def _lead(order: Order, parts: StageParts, iterations: Iterations) -> str:
+def _lead(order: Order, parts: StageParts) -> str:
     """Give a joint that is held by OSC its orientation or place, or back: of each puppet with such a hand."""
     puppeteers = [one for puppet in parts.puppets for one in puppet.hands.puppeteers]
     led = [one for one in puppeteers if isinstance(one, Remote | RemotePlace) and one.joint == order.text]

@@ -14,7 +14,6 @@ from appliance.levers.show_state import ShowState
 from appliance.levers.sources import LIVE, MAIN
 from appliance.levers.table import PHRASE, RATE, SPRINGS, find_lever
 from appliance.stage.carry_out import obey
-from appliance.stage.iterations import Iterations
 from appliance.stage.made_motions import MELT_S, MadeMotions
 from appliance.stage.stage_parts import StageParts
 
@@ -35,7 +34,6 @@ class Reconciler:
         self,
         show: str,
         parts: StageParts,
-        iterations: Iterations,
         reader: ShowStateReader,
         made: Sequence[MadeMotions] = (),
         source: str = MAIN,
@@ -43,11 +41,11 @@ class Reconciler:
         """made: what the generator makes for each puppet, in a show that has sources of it. source: it starts
         from that.
         """
-        self.parts, self.iterations = parts, iterations
+        self.parts = parts
         self.generation, self.cue, self.words = 0, "", ""
-        self.rate = self._usual_rate = parts.motion.rate
+        self.rate = self._usual_rate = parts.led.motion.rate
         self._show, self._reader = show, reader
-        self._is_first = parts.first.springs is not None  # a checkpoint knows nothing of the springs' setting
+        self._is_first = parts.led.springs is not None  # a checkpoint knows nothing of the springs' setting
         self._gate = True
         self._made, self.source, self.wanted = made, source, ""
         self.motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
@@ -84,10 +82,10 @@ class Reconciler:
             self._gate = self._goes
             if self.parts.springs:
                 orders.append(Order("gate", (float(self._gate), GATE_S if self._gate else 0.0)))
-        live, declared = self.parts.live, self._declared
+        live, declared = self.parts.led.live, self._declared
         wanted = declared.value if declared else self.source
         melt_s = declared.seconds if declared else MELT_S
-        self.wanted = "" if wanted in self.parts.motion.phrases else wanted
+        self.wanted = "" if wanted in self.parts.led.motion.phrases else wanted
         if wanted == LIVE and live is not None and not (orders or live.is_chosen):
             # After a restart: checkpoints know phrases only.
             orders.append(order_of(PHRASE, declared) if declared else Order(PHRASE.name, (), LIVE))
@@ -98,7 +96,7 @@ class Reconciler:
             if (order := made.order(source, fade_s, now)) is not None:
                 orders.append(order)
         rate = self.rate if self._going or not show_state.stands(now) else 0.0
-        if rate != self.parts.motion.rate:
+        if rate != self.parts.led.motion.rate:
             orders.append(Order("rate", (rate,)))
         return orders
 
@@ -111,7 +109,7 @@ class Reconciler:
 
     def _is_made(self, name: str) -> bool:
         """Whether the generator makes it: a source, or a motion that was kept."""
-        return bool(self._made) and name != LIVE and name not in self.parts.motion.phrases
+        return bool(self._made) and name != LIVE and name not in self.parts.led.motion.phrases
 
     def danced_before(self, *numbers: int) -> list[Material | None]:
         """The motions that the puppets danced before a restart, by number; None: a phrase, or it is not there
@@ -130,10 +128,10 @@ class Reconciler:
         """Before the first tick: begin with what is declared, without fades; a sentence about it, or ""."""
         words: list[str] = []
         for order in self.pending(now):
-            if order.name == "phrase" and order.text in self.parts.motion.phrases:
-                self.parts.motion.start_with(order.text)
+            if order.name == "phrase" and order.text in self.parts.led.motion.phrases:
+                self.parts.led.motion.start_with(order.text)
                 continue
-            words.append(obey(without_fade(order), self.parts, self.iterations)[1])
+            words.append(obey(without_fade(order), self.parts)[1])
         cue = f"The show goes on in the cue '{self.cue}'." if self.cue else ""
         return " ".join(filter(None, (cue, *words)))
 

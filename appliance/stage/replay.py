@@ -54,7 +54,7 @@ class Replay:
         assert isinstance(parts.network, _RecordedNetwork)
         self._network = parts.network
         parts.live_inbox = self._live = _RecordedLive(run)
-        parts.make_by(maker_of(show, parts.motion))
+        parts.make_by(maker_of(show, parts.led.motion))
         self._wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
         self.tick = Tick(parts, self._wearing, 0.0)
 
@@ -125,7 +125,7 @@ class Replay:
             asked, now, done_then = event["order"], float(event["now"]), bool(event["done"])
             order = Order(asked["name"], tuple(map(float, asked["values"])), asked["text"])
             self._link.answers(order.text, done_then)
-            done, _ = carry_out(order, self.tick.parts, self.tick.parts.first.iterations, self._wearing, now)
+            done, _ = carry_out(order, self.tick.parts, self._wearing, now)
             comparison.note_order(order.name, done_then, done)
 
 

@@ -66,7 +66,7 @@ class Resumption:
         why = "After a power cut" if self._after_power_cut else "After a restart of the stage"
         if place.tries >= TRIES:
             return (
-                f"{why}: {place.tries} starts at {place.position_s:.1f} s of the phrase '{place.phrase}' "
+                f"{why}: {place.tries} starts at {_where(place)} "
                 "ended without a frame. The show begins at the beginning. Export its journal for us."
             )
         try:
@@ -75,7 +75,7 @@ class Resumption:
             return f"{why}: the show begins at the beginning. {error}"
         self.went_on = True
         where = f" in the cue '{place.cue}'" if place.cue else ""
-        where += f" at {place.position_s:.1f} s of the phrase '{place.phrase}'"
+        where += f" at {_where(place)}"
         return f"{why} the show goes on{where}. {words}".rstrip()
 
     def write_start(self, reconciler: Reconciler) -> None:
@@ -105,42 +105,28 @@ class Resumption:
         parts = reconciler.parts
         # A power cut took the show state, so nothing would start a phrase that stood.
         rate = place.rate or (reconciler.rate if self._after_power_cut else 0.0)
-        standing = place.x, place.z, place.heading
         now_rate = 0.0 if reconciler.stands(now) else rate
-        made = reconciler.danced_before(place.made, *(one.made for one in place.others))
-        parts.motion.start_at(place.phrase, place.excerpt, place.position_s, now_rate, standing, made[0])
-        parts.first.grounding.strayed = place.strayed
-        for puppeteer in parts.hands.puppeteers:
-            puppeteer.enabled = puppeteer.joint not in place.let_go
-        for one, noted, material in zip(parts.puppets[1:], place.others, made[1:], strict=False):
+        made = reconciler.danced_before(*(one.made for one in place.puppets))
+        words = [
             one.go_on(noted, now_rate, material)
+            for one, noted, material in zip(parts.puppets, place.puppets, made, strict=False)
+        ]
         reconciler.cue, reconciler.rate = place.cue, rate
         reconciler.generation = 0 if self._after_power_cut else place.applied
         if self._after_power_cut and place.source:
             reconciler.source = place.source
         reconciler.motion = place.motion
-        if place.liveliness is not None:
-            level, seed, begins_at = place.liveliness
-            parts.liveliness.go_on(level, seed, begins_at + place.tick + 1)
-        return reconciler.iterations.ask(place.coding, place.interaction)
+        level, seed, begins_at = place.liveliness
+        parts.liveliness.go_on(level, seed, begins_at + place.tick + 1)
+        return " ".join(filter(None, words))
 
     def _place(self, reconciler: Reconciler, tick: int) -> Checkpoint:
-        motion, hands = reconciler.parts.motion, reconciler.parts.hands
         liveliness = reconciler.parts.liveliness
-        phrase, position_s, made = motion.going_on
-        coding, interaction = reconciler.iterations.asked
         return Checkpoint(
             self._show,
-            phrase,
-            position_s,
-            motion.excerpt_s,
+            tuple([puppet.noted for puppet in reconciler.parts.puppets]),
             reconciler.rate,
-            *motion.standing,
-            reconciler.parts.first.grounding.strayed,
-            coding,
-            interaction,
             reconciler.cue,
-            tuple([puppeteer.joint for puppeteer in hands.puppeteers if not puppeteer.enabled]),
             self._boot,
             tick,
             self.restarts,
@@ -148,8 +134,6 @@ class Resumption:
             applied=reconciler.generation,
             source=reconciler.wanted,
             motion=reconciler.motion,
-            others=tuple([puppet.noted for puppet in reconciler.parts.puppets[1:]]),
-            made=made,
             liveliness=(liveliness.asked, liveliness.seed, liveliness.begins_at),
         )
 
@@ -161,6 +145,11 @@ class Resumption:
             self._writer.write(place)
         except ValueError as error:  # names of several thousand signs
             self._writer, self.complaint = None, f"The place of the dance is not kept: {error}"
+
+
+def _where(place: Checkpoint) -> str:
+    one = place.puppets[0]
+    return f"{one.position_s:.1f} s of the phrase '{one.phrase}'"
 
 
 def _found(

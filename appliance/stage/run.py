@@ -76,7 +76,7 @@ class Stage:
                 show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY
             )
             opened.callback(self.parts.close)
-            if self.parts.live is not None:
+            if self.parts.led.live is not None:
                 self.parts.live_inbox = LivePoseReader(self.sharing.folder)
             self.inbox = _open_inbox(self.sharing.folder)
             opened.callback(self.inbox.close)
@@ -93,10 +93,10 @@ class Stage:
             )
             self._closing = opened.pop_all()
         self.parts.run_with(self.admission)
-        self.iterations = self.parts.first.iterations
+        self.iterations = self.parts.led.iterations
         self.second_look = SecondLook(self.admission)
         self.reconciler = Reconciler(
-            *(show.config.name, self.parts, self.iterations, show_state, self.made, show.config.motion.source)
+            *(show.config.name, self.parts, show_state, self.made, show.config.motion.source)
         )
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
@@ -225,7 +225,7 @@ class Stage:
             self.inbox.answer(*answer)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        done, words = carry_out(order, self.parts, self.iterations, self.wearing, now)
+        done, words = carry_out(order, self.parts, self.wearing, now)
         if self.recorder is not None:
             asked = {"name": order.name, "values": order.values, "text": order.text}
             self.recorder.event(ORDER, now, order=asked, done=done, words=words)

@@ -13,7 +13,7 @@ def habit_of(parts: StageParts, joint: WornSensor, mounting: Mounting) -> Headin
     """From all phrases that the puppet of this joint may play."""
     motion = next(
         (one.motion for one in parts.puppets if any(hand is joint for hand in one.hands.puppeteers)),
-        parts.motion,
+        parts.led.motion,
     )
     phrases = ((motion.loop_of(name).poses, 1.0 / TICK_S) for name in motion.phrases)
     return habit_in(phrases, parts.skeleton, parts.skeleton.index(joint.joint), mounting.at_neutral)

@@ -115,22 +115,22 @@ class Sharing:
         `sensors`: a line of the roster for each; `fallbacks`: those that ever happened; `sensor_age_s`: None
         without a sensor, infinite if unheard.
         """
-        parts, iterations = reconciler.parts, reconciler.iterations
+        parts, iterations = reconciler.parts, reconciler.parts.led.iterations
         told = health.snapshot(now)
         told |= {
-            "state": "dancing" if parts.motion.rate else "stopped",
+            "state": "dancing" if parts.led.motion.rate else "stopped",
             "sensor_age_s": None if sensor_age_s in (None, float("inf")) else sensor_age_s,
             "locked": locked,
             "coding": iterations.coding,
             "interaction": iterations.interaction,
             "liveliness": parts.liveliness.level,
             "seed": parts.liveliness.seed,
-            "phrase": parts.first.source,
-            "base": parts.motion.base,
+            "phrase": parts.led.source,
+            "base": parts.led.motion.base,
             "wanted": reconciler.wanted,
             "motion": dict(reconciler.motion),
-            "made": parts.motion.made.recipe if parts.motion.made else "",
-            "position_s": parts.motion.position_s,
+            "made": parts.led.motion.made.recipe if parts.led.motion.made else "",
+            "position_s": parts.led.motion.position_s,
             "others": [
                 {
                     "phrase": one.source,
@@ -142,7 +142,7 @@ class Sharing:
             ],
             "cue": reconciler.cue,
             "applied": [reconciler.generation, reconciler.words],
-            "let_go": [puppeteer.joint for puppeteer in parts.hands.puppeteers if not puppeteer.enabled],
+            "let_go": [puppeteer.joint for puppeteer in parts.led.hands.puppeteers if not puppeteer.enabled],
             "looked_at": now,
             "sensors": sensors,
             "temperature_c": self._thermometer.celsius(),

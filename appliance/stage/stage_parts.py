@@ -75,29 +75,14 @@ class StageParts:
         return [name for name in self.worn if not self.link.lets_in(name)]
 
     @property
-    def first(self) -> StagePuppet:
-        """The one that cues and commands lead."""
+    def led(self) -> StagePuppet:
+        """The puppet that cues and orders lead: the one that the show names first."""
         return self.puppets[0]
 
     @property
     def are_due(self) -> bool:
         """Whether the network is to dance in this tick: they share their hop, so all of them or none."""
         return any(one.blending.is_due for one in self.puppets)
-
-    @property
-    def motion(self) -> Playback:
-        """The first puppet's motion source."""
-        return self.first.motion
-
-    @property
-    def live(self) -> Live | None:
-        """The live dancer that the first puppet may start from."""
-        return self.first.live
-
-    @property
-    def hands(self) -> Hands:
-        """The first puppet's."""
-        return self.first.hands
 
     @property
     def springs(self) -> list[Springs]:
@@ -120,7 +105,7 @@ class StageParts:
 
     def hear_live(self) -> LivePose | None:
         """The pose of a live dancer that has come since the last tick, once it is believed."""
-        heard = None if self.live is None or self.live_inbox is None else self.live_inbox.read()
+        heard = None if self.led.live is None or self.live_inbox is None else self.live_inbox.read()
         if heard is None:
             return None
         pose = np.frombuffer(heard.rotations, np.float32).reshape(-1, 4)

@@ -194,14 +194,13 @@ class StagePuppet:
 
     @property
     def noted(self) -> Standing:
-        """Where a restarted stage lets this puppet go on, unless it is the first."""
+        """Where a restarted stage lets this puppet go on."""
         phrase, position_s, made = self.motion.going_on
         let_go = [puppeteer.joint for puppeteer in self.hands.puppeteers if not puppeteer.enabled]
         return Standing(
             phrase,
             position_s,
             self.motion.excerpt_s,
-            self.motion.rate,
             self.motion.standing,
             self.grounding.strayed,
             *self.iterations.asked,
@@ -209,15 +208,15 @@ class StagePuppet:
             made,
         )
 
-    def go_on(self, noted: Standing, rate: float, made: Material | None = None) -> None:
+    def go_on(self, noted: Standing, rate: float, made: Material | None = None) -> str:
         """Before the first tick: continue where another stage's puppet was. made: what it danced, if that was
-        made ahead and is still there. Raises ValueError.
+        made ahead and is still there. A sentence where fewer iterations fit. Raises ValueError.
         """
         self.motion.start_at(noted.phrase, noted.excerpt, noted.position_s, rate, noted.standing, made)
         self.grounding.strayed = noted.strayed
-        self.iterations.ask(noted.coding, noted.interaction)
         for puppeteer in self.hands.puppeteers:
             puppeteer.enabled = puppeteer.joint not in noted.let_go
+        return self.iterations.ask(noted.coding, noted.interaction)
 
 
 def _is_possible(figure: Figure) -> bool:

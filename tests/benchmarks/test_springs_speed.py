@@ -38,7 +38,7 @@ def parts() -> Iterator[StageParts]:
 def test_springs(
     measured: Callable[..., Any], parts: StageParts, what: str, setting: str, fade_s: float
 ) -> None:
-    springs = parts.first.springs
+    springs = parts.led.springs
     assert springs is not None
     springs.enabled = True
     springs.call(setting)
@@ -52,7 +52,7 @@ def test_springs(
 
 
 def test_the_puppet(measured: Callable[..., Any], parts: StageParts) -> None:
-    hands, puppet = parts.hands, parts.first.puppet
-    puppet.select(parts.motion.window())
+    hands, puppet = parts.led.hands, parts.led.puppet
+    puppet.select(parts.led.motion.window())
     puppet.hold(hands.mask, hands.targets, hands.weights, 10, 9)
     measured("ten iterations of the puppet", GROUP, reference=True)(parts.network.dance)

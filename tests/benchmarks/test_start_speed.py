@@ -18,7 +18,6 @@ from appliance.levers.show_state import ShowState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
-from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import Resumption
 from appliance.stage.stage_parts import assemble
@@ -107,7 +106,7 @@ def test_noting_the_place(tmp_path: Path, measured: Callable[..., Any]) -> None:
     box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
     parts = assemble(load_show(default_show_path()), box)
     resuming = Resumption("A show", tmp_path, None, "always")
-    reconciler = Reconciler("A show", parts, Iterations(10, 9, 20), ShowStateReader(tmp_path))
+    reconciler = Reconciler("A show", parts, ShowStateReader(tmp_path))
     measured("noting it", NOTE_GROUP, reference=True)(lambda: resuming.write_checkpoint(reconciler, 1))
     resuming.close()
     parts.close()
@@ -118,7 +117,7 @@ def test_reading_the_show_state(tmp_path: Path, measured: Callable[..., Any]) ->
     box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
     parts = assemble(load_show(default_show_path()), box)
     with closing(ShowStateWriter(tmp_path)) as writer, closing(ShowStateReader(tmp_path)) as reader:
-        reconciler = Reconciler("A show", parts, Iterations(10, 9, 20), reader)
+        reconciler = Reconciler("A show", parts, reader)
         writer.write(ShowState(show="A show", generation=int(1e9)))
         assert not reconciler.pending(1.0) and reconciler.generation
         measured("reading it", READ_GROUP, reference=True)(lambda: reconciler.pending(1.0))

@@ -76,7 +76,7 @@ def test_the_whole_tick(measured: Callable[..., Any], parts: StageParts, key: Se
     now = sensor.pair(parts.link, 100.0)
     paired = parts.link.counts["accepted"]
     wearing = SensorFit(parts, SensorMemory(None, print), print)
-    parts.first.iterations = Iterations(10, 9, 10)
+    parts.led.iterations = Iterations(10, 9, 10)
     tick = Tick(parts, wearing, latest_start_s=TICK_S)
     for other in parts.puppets[1:]:
         other.iterations = Iterations(10, 9, 10)

@@ -42,8 +42,8 @@ def test_1970_and_then_a_jump_of_a_year_in_mid_show(box: Box, tmp_path: Path, fi
     left, killed = box.place(), box.machine.kill(STAGE)
     _, after = box.pause_from(killed)
     figures.note("SIGKILL to next frame after the clock jumped", after.at - killed, limit=1.0)
-    assert box.place().phrase == left.phrase
-    assert box.place().position_s == pytest.approx(left.position_s, abs=10.0)
+    assert box.place().puppets[0].phrase == left.puppets[0].phrase
+    assert box.place().puppets[0].position_s == pytest.approx(left.puppets[0].position_s, abs=10.0)
     box.await_sensor()
     box.hall.switch_sensor_off()
 

@@ -73,5 +73,7 @@ def test_a_stage_that_is_killed_for_lack_of_memory_goes_on_at_its_place(
     figures.note("stage killed for lack of memory: time without frames", after.at - before.at)
     assert box.machine.main_pid(STAGE) != process
     now = box.place()
-    came_to_its_end = left.position_s + time.time() - left_at > now.excerpt[1] - 0.1
-    assert now.phrase == left.phrase and (now.position_s > left.position_s or came_to_its_end)
+    came_to_its_end = left.puppets[0].position_s + time.time() - left_at > now.puppets[0].excerpt[1] - 0.1
+    assert now.puppets[0].phrase == left.puppets[0].phrase and (
+        now.puppets[0].position_s > left.puppets[0].position_s or came_to_its_end
+    )

@@ -61,9 +61,9 @@ def _cut_somewhere(box: Box, chance: random.Random, in_the_start: bool) -> Check
 
 def _age_s(left: Checkpoint, now: Checkpoint) -> float:
     """How long before the cut the place was noted at which the dance went on."""
-    began_s = now.position_s - (now.tick + 1) / 50.0
-    start_s, end_s = now.excerpt
-    age_s = left.position_s - began_s
+    began_s = now.puppets[0].position_s - (now.tick + 1) / 50.0
+    start_s, end_s = now.puppets[0].excerpt
+    age_s = left.puppets[0].position_s - began_s
     return age_s if age_s > -1.0 else age_s + end_s - start_s
 
 

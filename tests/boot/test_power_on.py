@@ -25,7 +25,7 @@ def test_after_an_evening_that_ended_it_begins_at_the_beginning(
         figures.note("power-on to first frame", first.at - box.machine.powered_at, limit=POWER_ON_LIMIT_S)
         assert first.tick < 50, "the first frames were lost"
         now = box.place()
-        danced_s = now.position_s - 0.02 * first.tick
+        danced_s = now.puppets[0].position_s - 0.02 * first.tick
         assert danced_s == pytest.approx(box.danced_s(first.at, now.tick), abs=0.001), (
             "it did not begin at the beginning"
         )

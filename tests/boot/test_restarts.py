@@ -65,16 +65,22 @@ def test_twelve_kills_in_a_row_do_not_make_it_give_up(dancing: Box, figures: Fig
     assert lives(after) == 1
     figures.note(f"ticks missing after {KILLS} kills", missing_ticks(after), limit=0, unit="ticks")
     now = dancing.place()
-    assert now.phrase == left.phrase and now.position_s - left.position_s < after[-1].at - ended
+    assert (
+        now.puppets[0].phrase == left.puppets[0].phrase
+        and now.puppets[0].position_s - left.puppets[0].position_s < after[-1].at - ended
+    )
 
 
 def _same_phrase(box: Box, left: Checkpoint, first: Seen) -> None:
     """No tick of the phrase was lost or danced twice, however long the pause was. first: frame after it."""
     now = box.place()
-    assert now.phrase == left.phrase
-    if now.position_s > left.position_s:  # else it has come to its end and started over
+    assert now.puppets[0].phrase == left.puppets[0].phrase
+    if now.puppets[0].position_s > left.puppets[0].position_s:  # else it has come to its end and started over
         danced_s = box.danced_s(first.at, now.tick)
-        assert now.position_s - left.position_s == pytest.approx(danced_s, abs=0.001), (left, now)
+        assert now.puppets[0].position_s - left.puppets[0].position_s == pytest.approx(danced_s, abs=0.001), (
+            left,
+            now,
+        )
 
 
 def _spin(box: Box) -> float:

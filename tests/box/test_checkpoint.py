@@ -30,21 +30,13 @@ from appliance.box.checkpoint import (
 )
 from appliance.box.ring_file import RingFileWriter
 from appliance.pose.possible import FARTHEST_ON_STAGE_M
+from tests.standing import moved
 
 PLACE = Checkpoint(
     "Évora, night",
-    "second",
-    12.34,
-    (1.0, 40.0),
+    (Standing("second", 12.34, (1.0, 40.0), (0.25, -1.5, 3.0), (0.01, -0.2), 10, 9, ("lShldr", "rShldr")),),
     -0.5,
-    0.25,
-    -1.5,
-    3.0,
-    (0.01, -0.2),
-    10,
-    9,
     "storm",
-    ("lShldr", "rShldr"),
     "boot",
     123_456_789,
     3,
@@ -60,20 +52,29 @@ _names = st.text(max_size=60)
     st.builds(
         Checkpoint,
         show=_names,
-        phrase=_names,
-        position_s=_finite,
-        excerpt=st.tuples(_finite, _finite),
+        puppets=st.lists(
+            st.builds(
+                Standing,
+                phrase=_names,
+                position_s=_finite,
+                excerpt=st.tuples(_finite, _finite),
+                standing=st.tuples(_finite, _finite, _finite),
+                strayed=st.tuples(_finite, _finite),
+                coding=st.integers(1, 64),
+                interaction=st.integers(0, 64),
+                let_go=st.lists(_names, max_size=4).map(tuple),
+                made=st.integers(0, 2000),
+            ),
+            min_size=1,
+            max_size=3,
+        ).map(tuple),
         rate=_finite,
-        x=_finite,
-        strayed=st.tuples(_finite, _finite),
-        coding=st.integers(1, 64),
         cue=_names,
-        let_go=st.lists(_names, max_size=8).map(tuple),
         tick=st.integers(-1, 2**62),
         restarts=st.integers(0, 65535),
         ended=st.booleans(),
         tries=st.integers(0, 255),
-        liveliness=st.none() | st.tuples(_finite, st.integers(0, 2**31 - 1), st.integers(0, 2**62)),
+        liveliness=st.tuples(_finite, st.integers(0, 2**31 - 1), st.integers(0, 2**62)),
         motion=st.lists(st.tuples(_names, st.lists(_finite, max_size=4).map(tuple)), max_size=3).map(tuple),
     )
 )
@@ -82,25 +83,24 @@ def test_comes_back_as_it_was(place: Checkpoint) -> None:
 
 
 def test_numbers_that_are_none_are_no_place() -> None:
-    assert unpacked(packed(replace(PLACE, position_s=math.nan))) is None
-    assert unpacked(packed(replace(PLACE, strayed=(0.0, math.inf)))) is None
+    assert unpacked(packed(moved(PLACE, position_s=math.nan))) is None
+    assert unpacked(packed(moved(PLACE, strayed=(0.0, math.inf)))) is None
     assert unpacked(packed(replace(PLACE, liveliness=(math.nan, 0, 0)))) is None
     assert unpacked(packed(replace(PLACE, motion=(("motion vary sigma", (math.inf,)),)))) is None
 
 
 @pytest.mark.parametrize("far", [1.01 * FARTHEST_ON_STAGE_M, -1e30, 1e200])
 def test_places_where_no_stage_stands_are_none(far: float) -> None:
-    other = Standing("main", 0.0, (0.0, 1.0), 1.0, (0.0, 0.0, 0.0), (0.0, 0.0), 3, 2)
+    one = PLACE.puppets[0]
     for changes in (
-        {"x": far},
-        {"z": far},
+        {"standing": (far, 0.0, 0.0)},
+        {"standing": (0.0, far, 0.0)},
         {"strayed": (far, 0.0)},
-        {"others": (other._replace(standing=(0.0, far, 0.0)),)},
-        {"others": (other._replace(strayed=(0.0, far)),)},
+        {"strayed": (0.0, far)},
     ):
-        assert unpacked(packed(replace(PLACE, **changes))) is None
+        for puppets in ((one._replace(**changes), one), (one, one._replace(**changes))):
+            assert unpacked(packed(replace(PLACE, puppets=puppets))) is None
     assert unpacked(packed(replace(PLACE, liveliness=(0.5, 10**400, 0)))) is None
-    assert unpacked(packed(replace(PLACE, others=(other,)))) == replace(PLACE, others=(other,))
 
 
 @pytest.mark.parametrize("length", range(len(packed(PLACE))))

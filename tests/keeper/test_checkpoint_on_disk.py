@@ -12,15 +12,16 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, packed, read_checkpoint
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, Standing, packed, read_checkpoint
 from appliance.box.record import SLOT_BYTES, SLOT_CAPACITY, SLOTS, SlotFile
 from appliance.keeper.mirror import RETRY_S, TURN_S, Mirror
 from appliance.keeper.records import mirrored_checkpoint
 from tests.box import disks
 from tests.deploy.cut import cut_off
+from tests.standing import moved
 
 HEAD_BYTES = 24  # of a slot
-PLACE = Checkpoint("A show", "main", 1.5, (0.0, 30.0), let_go=("lShldr",), boot="here")
+PLACE = Checkpoint("A show", (Standing("main", 1.5, (0.0, 30.0), let_go=("lShldr",)),), boot="here")
 
 needs_mounts = pytest.mark.skipif(disks.why_not() is not None, reason=str(disks.why_not()))
 
@@ -150,18 +151,18 @@ def test_carried_once_in_each_turn_and_only_what_is_new(mirrored: Mirrored) -> N
     mirrored.stage.write(at(2))  # a show that stands: only its ticks go on
     mirrored.mirror.turn(110.0)
     assert (mirrored.state / FILE).read_bytes() == before
-    mirrored.stage.write(replace(PLACE, position_s=2.0))
+    mirrored.stage.write(moved(PLACE, position_s=2.0))
     mirrored.mirror.turn(120.0)
-    assert mirrored.on_disk == replace(PLACE, position_s=2.0)
+    assert mirrored.on_disk == moved(PLACE, position_s=2.0)
     assert mirrored.said == []
 
 
 def test_the_last_turn_carries_what_is_newest(mirrored: Mirrored) -> None:
     mirrored.stage.write(at(1))
     mirrored.mirror.turn(100.0)
-    mirrored.stage.write(replace(PLACE, position_s=2.0, ended=True))
+    mirrored.stage.write(moved(PLACE, position_s=2.0, ended=True))
     mirrored.mirror.last_turn(100.5)
-    assert mirrored.on_disk == replace(PLACE, position_s=2.0, ended=True)
+    assert mirrored.on_disk == moved(PLACE, position_s=2.0, ended=True)
 
 
 @needs_mounts
@@ -185,9 +186,9 @@ def test_a_disk_that_fills_up_later_takes_the_place_all_the_same(mirrored: Mirro
         mirrored.mirror.turn(100.0)
         disks.fill(mirrored.state)
         for turn in range(1, 5):
-            mirrored.stage.write(replace(PLACE, position_s=float(turn)))
+            mirrored.stage.write(moved(PLACE, position_s=float(turn)))
             mirrored.mirror.turn(100.0 + turn)
-            assert mirrored.on_disk == replace(PLACE, position_s=float(turn))
+            assert mirrored.on_disk == moved(PLACE, position_s=float(turn))
         assert mirrored.said == []
 
 
@@ -196,7 +197,7 @@ def test_a_read_only_disk_is_survived_and_taken_again_later(tmp_path: Path, mirr
     image = disks.made_image(tmp_path / "image")
     with disks.disk(image, mirrored.state):
         written(mirrored.state / FILE, 1)
-    mirrored.stage.write(replace(PLACE, position_s=2.0))
+    mirrored.stage.write(moved(PLACE, position_s=2.0))
     with disks.disk(image, mirrored.state, "ro"):
         for turn in range(3):
             mirrored.mirror.turn(100.0 + RETRY_S * turn)
@@ -204,7 +205,7 @@ def test_a_read_only_disk_is_survived_and_taken_again_later(tmp_path: Path, mirr
         assert len(mirrored.said) == 1 and "Read-only" in mirrored.said[0]
     with disks.disk(image, mirrored.state):
         mirrored.mirror.turn(200.0)
-        assert mirrored.on_disk == replace(PLACE, position_s=2.0)
+        assert mirrored.on_disk == moved(PLACE, position_s=2.0)
 
 
 @needs_mounts
@@ -215,26 +216,26 @@ def test_a_disk_that_fails_in_the_middle(tmp_path: Path, mirrored: Mirrored) -> 
         mirrored.stage.write(at(1))
         mirrored.mirror.turn(100.0)
         cut_off(mirrored.state)
-        mirrored.stage.write(replace(PLACE, position_s=2.0))
+        mirrored.stage.write(moved(PLACE, position_s=2.0))
         for turn in range(3):
             mirrored.mirror.turn(110.0 + RETRY_S * turn)
         assert mirrored.mirror.failed == 3 and len(mirrored.said) == 1
     with disks.disk(image, mirrored.state):
         assert mirrored.on_disk == at(1)
         mirrored.mirror.turn(200.0)  # the same process finds the disk that is back
-        assert mirrored.on_disk == replace(PLACE, position_s=2.0)
+        assert mirrored.on_disk == moved(PLACE, position_s=2.0)
 
 
 WRITER = """
 import sys
 from pathlib import Path
-from appliance.box.checkpoint import Checkpoint, packed
+from appliance.box.checkpoint import Checkpoint, Standing, packed
 from appliance.box.record import SlotFile
 file, tick = SlotFile(Path(sys.argv[1])), int(sys.argv[2])
 while True:
     tick += 1
     try:
-        file.write(packed(Checkpoint("A show", "main", 1.5, (0.0, 30.0), tick=tick)))
+        file.write(packed(Checkpoint("A show", (Standing("main", 1.5, (0.0, 30.0)),), tick=tick)))
     except OSError:
         break
     print(tick, flush=True)

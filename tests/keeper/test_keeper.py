@@ -5,13 +5,12 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from appliance.box.checkpoint import Checkpoint, CheckpointReader, CheckpointWriter
+from appliance.box.checkpoint import Checkpoint, CheckpointReader, CheckpointWriter, Standing
 from appliance.box.clock import TICK_S
 from appliance.box.ring_file import RingFileWriter
 from appliance.box.runtime_folder import Claim
@@ -26,9 +25,10 @@ from tests.box import disks
 from tests.bundles import write_show
 from tests.fake_clock import FakeTime
 from tests.recorder.night import Night
+from tests.standing import moved
 
 DISK_BYTES = 8 << 20
-PLACE = Checkpoint("A show", "main", 1.5, (0.0, 30.0))
+PLACE = Checkpoint("A show", (Standing("main", 1.5, (0.0, 30.0)),))
 
 
 @pytest.fixture
@@ -204,7 +204,7 @@ def end_of(place: CheckpointWriter, runtime: Path, ends_at: float, end_s: float 
 
     def sleep(seconds: float) -> None:
         time.sleep(seconds)
-        place.write(replace(PLACE, position_s=time.now - 1000.0, ended=time.now > 1000.0 + ends_at))
+        place.write(moved(PLACE, position_s=time.now - 1000.0, ended=time.now > 1000.0 + ends_at))
 
     place.write(PLACE)
     with closing(CheckpointReader(runtime)) as reader:

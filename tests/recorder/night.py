@@ -39,11 +39,10 @@ class Night:
         self.parts = assemble(self.show, BOX)
         self.heard = self.parts.link = _Heard()
         self.wearing = SensorFit(self.parts, SensorMemory(None, self.said.append), self.said.append)
-        self.parts.first.iterations = Iterations(3, 2, 10)
+        self.parts.led.iterations = Iterations(3, 2, 10)
         self.tick = Tick(self.parts, self.wearing, LATEST_START_S)
         self._declared = _Declared(self.show.config.name)
-        name, iterations = self.show.config.name, self.parts.first.iterations
-        self.reconciler = Reconciler(name, self.parts, iterations, self._declared)
+        self.reconciler = Reconciler(self.show.config.name, self.parts, self._declared)
         self.recorder = Recorder(runtime, facts_of_run(self.show, list(self.parts.worn)))
         self.slot = Slot(-1, begins_at, begins_at)
         self.recorder.keyframe(self.tick)
@@ -70,14 +69,14 @@ class Night:
 
     def command(self, address: str, *values: float, text: str = "") -> None:
         """What show control declares at a command; the dance follows after the last tick."""
-        now, facts = self.slot.started, facts_of(self.show, None, self.parts.first.iterations, 0.0)
+        now, facts = self.slot.started, facts_of(self.show, None, self.parts.led.iterations, 0.0)
         command = Command(address, values, text)
         self._declared.now, _ = declare(self._declared.now, command, facts, now)
         for order in self.reconciler.pending(now):
             self._carry_out(order, now)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        done, words = carry_out(order, self.parts, self.parts.first.iterations, self.wearing, now)
+        done, words = carry_out(order, self.parts, self.wearing, now)
         asked = {"name": order.name, "values": order.values, "text": order.text}
         self.recorder.event(ORDER, now, order=asked, done=done, words=words)
         return done, words

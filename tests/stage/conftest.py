@@ -40,13 +40,14 @@ def show(tmp_path: Path) -> Show:
 @pytest.fixture
 def parts(show: Show) -> Iterator[StageParts]:
     parts = assemble(show, BOX)
+    parts.led.iterations = Iterations(3, 2, most=8)
     yield parts
     parts.close()
 
 
 @pytest.fixture
-def iterations() -> Iterations:
-    return Iterations(3, 2, most=8)
+def iterations(parts: StageParts) -> Iterations:
+    return parts.led.iterations
 
 
 @pytest.fixture
@@ -55,8 +56,8 @@ def declared() -> Declared:
 
 
 @pytest.fixture
-def reconciler(parts: StageParts, iterations: Iterations, declared: Declared) -> Reconciler:
-    return Reconciler("A test", parts, iterations, declared)  # type: ignore[arg-type]
+def reconciler(parts: StageParts, declared: Declared) -> Reconciler:
+    return Reconciler("A test", parts, declared)  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -92,7 +93,9 @@ def dance_of(walking_show: Show, runtime: Path) -> Iterator[Callable[[], Reconci
 
     def dance() -> Reconciler:
         reader = ShowStateReader(runtime)
-        made.append(Reconciler("A test", assemble(walking_show, BOX), Iterations(3, 2, 20), reader))
+        parts = assemble(walking_show, BOX)
+        parts.led.iterations = Iterations(3, 2, 20)
+        made.append(Reconciler("A test", parts, reader))
         return made[-1]
 
     yield dance

@@ -26,8 +26,8 @@ class Declared:
 def follow(reconciler: Reconciler, now: float = NOW) -> str:
     """Let the dance follow what is declared; gives what it says about it."""
     orders = reconciler.pending(now)
-    return " ".join(filter(None, (obey(one, reconciler.parts, reconciler.iterations)[1] for one in orders)))
+    return " ".join(filter(None, (obey(one, reconciler.parts)[1] for one in orders)))
 
 
 def enabled(parts: StageParts) -> dict[str, bool]:
-    return {puppeteer.joint: puppeteer.enabled for puppeteer in parts.hands.puppeteers}
+    return {puppeteer.joint: puppeteer.enabled for puppeteer in parts.led.hands.puppeteers}

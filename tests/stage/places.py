@@ -5,11 +5,11 @@ from __future__ import annotations
 from contextlib import closing
 from pathlib import Path
 
-from appliance.box.checkpoint import Checkpoint, CheckpointWriter
+from appliance.box.checkpoint import Checkpoint, CheckpointWriter, Standing
 from appliance.box.show_state import ShowStateWriter
 from appliance.levers.show_state import ShowState
 
-PLACE = Checkpoint("A test", "walk", 2.0, (0.0, 5.0), coding=3, interaction=2, boot="another")
+PLACE = Checkpoint("A test", (Standing("walk", 2.0, (0.0, 5.0), coding=3, interaction=2),), boot="another")
 
 
 def put(runtime: Path, place: Checkpoint) -> None:

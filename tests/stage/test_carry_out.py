@@ -15,14 +15,12 @@ from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.carry_out import obey, obey_for_sensors
-from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts, assemble
 from tests.bundles import write_show
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
-ITERATIONS = Iterations(3, 2, 8)
 
 
 @pytest.fixture
@@ -34,26 +32,25 @@ def parts(tmp_path: Path) -> Iterator[StageParts]:
 
 
 def test_playback_jumps_and_plays_excerpts(parts: StageParts) -> None:
-    assert obey(Order("jump", (1.5,)), parts, ITERATIONS) == (True, "")
-    parts.motion.advance()
-    assert parts.motion.jumped
-    done, words = obey(Order("excerpt", (2.0, 2.04)), parts, ITERATIONS)
+    assert obey(Order("jump", (1.5,)), parts) == (True, "")
+    parts.led.motion.advance()
+    assert parts.led.motion.jumped
+    done, words = obey(Order("excerpt", (2.0, 2.04)), parts)
     assert not done and "from 2 s to 2.04 s" in words
 
 
 def test_a_joint_is_held_and_released_by_osc(parts: StageParts) -> None:
-    assert obey(Order("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), parts, ITERATIONS) == (True, "")
+    assert obey(Order("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), parts) == (True, "")
     for tick in range(100):
-        parts.hands.pull(10.0 + 0.02 * tick, parts.first.puppet.select(parts.motion.window()))
-    place = parts.first.hand_places[0]
-    assert (
-        quaternion.angle_between(parts.hands.targets[0, place], np.array([0.5**0.5, 0.5**0.5, 0, 0])) < 1e-3
-    )
-    assert parts.hands.weights[place] == 1.0
-    assert obey(Order("release", (), "lShldr"), parts, ITERATIONS) == (True, "")
+        parts.led.hands.pull(10.0 + 0.02 * tick, parts.led.puppet.select(parts.led.motion.window()))
+    place = parts.led.hand_places[0]
+    turned = np.array([0.5**0.5, 0.5**0.5, 0, 0])
+    assert quaternion.angle_between(parts.led.hands.targets[0, place], turned) < 1e-3
+    assert parts.led.hands.weights[place] == 1.0
+    assert obey(Order("release", (), "lShldr"), parts) == (True, "")
     for tick in range(100):
-        parts.hands.pull(12.0 + 0.02 * tick, parts.first.puppet.select(parts.motion.window()))
-    assert parts.hands.weights[place] == 0.0
+        parts.led.hands.pull(12.0 + 0.02 * tick, parts.led.puppet.select(parts.led.motion.window()))
+    assert parts.led.hands.weights[place] == 0.0
 
 
 def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(parts: StageParts) -> None:
@@ -63,7 +60,7 @@ def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(parts: StageParts
         (Order("hold", (0.0, 0.0, 0.0, 1.0), "lShldr"), "no rotation"),
         (Order("dance"), "knows no order 'dance'"),
     ]:
-        done, said = obey(order, parts, ITERATIONS)
+        done, said = obey(order, parts)
         assert not done and words in said
 
 

@@ -49,12 +49,12 @@ def given(night: Night, puppet: int = 0) -> np.ndarray:
 
 
 def test_the_network_is_given_the_place_and_the_weight_of_one_pass(night: Night) -> None:
-    row, arm = night.parts.first.puppet, MOVING.index(ARM)
+    row, arm = night.parts.led.puppet, MOVING.index(ARM)
     night.dance(20)
     assert not row.place_weights.any()
     night.order("place", *PLACE, text=ARM)
     night.dance(15)
-    growing = float(night.parts.hands.place_weights[arm])
+    growing = float(night.parts.led.hands.place_weights[arm])
     assert 0.1 < growing < 0.9
     assert row.place_weights[arm] == pytest.approx(weights_of_one_pass(np.float32(growing), 2), abs=1e-6)
     night.dance(60)
@@ -72,10 +72,10 @@ def test_one_joint_goes_to_a_place_with_a_hands_orientation(tmp_path: Path) -> N
     night = Night(write_show(tmp_path / "show", [HANDS[0], turned]), tmp_path / "runtime")
     night.order("place", *PLACE, text=ARM)
     night.dance(80)
-    row, arm = night.parts.first.puppet, MOVING.index(ARM)
+    row, arm = night.parts.led.puppet, MOVING.index(ARM)
     assert given(night) == pytest.approx(PLACE, abs=5e-3)
-    assert row.place_weights[arm] == 1.0 and night.parts.hands.mask[arm]
-    assert night.parts.hands.targets[0, arm] == pytest.approx([0.8, 0.6, 0, 0], abs=1e-5)
+    assert row.place_weights[arm] == 1.0 and night.parts.led.hands.mask[arm]
+    assert night.parts.led.hands.targets[0, arm] == pytest.approx([0.8, 0.6, 0, 0], abs=1e-5)
     night.recorder.close()
     night.parts.close()
     (run,) = read_journal(night.kept(tmp_path / "journal")).runs
@@ -88,9 +88,9 @@ def test_a_place_that_this_dancer_never_goes_to_is_brought_within_its_reach(nigh
     night.dance(80)
     away = given(night) - np.array((0.4, 1.0, -0.5))
     assert np.linalg.norm(away) > 0.1
-    hand = night.parts.hands.puppeteers[0]
+    hand = night.parts.led.hands.puppeteers[0]
     assert isinstance(hand, HeldPlace) and hand.habitual is not None
-    row = night.parts.first.puppet.places[MOVING.index(ARM)]
+    row = night.parts.led.puppet.places[MOVING.index(ARM)]
     assert hand.habitual.bounded(row) == pytest.approx(row, abs=1e-5)
 
 
@@ -120,7 +120,7 @@ def test_the_hips_go_to_their_place_with_the_feet_on_the_floor(night: Night) -> 
     for _ in range(200):
         night.dance(1)
         roots.append(night.tick.frames[0].root.copy())
-        assert not night.parts.first.puppet.place_weights.any()
+        assert not night.parts.led.puppet.place_weights.any()
     assert roots[-1][[0, 2]] == pytest.approx([0.4, -0.3], abs=0.02)
     assert roots[-1][1] == pytest.approx(begun[1], abs=0.05)  # the height is the legs'
     assert np.linalg.norm(np.diff(roots, axis=0), axis=1).max() < 0.03
@@ -150,7 +150,7 @@ def test_a_night_with_places_dances_again_bit_for_bit(night: Night, tmp_path: Pa
             pass
         assert comparison.first is None
         assert comparison.ticks > 200
-        row, again = night.parts.first.puppet, replay.tick.parts.first.puppet
+        row, again = night.parts.led.puppet, replay.tick.parts.led.puppet
         assert again.places.tobytes() == row.places.tobytes()
         assert again.place_weights.tobytes() == row.place_weights.tobytes()
         assert row.place_weights.any()

@@ -37,8 +37,8 @@ def some_message(chance: random.Random) -> tuple[str, list[object]]:
 def test_whatever_a_live_stream_sends_no_frame_is_impossible(tmp_path: Path, chance: random.Random) -> None:
     show = write_show(tmp_path / "show", hands=[], motion={"live": True})
     night = Night(show, tmp_path / "runtime")
-    facts = facts_of(night.show, None, night.parts.first.iterations, 0.0)
-    first, heard = night.parts.first, 0
+    facts = facts_of(night.show, None, night.parts.led.iterations, 0.0)
+    first, heard = night.parts.led, 0
     with contextlib.closing(LiveInput(tmp_path / "runtime")) as live:
         night.parts.live_inbox = LivePoseReader(tmp_path / "runtime")
         night.command("/phrase", 0.0, text=LIVE)

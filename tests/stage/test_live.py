@@ -112,9 +112,9 @@ def test_a_stage_that_starts_again_goes_on_with_its_guest(show: Path, tmp_path: 
     """A checkpoint knows phrases only; what show control declares knows the guest."""
     night = Night(show, tmp_path / "runtime")
     night.command("/phrase", 0.2, text=LIVE)
-    assert night.parts.first.source == LIVE
-    assert night.parts.live is not None
-    night.parts.live.choose(False, 0.0)
+    assert night.parts.led.source == LIVE
+    assert night.parts.led.live is not None
+    night.parts.led.live.choose(False, 0.0)
     (order,) = night.reconciler.pending(1.0)
     assert (order.name, order.text) == ("phrase", LIVE)
 
@@ -122,12 +122,12 @@ def test_a_stage_that_starts_again_goes_on_with_its_guest(show: Path, tmp_path: 
 def test_a_guest_who_falls_silent_is_told_once_and_counted(parts: StageParts) -> None:
     stream, watch = Stream(), Watch(parts, FITS)
     parts.live_inbox = stream
-    parts.first.play(LIVE, 0.2)
+    parts.led.play(LIVE, 0.2)
     for tick in range(200):
         now = tick * 0.02
         stream.coming = LivePose(now, (math.nan,) * 3, pose(0.1)) if tick < 50 or tick > 150 else None
         parts.hear_live()
-        parts.first.start(now)
+        parts.led.start(now)
         watch.count_silences(now)
     fallen = {one.name: one for one in watch.fallbacks.happened(4.0)}
     assert fallen[rows.SOURCE_LATE.name].times == 1
@@ -175,7 +175,7 @@ def test_no_phrase_may_have_the_guests_name(tmp_path: Path) -> None:
 def test_a_root_that_jumps_for_a_moment_leaves_the_figure_where_it_was_and_is_told(parts: StageParts) -> None:
     """Places were infinite for ever after."""
     stream, watch = Stream(), Watch(parts, FITS)
-    parts.live_inbox, first = stream, parts.first
+    parts.live_inbox, first = stream, parts.led
     first.play(LIVE, 0.2)
     for tick in range(300):
         now = tick * 0.02
@@ -194,16 +194,16 @@ def test_a_root_that_jumps_for_a_moment_leaves_the_figure_where_it_was_and_is_to
 
 def test_feet_that_do_not_come_keep_the_jumps_of_the_phrase(parts: StageParts) -> None:
     stream = parts.live_inbox = Stream()
-    parts.first.play(LIVE, 0.0)
+    parts.led.play(LIVE, 0.0)
     rotations = np.frombuffer(pose(0.1), np.float32).reshape(-1, 4).copy()
     rotations[[FIGURE.index("lFoot"), FIGURE.index("rFoot")]] = math.nan
     for tick in range(60):
         stream.coming = LivePose(0.02 * tick, (math.nan,) * 3, rotations.tobytes())
         parts.hear_live()
-        parts.first.start(0.02 * tick)
-    assert parts.first.live is not None and parts.first.live.share == 1.0
-    parts.first.motion._stream._tracks[:, 3] = 0.25  # the phrase is in the air
-    assert parts.first.lift == pytest.approx(0.25)
+        parts.led.start(0.02 * tick)
+    assert parts.led.live is not None and parts.led.live.share == 1.0
+    parts.led.motion._stream._tracks[:, 3] = 0.25  # the phrase is in the air
+    assert parts.led.lift == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e200])
@@ -212,7 +212,7 @@ def test_a_figure_that_is_none_never_leaves_and_the_dance_recovers_by_itself(
 ) -> None:
     night = Night(show, tmp_path / "runtime")
     night.dance(50)
-    first, watch = night.parts.first, Watch(night.parts, FITS)
+    first, watch = night.parts.led, Watch(night.parts, FITS)
     before = first.frame.positions.copy()
     first.grounding.strayed = wrong, 0.0
     with np.errstate(all="ignore"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,6 @@ from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from tests.bundles import write_show
 from tests.stage.declared import Commanded
-from tests.stage.places import PLACE, put
 from tests.stage.shows import BOX, NOW
 
 
@@ -34,8 +32,8 @@ def danced(parts: StageParts, ticks: int, begin: int = 0) -> tuple[np.ndarray, n
     levels, noises = [], []
     for tick in range(begin, begin + ticks):
         parts.liveliness.dance(tick)
-        levels.append(parts.first.liveliness)
-        noises.append(parts.first.noise.copy())
+        levels.append(parts.led.liveliness)
+        noises.append(parts.led.noise.copy())
         parts.liveliness.advance()
     return np.array(levels), np.array(noises)
 
@@ -149,7 +147,7 @@ def test_a_cue_changes_both(parts: StageParts, reconciler: Reconciler, command: 
 def test_it_goes_on_from_a_keyframe_in_the_middle_of_its_fades(show: Show, parts: StageParts) -> None:
     danced(parts, 20)
     for order in (Order("liveliness", (0.3, 4.0)), Order("seed", (7.0,))):
-        obey(order, parts, parts.first.iterations)
+        obey(order, parts)
     danced(parts, 30, 20)
     again = assemble(show, BOX)
     restore(again, packed(parts))
@@ -171,7 +169,7 @@ def test_a_restarted_stage_goes_on_in_the_same_noise(
     """Twice: each stage counts its ticks from 0."""
     first, second, third = dance_of(), dance_of(), dance_of()
     for order in (Order("seed", (8.0,)), Order("liveliness", (0.75,))):
-        obey(order, first.parts, first.iterations)
+        obey(order, first.parts)
     levels, noises = danced(first.parts, 300)
     resumed(first, second, runtime, 99)
     levels_after, noises_after = danced(second.parts, 50)
@@ -188,19 +186,9 @@ def test_what_it_was_on_its_way_to_is_there_at_once_after_a_restart(
     first, second = dance_of(), dance_of()
     danced(first.parts, 10)
     for order in (Order("seed", (8.0,)), Order("liveliness", (0.5, 10.0))):
-        obey(order, first.parts, first.iterations)
+        obey(order, first.parts)
     danced(first.parts, 10, 10)
     resumed(first, second, runtime, 19)
     levels, noises = danced(second.parts, 1)
     assert levels[0] == 0.5
     np.testing.assert_allclose(noises[0], LatentNoise(8, 1, 1).at(20)[0], rtol=1e-6)
-
-
-def test_a_checkpoint_of_another_release_leaves_it_as_the_show_says(
-    dance_of: Callable[[], Reconciler], runtime: Path
-) -> None:
-    put(runtime, replace(PLACE, liveliness=None))
-    dance = dance_of()
-    with closing(Resumption("A test", runtime, None, "always")) as resuming:
-        assert "goes on" in resuming.go_on(dance, NOW)
-    assert (dance.parts.liveliness.level, dance.parts.liveliness.seed) == (1.0, 0)

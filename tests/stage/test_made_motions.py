@@ -24,7 +24,6 @@ from appliance.show.show import Show, load_show
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
 from appliance.stage.carry_out import obey
-from appliance.stage.iterations import Iterations
 from appliance.stage.made_motions import LATE_S, open_made_motions
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import Resumption
@@ -45,24 +44,24 @@ class Dance:
         self.show, self.now, self.folder = show, 1000.0, folder
         self.parts: StageParts = assemble(show, BOX)
         self.made = open_made_motions(folder, show, self.parts)
-        reader, self.iterations = ShowStateReader(folder), Iterations(3, 2, 64)
+        reader = ShowStateReader(folder)
         source = show.config.motion.source
-        self.reconciler = Reconciler("A test", self.parts, self.iterations, reader, self.made, source)
+        self.reconciler = Reconciler("A test", self.parts, reader, self.made, source)
         self.watch = Watch(self.parts, FITS, self.made)
-        self._maker = Maker(show.skeleton, show.motion_networks, self.parts.motion.loop_of, grounded=True)
+        self._maker = Maker(show.skeleton, show.motion_networks, self.parts.led.motion.loop_of, grounded=True)
 
     def run(self, seconds: float) -> set[str]:
         """Tick on; the names of what was danced."""
         seen = set()
         for _ in range(round(seconds / TICK_S)):
             for order in self.reconciler.pending(self.now):
-                done, words = obey(order, self.parts, self.iterations)
+                done, words = obey(order, self.parts)
                 assert done, words
             self.watch.count_silences(self.now)
             for puppet in self.parts.puppets:
                 puppet.motion.advance()
             self.now += TICK_S
-            seen.add(self.parts.first.source)
+            seen.add(self.parts.led.source)
         return seen
 
     def make(self, writer: MadeMotionWriter, at_once: bool, **recipe: Any) -> None:
@@ -132,10 +131,10 @@ def test_the_phrase_plays_on_until_it_is_made_and_the_wait_is_told_once(
     dance.run(2.0)
     assert dance.late() == 1
     dance.make(writer, True, number=1001)
-    assert dance.run(1.0) == {"main", "vary"} and dance.parts.first.source == "vary"
+    assert dance.run(1.0) == {"main", "vary"} and dance.parts.led.source == "vary"
     declare(tmp_path, "vary", "main")
     dance.run(1.0)
-    assert dance.parts.first.source == "main" and dance.parts.motion.made is None
+    assert dance.parts.led.source == "main" and dance.parts.led.motion.made is None
 
 
 def test_what_is_made_for_the_return_waits_for_it_and_what_is_not_does_not(
@@ -146,7 +145,7 @@ def test_what_is_made_for_the_return_waits_for_it_and_what_is_not_does_not(
     dance.make(writer, True, number=1001)
     dance.run(0.5)
     dance.make(writer, False, number=1002, seed=2)
-    number = dance.parts.motion
+    number = dance.parts.led.motion
     dance.run(1.5)
     assert number.made is not None and number.made.number == 1001
     dance.run(1.5)  # the phrase has three seconds
@@ -156,7 +155,7 @@ def test_what_is_made_for_the_return_waits_for_it_and_what_is_not_does_not(
     assert number.made.number == 1003
     assert dance.late() == 0
     dance.run(4.0)  # nothing more comes: the last one plays on, and that is told
-    assert number.made.number == 1003 and dance.parts.first.source == "vary" and dance.late() == 1
+    assert number.made.number == 1003 and dance.parts.led.source == "vary" and dance.late() == 1
     dance.make(writer, False, number=1004, seed=3)
     dance.run(3.2)
     assert number.made.number == 1004
@@ -166,7 +165,7 @@ def test_improvisations_follow_each_other_in_step_and_come_round_where_none_is_t
     dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path
 ) -> None:
     dance = dance_of()
-    motion = dance.parts.motion
+    motion = dance.parts.led.motion
     declare(tmp_path, "improvise")
     dance.run(0.5)
     first = dance.improvise(writer, True, 1001, motion.loop_of("main"), 75)
@@ -200,16 +199,16 @@ def test_backwards_a_return_is_the_other_end(
     dance.run(1.0)  # it begins at the phrase's start, and comes from its end at once
     dance.make(writer, False, number=1002, seed=2)
     dance.run(0.5)
-    assert dance.parts.motion.made is not None and dance.parts.motion.made.number == 1001
+    assert dance.parts.led.motion.made is not None and dance.parts.led.motion.made.number == 1001
     dance.run(3.0)
-    assert dance.parts.motion.made.number == 1002
+    assert dance.parts.led.motion.made.number == 1002
 
 
 def test_a_show_may_start_from_it(dance_of: Callable[..., Dance], writer: MadeMotionWriter) -> None:
     dance = dance_of(source="vary")
     dance.make(writer, True, number=1001)
     dance.run(1.5)
-    assert dance.parts.first.source == "vary"
+    assert dance.parts.led.source == "vary"
 
 
 def test_a_file_that_is_gone_or_foreign_changes_nothing(
@@ -220,12 +219,12 @@ def test_a_file_that_is_gone_or_foreign_changes_nothing(
     recipe = recipe_text({"source": "vary", "phrase": "main", "sigma": 1.0, "seed": 1, "number": 1001})
     (tmp_path / FOLDER / "1001.material").write_bytes(b"damaged")
     with pytest.raises(ValueError, match="no material"):
-        dance.parts.first.play_made(recipe, 0.2)
+        dance.parts.led.play_made(recipe, 0.2)
     (tmp_path / FOLDER / "1001.material").unlink()
     with pytest.raises(ValueError, match="cannot be read"):
-        dance.parts.first.play_made(recipe, 0.2)
+        dance.parts.led.play_made(recipe, 0.2)
     with pytest.raises(ValueError, match="no sound recipe"):
-        dance.parts.first.play_made("{}", 0.2)
+        dance.parts.led.play_made("{}", 0.2)
     assert dance.run(0.2) == {"main"}
 
 
@@ -255,7 +254,7 @@ def test_a_restarted_stage_goes_on_in_what_was_made(
     puppets = [{"name": "a"}, {"name": "b", "phrase": "vary"}]
     dance = dance_of(puppets=puppets)
     declare(tmp_path, "improvise")
-    dance.improvise(writer, True, 1001, dance.parts.motion.loop_of("main"), 75)
+    dance.improvise(writer, True, 1001, dance.parts.led.motion.loop_of("main"), 75)
     with closing(MadeMotionWriter(tmp_path, 1)) as second:
         dance.make(second, True, number=1002)
     dance.run(3.0)
@@ -297,4 +296,4 @@ def test_after_a_power_cut_it_goes_on_with_its_source(
     with closing(Resumption("A test", runtime, None, "always")) as resumed:
         assert "After a power cut" in resumed.go_on(again.reconciler, again.now)
         again.run(0.5)
-        assert again.reconciler.wanted == "vary" and again.parts.first.source == "vary"
+        assert again.reconciler.wanted == "vary" and again.parts.led.source == "vary"

@@ -32,24 +32,24 @@ def parts(tmp_path: Path) -> Iterator[StageParts]:
 
 
 def hand_of(parts: StageParts) -> RemotePlace:
-    hand = parts.hands.puppeteers[0]
+    hand = parts.led.hands.puppeteers[0]
     assert isinstance(hand, RemotePlace)
     return hand
 
 
 def test_a_place_is_told_and_taken_back(parts: StageParts) -> None:
     hand = hand_of(parts)
-    assert obey(Order("place", (0.25, 1.5, -0.5), "lShldr"), parts, ITERATIONS) == (True, "")
+    assert obey(Order("place", (0.25, 1.5, -0.5), "lShldr"), parts) == (True, "")
     assert hand.told == (0.25, 1.5, -0.5)
-    assert obey(Order("release", (), "lShldr"), parts, ITERATIONS) == (True, "")
+    assert obey(Order("release", (), "lShldr"), parts) == (True, "")
     assert hand.told is None
 
 
 def test_a_hand_that_is_let_hold_by_place_holds_its_joint_where_it_is(parts: StageParts) -> None:
-    parts.first.stand()
-    assert obey(Order("hand", (1.0,), "lShldr"), parts, ITERATIONS) == (True, "")
+    parts.led.stand()
+    assert obey(Order("hand", (1.0,), "lShldr"), parts) == (True, "")
     hand = hand_of(parts)
-    assert hand.told == pytest.approx(parts.first.frame.positions[hand.number].tolist())
+    assert hand.told == pytest.approx(parts.led.frame.positions[hand.number].tolist())
     assert any(hand.told or ())
 
 
@@ -63,7 +63,7 @@ def test_what_a_hand_does_not_give_is_refused_in_words(parts: StageParts) -> Non
         (Order("place", (0.0, 1.0, 0.0), "hip"), "No hand of this show holds 'hip'"),
         (Order("place", (0.0, 1e4, 0.0), "lShldr"), "no place"),
     ]:
-        done, said = obey(order, parts, ITERATIONS)
+        done, said = obey(order, parts)
         assert not done and words in said
     assert hand_of(parts).told is None
 

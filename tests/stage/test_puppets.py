@@ -139,13 +139,12 @@ def test_their_journal_dances_again_bit_for_bit(night: Night, tmp_path: Path) ->
 
 def test_a_restarted_stage_goes_on_with_all_of_them(night: Night, tmp_path: Path) -> None:
     night.dance(77, reading(TURNED))
-    noted = [puppet.noted for puppet in night.parts.puppets[1:]]
-    place = Checkpoint("A test", "main", 1.0, (0.0, 3.0), others=tuple(noted))
+    noted = tuple(puppet.noted for puppet in night.parts.puppets)
+    place = Checkpoint("A test", noted)
     assert unpacked(packed(place)) == place
-    assert unpacked(packed(replace(place, others=()))) == replace(place, others=())
     assert unpacked(packed(place)[:-1]) is None
     again = Night(tmp_path / "show", tmp_path / "again")
-    for puppet, one, before in zip(again.parts.puppets[1:], noted, night.parts.puppets[1:], strict=True):
+    for puppet, one, before in zip(again.parts.puppets, noted, night.parts.puppets, strict=True):
         puppet.go_on(one, 1.0)
         assert puppet.motion.position_s == pytest.approx(before.motion.position_s, abs=1e-3)
     assert again.parts.puppets[2].iterations.coding == 2
@@ -165,7 +164,7 @@ def test_all_of_them_count_towards_the_budget(tmp_path: Path) -> None:
 
 
 def test_the_shared_frame_has_room_for_them(night: Night, tmp_path: Path) -> None:
-    facts = facts_of(night.show, None, night.parts.first.iterations, 0.0)
+    facts = facts_of(night.show, None, night.parts.led.iterations, 0.0)
     writer = FrameWriter(tmp_path / "run", facts)
     night.parts.outputs.share(writer)
     night.dance(5, reading(STILL))

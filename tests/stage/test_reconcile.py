@@ -53,7 +53,7 @@ def test_a_part_is_applied_once_so_that_what_came_after_it_stays(
     parts: StageParts, reconciler: Reconciler, command: Commanded
 ) -> None:
     command("/hold", 1.0, text="Chest")
-    chest = parts.hands.puppeteers[1]
+    chest = parts.led.hands.puppeteers[1]
     assert isinstance(chest, Remote)
     chest.release()
     command("/hold", 0.0, text="lShldr")
@@ -65,8 +65,8 @@ def test_a_phrase_that_the_show_lost_changes_nothing_and_is_told(
 ) -> None:
     declared.now = declared.now.to(PHRASE, "slwo", NOW).to(RATE, 0.5, NOW)
     assert "Did you mean 'slow'?" in follow(reconciler)
-    parts.motion.advance()
-    assert (parts.motion.rate, parts.motion.jumped) == (0.5, False)
+    parts.led.motion.advance()
+    assert (parts.led.motion.rate, parts.led.motion.jumped) == (0.5, False)
     assert not reconciler.pending(NOW)
 
 
@@ -75,7 +75,7 @@ def test_a_stopped_show_stands_once_it_is_dark_and_goes_on_at_its_rate(
 ) -> None:
     def rate_at(now: float) -> float:
         follow(reconciler, now)
-        return parts.motion.rate
+        return parts.led.motion.rate
 
     command("/player/rate", 0.5)
     declared.now = declared.now.to(GOING, 0.0, NOW, 2.0)
@@ -88,10 +88,10 @@ def test_a_stopped_show_stands_once_it_is_dark_and_goes_on_at_its_rate(
     assert rate_at(NOW + 6.0) == 1.0
 
 
-def test_a_show_that_stands_by_itself_can_be_started(parts: StageParts, iterations: Iterations) -> None:
-    parts.motion.rate = 0.0
+def test_a_show_that_stands_by_itself_can_be_started(parts: StageParts) -> None:
+    parts.led.motion.rate = 0.0
     declared = Declared()
-    reconciler = Reconciler("A test", parts, iterations, declared)  # type: ignore[arg-type]
+    reconciler = Reconciler("A test", parts, declared)  # type: ignore[arg-type]
     assert not reconciler.pending(NOW)
     declared.now = declared.now.to(RATE, None, NOW)
     assert reconciler.pending(NOW) == [Order("rate", (1.0,))]
@@ -105,13 +105,13 @@ def test_a_stage_without_a_checkpoint_begins_with_what_is_declared(
     declared.now = declared.now.changed(NOW, [*called, *hands])
     sentence = reconciler.begin(NOW)
     assert "goes on in the cue 'storm'" in sentence and "at most 8 fit" in sentence
-    assert (reconciler.cue, parts.motion.phrase, parts.motion.position_s) == ("storm", "slow", 0.0)
+    assert (reconciler.cue, parts.led.motion.phrase, parts.led.motion.position_s) == ("storm", "slow", 0.0)
     assert (iterations.coding, iterations.interaction) == (8, 7)
     assert enabled(parts) == {"lShldr": False, "Chest": True}
-    parts.motion.advance()
-    assert not parts.motion.jumped
-    first = parts.motion.window()[0][FIGURE.index("Chest")]
-    held = parts.hands.puppeteers[1].pull(10.0).orientation
+    parts.led.motion.advance()
+    assert not parts.led.motion.jumped
+    first = parts.led.motion.window()[0][FIGURE.index("Chest")]
+    held = parts.led.hands.puppeteers[1].pull(10.0).orientation
     assert quaternion.angle_between(held, first) < 0.1
 
 
@@ -128,4 +128,5 @@ def test_with_nothing_declared_for_this_show_it_begins_as_it_does(
 ) -> None:
     declared.now = show_state
     assert reconciler.begin(NOW) == ""
-    assert (reconciler.cue, parts.motion.phrase, parts.motion.rate, iterations.coding) == ("", "main", 1.0, 3)
+    motion = parts.led.motion
+    assert (reconciler.cue, motion.phrase, motion.rate, iterations.coding) == ("", "main", 1.0, 3)

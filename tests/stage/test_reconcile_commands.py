@@ -24,8 +24,7 @@ from tests.stage.shows import BOX
 
 
 @pytest.fixture
-def tick(parts: StageParts, iterations: Iterations) -> Tick:
-    parts.first.iterations = iterations
+def tick(parts: StageParts) -> Tick:
     return Tick(parts, SensorFit(parts, SensorMemory(None, print), print), 1.0)
 
 
@@ -55,8 +54,8 @@ def test_a_cue_changes_phrase_iterations_and_hands(
     assert enabled(parts) == {"lShldr": False, "Chest": True}
     assert reconciler.cue == "storm"
     for _ in range(20):
-        parts.motion.advance()
-    assert parts.motion.phrase == "slow"
+        parts.led.motion.advance()
+    assert parts.led.motion.phrase == "slow"
     assert command("/cue", text="start") == ""
     assert reached(iterations) == (4, 3)
     assert enabled(parts) == {"lShldr": True, "Chest": True}
@@ -89,29 +88,29 @@ def test_a_cue_shows_no_jump(command: Commanded, tick: Tick) -> None:
 
 def test_a_phrase_is_called_with_its_own_fade(parts: StageParts, command: Commanded) -> None:
     assert command("/phrase", 1.0, text="slow") == ""
-    parts.motion.advance()
-    assert parts.motion.jumped
+    parts.led.motion.advance()
+    assert parts.led.motion.jumped
     assert "plays already" in command("/phrase", 1.0, text="slow")
     assert command("/phrase", text="main") == ""
 
 
 def test_a_phrase_that_is_called_again_plays_as_a_whole(parts: StageParts, command: Commanded) -> None:
     command("/phrase", text="slow")
-    parts.motion.excerpt(1.0, 2.0)
+    parts.led.motion.excerpt(1.0, 2.0)
     assert command("/phrase", text="slow") == ""
-    assert parts.motion.excerpt_s == pytest.approx((0.0, 5.0), abs=0.1)
+    assert parts.led.motion.excerpt_s == pytest.approx((0.0, 5.0), abs=0.1)
 
 
 def test_a_hand_lets_go_and_holds(parts: StageParts, command: Commanded, tick: Tick) -> None:
-    place = parts.first.hand_places[0]
+    place = parts.led.hand_places[0]
     danced(tick, 50)
-    assert parts.hands.weights[place] == 1.0
+    assert parts.led.hands.weights[place] == 1.0
     command("/hold", 0.0, text="lShldr")
     danced(tick, 60, 50)
-    assert parts.hands.weights[place] == 0.0
+    assert parts.led.hands.weights[place] == 0.0
     command("/hold", 1.0, text="lShldr")
     danced(tick, 60, 110)
-    assert parts.hands.weights[place] == 1.0
+    assert parts.led.hands.weights[place] == 1.0
 
 
 def test_a_hand_by_osc_that_was_told_nothing_holds_its_joint_where_it_is(
@@ -121,7 +120,7 @@ def test_a_hand_by_osc_that_was_told_nothing_holds_its_joint_where_it_is(
     before = danced(tick, 62)
     assert quaternion.angle_between(before[-1, chest], before[-20, chest]) > 0.1  # it sways
     command("/hold", 1.0, text="Chest")
-    held = parts.hands.puppeteers[1].pull(11.24).orientation.copy()
+    held = parts.led.hands.puppeteers[1].pull(11.24).orientation.copy()
     assert quaternion.angle_between(held, before[-1, chest]) < 1e-3
     after = danced(tick, 100, 62)
     assert quaternion.angle_between(after[-50:, chest], held).max() < 1e-3
@@ -129,15 +128,15 @@ def test_a_hand_by_osc_that_was_told_nothing_holds_its_joint_where_it_is(
 
 def test_a_kept_joint_holds_and_lets_go(tmp_path: Path) -> None:
     parts = assemble(load_show(write_show(tmp_path / "kept", [{"kept": True, "joint": "Chest"}])), BOX)
-    place = parts.first.hand_places[0]
+    place = parts.led.hand_places[0]
     for holds, begins in ((True, 0), (False, 60), (True, 120)):
-        obey(Order("hand", (float(holds),), "Chest"), parts, Iterations(3, 3, 8))
+        obey(Order("hand", (float(holds),), "Chest"), parts)
         for tick in range(60):
-            window = parts.first.puppet.select(parts.motion.window())
-            parts.hands.pull(10.0 + 0.02 * (begins + tick), window)
-            assert np.array_equal(parts.hands.targets[:, place], window[:, place])
-            parts.motion.advance()
-        assert parts.hands.weights[place] == float(holds)
+            window = parts.led.puppet.select(parts.led.motion.window())
+            parts.led.hands.pull(10.0 + 0.02 * (begins + tick), window)
+            assert np.array_equal(parts.led.hands.targets[:, place], window[:, place])
+            parts.led.motion.advance()
+        assert parts.led.hands.weights[place] == float(holds)
     parts.close()
 
 

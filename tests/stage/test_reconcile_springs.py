@@ -26,8 +26,8 @@ def test_springs_follow_what_is_declared_also_after_a_restart(tmp_path: Path, de
     show = load_show(write_show(tmp_path / "sprung", [{"springs": "stiff", "joint": "Hips"}], cues=cues))
     parts, again = assemble(show, BOX), assemble(show, BOX)
     facts = facts_of(show, None, Iterations(3, 2, most=8), NOW)
-    reconciler = Reconciler("A test", parts, Iterations(3, 2, most=8), declared)  # type: ignore[arg-type]
-    assert parts.first.springs is not None and again.first.springs is not None
+    reconciler = Reconciler("A test", parts, declared)  # type: ignore[arg-type]
+    assert parts.led.springs is not None and again.led.springs is not None
 
     def say(address: str, *values: float, text: str = "") -> None:
         declared.now, _ = declare(declared.now, Command(address, values, text), facts, NOW)
@@ -35,18 +35,18 @@ def test_springs_follow_what_is_declared_also_after_a_restart(tmp_path: Path, de
 
     say("/springs/wind", 1.0, 2.0, 3.0)
     say("/cue", text="gale")
-    assert parts.first.springs.setting == "storm"
-    assert parts.first.springs.wind.tolist() == list(
-        parts.first.springs.settings["storm"].wind
+    assert parts.led.springs.setting == "storm"
+    assert parts.led.springs.wind.tolist() == list(
+        parts.led.springs.settings["storm"].wind
     )  # the older wind is over
     say("/springs", text="loose")
     say("/springs/wind", 3.0, 0.0, -1.0)
     say("/springs/gravity", 5.0)
-    restarted = Reconciler("A test", again, Iterations(3, 2, most=8), declared)  # type: ignore[arg-type]
+    restarted = Reconciler("A test", again, declared)  # type: ignore[arg-type]
     restarted.generation = reconciler.generation  # as its checkpoint says
     follow(restarted)
     assert not restarted.pending(NOW)
-    for springs in (parts.first.springs, again.first.springs):
+    for springs in (parts.led.springs, again.led.springs):
         assert (springs.setting, springs.gravity, springs.wind.tolist()) == ("loose", 5.0, [3.0, 0.0, -1.0])
     with pytest.raises(ValueError, match="Did you mean 'loose'"):
         say("/springs", text="lose")
@@ -63,7 +63,7 @@ def test_strings_drive_no_joint_in_panic_blackout_and_after_a_stop(
     first = strung if puppets == 1 else []
     config = {"springs": settings, **({"puppets": two} if puppets == 2 else {})}
     parts = assemble(load_show(write_show(tmp_path / "strung", first, **config)), BOX)
-    reconciler = Reconciler("A test", parts, Iterations(3, 2, most=8), declared)  # type: ignore[arg-type]
+    reconciler = Reconciler("A test", parts, declared)  # type: ignore[arg-type]
     (springs,) = parts.springs
     assert springs.feedback == 1.0
     for away, back in (("/panic", "/go"), ("/stop", "/go"), ("/blackout", "/blackout")):
@@ -82,5 +82,5 @@ def test_strings_drive_no_joint_in_panic_blackout_and_after_a_stop(
 def test_springs_of_which_there_are_none_are_refused(command: Commanded, parts: StageParts) -> None:
     with pytest.raises(ValueError, match="No hand of this show is springs"):
         command("/springs/wind", 1.0, 0.0, 0.0)
-    done, words = obey(Order("kick", (1.0, 0.0, 0.0)), parts, Iterations(3, 2, 8))
+    done, words = obey(Order("kick", (1.0, 0.0, 0.0)), parts)
     assert not done and "No hand of this show is springs" in words

@@ -26,7 +26,7 @@ def test_the_stage_begins_with_the_show_state_of_its_folder(show: Show, box: Box
         stage = Stage(show, box, said.append)
         with closing(stage):
             stage.dance(0.1, lambda: False)
-            assert (stage.reconciler.cue, stage.parts.motion.phrase) == (cue, phrase)
+            assert (stage.reconciler.cue, stage.parts.led.motion.phrase) == (cue, phrase)
         assert any("goes on in the cue 'storm'" in words for words in said) == (cue == "storm")
 
 
@@ -53,7 +53,7 @@ def test_the_dance_follows_within_a_tick_reports_it_and_notes_it_before(show: Sh
         assert health is not None and place is not None
         assert health["applied"] == [declared.generation, ""]
         assert health["cue"] == place.cue == "storm"
-        assert (place.phrase, place.applied) == ("slow", declared.generation)
+        assert (place.puppets[0].phrase, place.applied) == ("slow", declared.generation)
         reads = [stage.reconciler.pending(time.monotonic()) for _ in range(100)]
         assert reads == [[]] * 100
 

@@ -28,7 +28,7 @@ def window_of(motion: Playback) -> tuple[np.ndarray, np.ndarray]:
 
 def do(dance: Reconciler, *orders: Order) -> None:
     for order in orders:
-        assert obey(order, dance.parts, dance.iterations)[0]
+        assert obey(order, dance.parts)[0]
 
 
 def goes_on(dance: Reconciler, runtime: Path, again: Reconciler) -> str:
@@ -46,19 +46,20 @@ def test_the_very_next_pose_comes_next_at_its_place_on_the_stage(
 ) -> None:
     before, after = dance_of(), dance_of()
     do(before, Order("phrase", (0.5,), "walk"))
-    before.rate = before.parts.motion.rate = rate
+    before.rate = before.parts.led.motion.rate = rate
     for _ in range(200 + ticks):
-        before.parts.motion.advance()
+        before.parts.led.motion.advance()
     words = goes_on(before, runtime, after)
     assert "After a restart of the stage" in words and "the phrase 'walk'" in words
     for _ in range(60):
-        poses, roots = window_of(before.parts.motion)
-        poses_after, roots_after = window_of(after.parts.motion)
+        poses, roots = window_of(before.parts.led.motion)
+        poses_after, roots_after = window_of(after.parts.led.motion)
         assert quaternion.angle_between(poses[0], poses_after[0]).max() < 0.01
         np.testing.assert_allclose(roots_after[0], roots[0], atol=0.005)
-        assert after.parts.motion.position_s == pytest.approx(before.parts.motion.position_s, abs=2e-3)
-        before.parts.motion.advance()
-        after.parts.motion.advance()
+        was_at_s = before.parts.led.motion.position_s
+        assert after.parts.led.motion.position_s == pytest.approx(was_at_s, abs=2e-3)
+        before.parts.led.motion.advance()
+        after.parts.led.motion.advance()
 
 
 @pytest.mark.parametrize("ticks", [0, 1, 4, 8, 20])
@@ -68,13 +69,13 @@ def test_a_phrase_that_was_just_asked_for_is_the_one_that_comes_back(
     """Also while it has not reached the window's first pose, or is still fading in."""
     before, after = dance_of(), dance_of()
     for _ in range(50):
-        before.parts.motion.advance()
+        before.parts.led.motion.advance()
     do(before, Order("phrase", (1.0,), "walk"))
     for _ in range(ticks):
-        before.parts.motion.advance()
+        before.parts.led.motion.advance()
     goes_on(before, runtime, after)
-    assert after.parts.motion.phrase == "walk"
-    assert after.parts.motion.position_s == pytest.approx(max(0.0, (ticks - 8) * TICK_S), abs=0.03)
+    assert after.parts.led.motion.phrase == "walk"
+    assert after.parts.led.motion.position_s == pytest.approx(max(0.0, (ticks - 8) * TICK_S), abs=0.03)
 
 
 def test_excerpt_rate_iterations_hands_and_cue_come_back(
@@ -84,15 +85,15 @@ def test_excerpt_rate_iterations_hands_and_cue_come_back(
     do(before, Order("phrase", (0.2,), "walk"), Order("iterations", (6.0, 5.0, 0.2)), Order("rate", (0.5,)))
     do(before, Order("hand", (0.0,), "lShldr"))
     before.cue, before.rate, before.generation = "storm", 0.5, 77
-    before.parts.motion.excerpt(1.0, 3.0)
+    before.parts.led.motion.excerpt(1.0, 3.0)
     for _ in range(80):
-        before.parts.motion.advance()
-        before.iterations.advance()
+        before.parts.led.motion.advance()
+        before.parts.led.iterations.advance()
     assert "in the cue 'storm'" in goes_on(before, runtime, after)
     assert (after.cue, after.rate, after.generation) == ("storm", 0.5, 77)
-    assert (after.parts.motion.rate, after.parts.motion.excerpt_s) == (0.5, (1.0, 3.0))
-    assert (after.iterations.coding, after.iterations.interaction) == (6, 5)
-    assert {one.joint: one.enabled for one in after.parts.hands.puppeteers} == {
+    assert (after.parts.led.motion.rate, after.parts.led.motion.excerpt_s) == (0.5, (1.0, 3.0))
+    assert (after.parts.led.iterations.coding, after.parts.led.iterations.interaction) == (6, 5)
+    assert {one.joint: one.enabled for one in after.parts.led.hands.puppeteers} == {
         "lShldr": False,
         "Chest": True,
     }
@@ -107,8 +108,8 @@ def test_what_was_declared_while_the_stage_was_away_follows_and_what_it_followed
     declare(runtime, declared)
     for _ in range(10):
         do(before, *before.pending(NOW))
-        before.parts.motion.advance()
-    before.parts.motion.excerpt(1.0, 3.0)
+        before.parts.led.motion.advance()
+    before.parts.led.motion.excerpt(1.0, 3.0)
     if is_applied:
         declare(runtime, declared.to(PHRASE, "walk", NOW, 0.5).to(ITERATIONS, (6, 5), NOW))
     goes_on(before, runtime, after)
@@ -126,12 +127,12 @@ def test_a_show_that_stands_comes_back_standing(
             goes = ShowState(show="A test")
             declare(runtime, goes.to(GOING, 0.0, NOW) if by == "stop" else goes.to(RATE, 0.0, NOW))
         do(before, *before.pending(NOW))
-        before.parts.motion.advance()
+        before.parts.led.motion.advance()
     goes_on(before, runtime, after)
-    assert after.parts.motion.rate == 0.0 and not after.pending(NOW)
+    assert after.parts.led.motion.rate == 0.0 and not after.pending(NOW)
     for _ in range(20):
-        after.parts.motion.advance()
-    assert after.parts.motion.position_s == pytest.approx(before.parts.motion.position_s, abs=2e-3)
+        after.parts.led.motion.advance()
+    assert after.parts.led.motion.position_s == pytest.approx(before.parts.led.motion.position_s, abs=2e-3)
     if by == "stop":
         declare(runtime, ShowState(show="A test"))
         assert after.pending(NOW) == [Order("rate", (1.0,))]
@@ -141,6 +142,6 @@ def test_what_grounding_moved_the_figure_by_comes_back(
     dance_of: Callable[[], Reconciler], runtime: Path
 ) -> None:
     before, after = dance_of(), dance_of()
-    before.parts.first.grounding.strayed = (0.2, -0.1)
+    before.parts.led.grounding.strayed = (0.2, -0.1)
     goes_on(before, runtime, after)
-    assert after.parts.first.grounding.strayed == (0.2, -0.1)
+    assert after.parts.led.grounding.strayed == (0.2, -0.1)

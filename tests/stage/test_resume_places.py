@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,13 +22,14 @@ from appliance.stage.watch import Watch
 from tests.stage.places import PLACE, declare, put
 from tests.stage.shows import NOW
 from tests.stage.test_fallbacks import FITS
+from tests.standing import moved
 
 
 def test_after_a_power_cut_all_that_is_declared_is_new(
     dance_of: Callable[[], Reconciler], runtime: Path
 ) -> None:
     """Its generations count from the machine's start."""
-    put(runtime, replace(PLACE, boot="another", applied=10**15, cue="storm"))
+    put(runtime, moved(PLACE, boot="another", applied=10**15, cue="storm"))
     declare(runtime, ShowState(show="A test").to(ITERATIONS, (6, 5), NOW))
     dance = dance_of()
     with closing(Resumption("A test", runtime, None, "always")) as resuming:
@@ -44,20 +44,20 @@ def test_after_a_power_cut_a_show_that_stood_dances(
 ) -> None:
     """The dark show state has gone with the memory: in full light the phrase does not stand still."""
     with closing(SlotFile(tmp_path / "state" / FILE)) as file:
-        file.write(packed(replace(PLACE, rate=0.0, boot=boot)))
+        file.write(packed(moved(PLACE, rate=0.0, boot=boot)))
     dance = dance_of()
     with closing(Resumption("A test", runtime, tmp_path / "state", "always")) as resuming:
         assert "goes on at 2.0 s" in resuming.go_on(dance, NOW)
-    assert dance.parts.motion.rate == rate
+    assert dance.parts.led.motion.rate == rate
 
 
 @pytest.mark.parametrize(
     ("place", "reason"),
     [
-        (replace(PLACE, show="Another show"), "Before, the show was 'Another show'"),
-        (replace(PLACE, phrase="run"), "no phrase 'run'"),
-        (replace(PLACE, excerpt=(70.0, 90.0)), "Choose a longer part"),
-        (replace(PLACE, rate=90.0), "The rate is 90"),
+        (moved(PLACE, show="Another show"), "Before, the show was 'Another show'"),
+        (moved(PLACE, phrase="run"), "no phrase 'run'"),
+        (moved(PLACE, excerpt=(70.0, 90.0)), "Choose a longer part"),
+        (moved(PLACE, rate=90.0), "The rate is 90"),
     ],
 )
 def test_a_place_that_this_show_does_not_have_is_no_place(
@@ -70,22 +70,22 @@ def test_a_place_that_this_show_does_not_have_is_no_place(
     resuming.close()
     assert "begins at the beginning" in words and reason in words
     assert not resuming.went_on
-    assert (dance.parts.motion.phrase, dance.parts.motion.position_s) == ("main", 0.0)
+    assert (dance.parts.led.motion.phrase, dance.parts.led.motion.position_s) == ("main", 0.0)
     for _ in range(20):
-        dance.parts.motion.advance()
-    assert (dance.parts.motion.phrase, dance.parts.motion.rate) == ("main", 1.0)
-    assert dance.parts.motion.going_on[1] == pytest.approx(20 * TICK_S, abs=2e-3)
+        dance.parts.led.motion.advance()
+    assert (dance.parts.led.motion.phrase, dance.parts.led.motion.rate) == ("main", 1.0)
+    assert dance.parts.led.motion.going_on[1] == pytest.approx(20 * TICK_S, abs=2e-3)
 
 
 def test_a_second_beyond_the_phrase_is_its_last_one(
     dance_of: Callable[[], Reconciler], runtime: Path
 ) -> None:
     dance = dance_of()
-    put(runtime, replace(PLACE, position_s=99.0))
+    put(runtime, moved(PLACE, position_s=99.0))
     resuming = Resumption("A test", runtime, None, "always")
     assert "goes on" in resuming.go_on(dance, NOW)
     resuming.close()
-    assert dance.parts.motion.position_s == pytest.approx(5.0, abs=0.1)
+    assert dance.parts.led.motion.position_s == pytest.approx(5.0, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -117,11 +117,11 @@ def test_memory_is_asked_first_then_the_disk(
 ) -> None:
     here = boot_id()
     if in_memory:
-        put(runtime, replace(PLACE, boot=here, ended=in_memory == "ended"))
+        put(runtime, moved(PLACE, boot=here, ended=in_memory == "ended"))
     if on_disk:
         boot = here if on_disk == "here" else "another"
         file = SlotFile(tmp_path / "state" / FILE)
-        file.write(packed(replace(PLACE, position_s=3.0, boot=boot, ended=on_disk == "ended")))
+        file.write(packed(moved(PLACE, position_s=3.0, boot=boot, ended=on_disk == "ended")))
         file.close()
     dance = dance_of()
     resuming = Resumption("A test", runtime, tmp_path / "state", wanted)  # type: ignore[arg-type]
@@ -129,7 +129,7 @@ def test_memory_is_asked_first_then_the_disk(
     resuming.close()
     assert (resuming.power_cuts, resuming.restarts) == (power_cuts, restarts)
     assert resuming.went_on == (at_s is not None)
-    assert dance.parts.motion.position_s == pytest.approx(at_s or 0.0, abs=1e-3)
+    assert dance.parts.led.motion.position_s == pytest.approx(at_s or 0.0, abs=1e-3)
     assert ("After a power cut" in words) == bool(power_cuts)
 
 
@@ -161,7 +161,7 @@ def test_a_place_from_which_no_frame_ever_leaves_is_given_up(
         words = resuming.go_on(dance, NOW)
         resuming.write_start(dance)  # and no note: it died in its first tick
         resuming.close()
-        begun.append(dance.parts.motion.position_s)
+        begun.append(dance.parts.led.motion.position_s)
     assert begun == pytest.approx([2.0] * TRIES + [0.0], abs=1e-3)
     assert f"{TRIES} starts" in words and "begins at the beginning" in words
     with closing(CheckpointReader(runtime)) as reader:
@@ -177,10 +177,10 @@ def test_one_frame_is_enough_to_come_back_as_often_as_it_takes(
         resuming, dance = Resumption("A test", runtime, None, "always"), dance_of()
         assert "goes on" in resuming.go_on(dance, NOW)
         resuming.write_start(dance)
-        dance.parts.motion.advance()
+        dance.parts.led.motion.advance()
         resuming.write_checkpoint(dance, 0)
         resuming.close()
-    assert dance.parts.motion.position_s == pytest.approx(2.0 + 2 * TRIES * TICK_S, abs=0.01)
+    assert dance.parts.led.motion.position_s == pytest.approx(2.0 + 2 * TRIES * TICK_S, abs=0.01)
 
 
 def test_without_room_for_it_the_dance_goes_on(dance_of: Callable[[], Reconciler], runtime: Path) -> None:
@@ -197,10 +197,10 @@ def test_without_room_for_it_the_dance_goes_on(dance_of: Callable[[], Reconciler
 @pytest.mark.parametrize(
     "place",
     [
-        replace(PLACE, x=1e30),
-        replace(PLACE, strayed=(0.0, -1e200)),
-        replace(PLACE, heading=math.inf),
-        replace(PLACE, liveliness=(0.5, 10**400, 0)),
+        moved(PLACE, standing=(1e30, 0.0, 0.0)),
+        moved(PLACE, strayed=(0.0, -1e200)),
+        moved(PLACE, standing=(0.0, 0.0, math.inf)),
+        moved(PLACE, liveliness=(0.5, 10**400, 0)),
     ],
 )
 def test_a_place_where_no_stage_stands_is_dropped_and_told(
@@ -220,10 +220,10 @@ def test_a_place_where_no_stage_stands_is_dropped_and_told(
 def test_a_place_in_memory_that_is_dropped_leaves_the_one_on_the_disk(
     dance_of: Callable[[], Reconciler], runtime: Path, tmp_path: Path
 ) -> None:
-    put(runtime, replace(PLACE, z=-1e9))
+    put(runtime, moved(PLACE, standing=(0.0, -1e9, 0.0)))
     with closing(SlotFile(tmp_path / "state" / FILE)) as file:
         file.write(packed(PLACE))
-        file.write(packed(replace(PLACE, x=1e9)))
+        file.write(packed(moved(PLACE, standing=(1e9, 0.0, 0.0))))
     with closing(Resumption("A test", runtime, tmp_path / "state", "always")) as resuming:
         assert "goes on at 2.0 s" in resuming.go_on(dance_of(), NOW)
         assert resuming.dropped

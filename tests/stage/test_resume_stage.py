@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from appliance.show.show import Show
 from appliance.stage.run import Stage
 from tests.stage.places import PLACE, declare, put
 from tests.stage.shows import NOW
+from tests.standing import moved
 
 
 @pytest.fixture
@@ -28,19 +28,19 @@ def show(walking_show: Show) -> Show:
 def test_the_whole_stage_goes_on_where_it_was(show: Show, box: BoxConfig) -> None:
     stage = Stage(show, box, lambda words: None)
     with closing(stage), pytest.raises(ZeroDivisionError):
-        stage.dance(None, lambda: stage.parts.motion.position_s > 0.3 and bool(1 / 0))  # late ticks stand
-    was_at_s = stage.parts.motion.position_s
+        stage.dance(None, lambda: stage.parts.led.motion.position_s > 0.3 and bool(1 / 0))  # late ticks stand
+    was_at_s = stage.parts.led.motion.position_s
     said: list[str] = []
     again = Stage(show, box, said.append)
     with closing(again):
-        assert again.parts.motion.position_s == pytest.approx(was_at_s, abs=1e-3)
+        assert again.parts.led.motion.position_s == pytest.approx(was_at_s, abs=1e-3)
         assert any("After a restart of the stage the show goes on at" in words for words in said)
         # The figure stands where it stood: no step through the room.
         np.testing.assert_allclose(again.tick.frames[0].root, stage.tick.frames[0].root, atol=0.02)
         again.dance(0.1, lambda: False)
     fresh = Stage(show, box, said.append)  # that one ended as it should
     with closing(fresh):
-        assert fresh.parts.motion.position_s == 0.0
+        assert fresh.parts.led.motion.position_s == 0.0
         assert not fresh.resuming.went_on
 
 
@@ -48,13 +48,13 @@ def test_a_place_goes_before_what_was_declared_before_it(show: Show, box: BoxCon
     """The cue was called, and another part of the phrase after it."""
     declared = ShowState(show="A test").to(CUE, "storm", NOW).to(PHRASE, "walk", NOW)
     declare(runtime, declared)
-    place = replace(PLACE, excerpt=(1.0, 3.0), cue="storm", applied=declared.generation, boot=boot_id())
+    place = moved(PLACE, excerpt=(1.0, 3.0), cue="storm", applied=declared.generation, boot=boot_id())
     put(runtime, place)
     with closing(Stage(show, box, lambda words: None)) as stage:
-        assert (stage.reconciler.cue, stage.parts.motion.phrase) == ("storm", "walk")
-        assert stage.parts.motion.position_s == pytest.approx(2.0, abs=1e-3)
+        assert (stage.reconciler.cue, stage.parts.led.motion.phrase) == ("storm", "walk")
+        assert stage.parts.led.motion.position_s == pytest.approx(2.0, abs=1e-3)
         stage.dance(0.1, lambda: False)
-        assert stage.parts.motion.excerpt_s == (1.0, 3.0)
+        assert stage.parts.led.motion.excerpt_s == (1.0, 3.0)
 
 
 def test_slots_are_not_needed_to_know_the_place(runtime: Path, show: Show, box: BoxConfig) -> None:
@@ -67,4 +67,4 @@ def test_slots_are_not_needed_to_know_the_place(runtime: Path, show: Show, box: 
             stage._note(slot)
         with closing(CheckpointReader(runtime)) as reader:
             place = reader.read()
-    assert place is not None and (place.tick, place.position_s) == (2, 0.0)
+    assert place is not None and (place.tick, place.puppets[0].position_s) == (2, 0.0)

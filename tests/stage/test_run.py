@@ -106,7 +106,7 @@ class Evening:
 
     @property
     def _weight(self) -> float:
-        return float(self.stage.parts.hands.weights[self.stage.parts.first.hand_places[0]])
+        return float(self.stage.parts.led.hands.weights[self.stage.parts.led.hand_places[0]])
 
     def _overshoot_s(self) -> float:
         return self.each_s + self.stops.get(self.stage.health.ticks, 0.0)
@@ -190,7 +190,7 @@ def test_what_was_declared_before_an_order_comes_before_it(evening: Evening) -> 
         writer.write(ShowState(show="A test").to(PHRASE, "other", evening.time.now, 0.5))
     evening.inbox.waiting = [Order("jump", (0.5,))]
     evening.stage._take_orders(evening.time.now, evening.time.monotonic)
-    assert evening.stage.parts.motion.going_on == ("other", pytest.approx(0.5), 0)
+    assert evening.stage.parts.led.motion.going_on == ("other", pytest.approx(0.5), 0)
 
 
 def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(

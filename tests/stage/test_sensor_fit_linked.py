@@ -72,16 +72,17 @@ class Evening:
         self.box_on()
 
     def run(self, seconds: float) -> None:
-        place = self.parts.first.puppet.joints.index("lShldr")
+        place = self.parts.led.puppet.joints.index("lShldr")
         for _ in range(round(seconds / TICK_S)):
             for reading in self.show.run(TICK_S):
                 self.wearing.hear(reading)
                 self.parts.hear(reading)
                 self.newest = reading
-            self.parts.hands.pull(self.show.now, self.parts.first.puppet.select(self.parts.motion.window()))
+            led = self.parts.led
+            led.hands.pull(self.show.now, led.puppet.select(led.motion.window()))
             self.wearing.look(self.show.now)
             if self.newest is not None:
-                self.errors.append(self._error(self.newest, self.parts.hands.targets[0, place]))
+                self.errors.append(self._error(self.newest, self.parts.led.hands.targets[0, place]))
             if self.lights[-1:] != [self.device.light]:
                 self.lights.append(self.device.light)
 

@@ -45,7 +45,7 @@ def stage(tmp_path: Path, receiver: OscReceiver) -> Iterator[Callable[..., Tick]
             outputs=OutputsConfig(osc=[OscConfig(port=receiver.port, frame_message=True)]),
         )
         casts.append(assemble(show, box))
-        casts[-1].first.iterations = Iterations(3, 2, 10)
+        casts[-1].led.iterations = Iterations(3, 2, 10)
         return Tick(casts[-1], worn(casts[-1]), latest_start_s=0.005)
 
     yield made
@@ -89,7 +89,7 @@ def test_without_hands_the_phrase_itself_is_danced(stage: Callable[..., Tick], r
     tick = stage(hands=[])
     expected = []
     for number in range(60):
-        expected.append(tick.parts.motion.window()[0].copy())
+        expected.append(tick.parts.led.motion.window()[0].copy())
         dance(tick, range(number, number + 1))
     np.testing.assert_allclose(poses(receiver), expected, atol=1e-5)
 
@@ -144,9 +144,9 @@ def test_a_late_tick_sends_the_last_pose_marked_late_and_the_phrase_waits(
 ) -> None:
     tick = stage(hands=[])
     dance(tick, range(30))
-    before = tick.parts.motion.position_s
+    before = tick.parts.led.motion.position_s
     dance(tick, range(30, 31), late_s=0.006)
-    assert tick.parts.motion.position_s == before
+    assert tick.parts.led.motion.position_s == before
     dance(tick, range(31, 32))
     sent = receiver.poll(1.0)
     marks = [arguments for _, address, arguments in sent if address == "/bunraku/frame"]
@@ -197,7 +197,7 @@ def test_a_tick_makes_nothing_for_the_collector(stage: Callable[..., Tick]) -> N
 def test_section_times_add_up_to_the_cost(stage: Callable[..., Tick]) -> None:
     ticking = iter(np.arange(0.0, 100.0, 0.001).tolist())
     parts = stage(hands=[]).parts
-    parts.first.iterations = Iterations(3, 2, 10)
+    parts.led.iterations = Iterations(3, 2, 10)
     tick = Tick(parts, worn(parts), 0.005, monotonic=lambda: next(ticking))
     slot = Slot(0, 0.0, 0.0)
     tick.run(slot)

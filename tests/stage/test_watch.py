@@ -139,10 +139,10 @@ def test_a_receiver_that_goes_and_comes_back(cast: StageParts, receiver: OscRece
 
 def test_a_network_that_fails_and_recovers(cast: StageParts) -> None:
     watch = Watch(cast, FITS)
-    cast.first.puppet.is_broken = True
+    cast.led.puppet.is_broken = True
     [words] = watch.check(1.0, Health())
     assert "holds the last good pose" in words
     assert watch.check(2.0, Health()) == []
-    cast.first.puppet.is_broken = False
+    cast.led.puppet.is_broken = False
     [words] = watch.check(3.0, Health())
     assert "gives poses again" in words

@@ -72,7 +72,7 @@ class Stage:
     def take(self, reading: SensorReading) -> None:
         self.wearing.hear(reading)
         self.parts.hear(reading)
-        self.parts.hands.pull(self.now, self.parts.first.puppet.select(self.parts.motion.window()))
+        self.parts.led.hands.pull(self.now, self.parts.led.puppet.select(self.parts.led.motion.window()))
         self.wearing.look(self.now)
 
     def stand(self, seconds: float, orientation: Orientation, **reading: int | str) -> None:
@@ -87,11 +87,11 @@ class Stage:
     def silence(self, seconds: float) -> None:
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
-            self.parts.hands.pull(self.now, self.parts.first.puppet.select(self.parts.motion.window()))
+            self.parts.led.hands.pull(self.now, self.parts.led.puppet.select(self.parts.led.motion.window()))
             self.wearing.look(self.now)
 
     def target(self, joint: str = "lShldr") -> np.ndarray:
-        return self.parts.hands.targets[0, self.parts.first.puppet.joints.index(joint)].copy()
+        return self.parts.led.hands.targets[0, self.parts.led.puppet.joints.index(joint)].copy()
 
     @property
     def wants(self) -> bool:

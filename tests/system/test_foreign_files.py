@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from appliance.box.block import BlockReader, BlockWriter
-from appliance.box.checkpoint import Checkpoint, packed, read_checkpoint, unpacked
+from appliance.box.checkpoint import Checkpoint, Standing, packed, read_checkpoint, unpacked
 from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.dancer.phrase_cache import FOLDER, LARGEST, SUFFIX, PhraseCache, prepare
 from appliance.fixture_library.convert import convert_file
@@ -138,7 +138,7 @@ def test_a_block_of_this_box_is_still_read(tmp_path: Path) -> None:
 
 
 def test_a_checkpoint_with_names_nested_too_deeply_is_refused() -> None:
-    payload = packed(Checkpoint("show", "phrase", 0.0, (0.0, 1.0)))
+    payload = packed(Checkpoint("show", (Standing("phrase", 0.0, (0.0, 1.0)),)))
     assert unpacked(payload) is not None
     assert unpacked(payload[: payload.index(b'["show"')] + DEEP) is None
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, read_checkpoint
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, Standing, read_checkpoint
 from appliance.box.process_health import ProcessHealth
 from appliance.box.ring_file import RingFileWriter
 from appliance.keeper.fallback import JOURNAL_STOPPED, SENSORS_NOT_KEPT
@@ -64,7 +64,7 @@ class Keeper(Process):
     def follow_place(self, ended: bool = False) -> None:
         """Move the checkpoint on, and wait until the disk has it."""
         self.position_s += 0.02
-        place = Checkpoint("A show", "main", self.position_s, (0.0, 30.0))
+        place = Checkpoint("A show", (Standing("main", self.position_s, (0.0, 30.0)),))
         self.place.write(replace(place, ended=ended))
         wait_until(
             lambda: self.kept_place() == self.position_s, lambda: f"the disk stays behind: {self.words}"
@@ -72,7 +72,7 @@ class Keeper(Process):
 
     def kept_place(self) -> float | None:
         place = read_checkpoint(self.folder / "state" / FILE)
-        return None if place is None else place.position_s
+        return None if place is None else place.puppets[0].position_s
 
     def fallbacks(self) -> set[str]:
         """The keeper's fallbacks in force, as consoles see them."""
@@ -123,7 +123,7 @@ def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Pat
 def test_the_rest_that_a_keeper_left_does_not_wait_for_a_disk_that_hangs(disk: Path, keeper: Keeper) -> None:
     keeper.end()
     keeper.night.dance(10)
-    keeper.place.write(Checkpoint("A show", "main", 7.5, (0.0, 30.0), ended=True))
+    keeper.place.write(Checkpoint("A show", (Standing("main", 7.5, (0.0, 30.0)),), ended=True))
     said: list[str] = []
     with disks.frozen(disk):
         keep_rest(load_box(keeper.box_file), keeper.runtime, keeper.journal, 1.0, said.append)

@@ -68,13 +68,19 @@ def test_goes_on_at_the_same_place_however_it_died(show: Path, tmp_path: Path, h
         frames += box.last_frames()
         died_at = checkpoint_of(box)
         # It may have died between sending its last frame and writing the checkpoint.
-        assert not died_at.ended and has_gone_on(0.0, died_at.position_s, danced(frames) - 1, danced(frames))
+        assert not died_at.ended and has_gone_on(
+            0.0, died_at.puppets[0].position_s, danced(frames) - 1, danced(frames)
+        )
         box.kill_and_restart()
         frames = box.frames(10)
-        assert goes_on_at(box, 1) == pytest.approx(died_at.position_s, abs=0.051)  # reported to a tenth
+        assert goes_on_at(box, 1) == pytest.approx(
+            died_at.puppets[0].position_s, abs=0.051
+        )  # reported to a tenth
         now = checkpoint_of(box)
         assert (now.restarts, now.power_cuts) == (1, 0)
-        assert has_gone_on(died_at.position_s, now.position_s, danced(frames) - 1, now.tick + 1)
+        assert has_gone_on(
+            died_at.puppets[0].position_s, now.puppets[0].position_s, danced(frames) - 1, now.tick + 1
+        )
         if how == signal.SIGABRT:  # the watchdog's: the traceback shows the line that hung
             assert "Fatal Python error: Aborted" in box.words and "run.py" in box.words
 
@@ -89,8 +95,8 @@ def test_twelve_kills_in_a_row(show: Path, tmp_path: Path) -> None:
             died_at = checkpoint_of(box)
             assert died_at.restarts == kill - 1
             assert died_at.tick in (frames[-2][0], frames[-1][0])
-            assert has_gone_on(began_at_s, died_at.position_s, danced(frames) - 1, danced(frames))
-            began_at_s = died_at.position_s
+            assert has_gone_on(began_at_s, died_at.puppets[0].position_s, danced(frames) - 1, danced(frames))
+            began_at_s = died_at.puppets[0].position_s
             box.kill_and_restart()
         box.frames(3)
 
@@ -103,7 +109,7 @@ def test_a_show_that_was_ended_begins_at_the_beginning(show: Path, tmp_path: Pat
         box.kill_and_restart()
         box.frames(5)
         now = checkpoint_of(box)
-        assert has_gone_on(0.0, now.position_s, 0, now.tick + 1)
+        assert has_gone_on(0.0, now.puppets[0].position_s, 0, now.tick + 1)
         assert box.end() == 0
         assert "the show goes on" not in box.words
 
@@ -131,7 +137,7 @@ def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path)
         assert not on_disk.ended and on_disk.tick > 0
         box.start()
         box.frames(5)
-        assert goes_on_at(box, 1) == pytest.approx(on_disk.position_s, abs=0.051)
+        assert goes_on_at(box, 1) == pytest.approx(on_disk.puppets[0].position_s, abs=0.051)
         assert "After a power cut the show goes on" in box.words
         assert checkpoint_of(box).power_cuts == 1
 
