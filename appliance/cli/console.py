@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
 
 _KEPT = "console.json"
+_PATIENCE_S = 2.0
 
 console = command_group(
     "Serve the page: a browser at the venue shows the box and, with the PIN, commands it. `bunraku play` "
@@ -117,13 +118,15 @@ def phone(
     names = codes.names
     chosen = names[0] if name is None and len(names) == 1 else name
     if chosen not in names:
-        those = f"Phones may be: {', '.join(names)}." if names else "No phone may be a sensor of this box."
+        those = f"Phones may be: {', '.join(names)}." if names else "No box runs here that takes a phone."
         raise StageError(
             f"{those} The box file lists them: sensors: foreign: [{{name: left-wrist, from: phone}}]. To try "
             "it: bunraku play --phone"
         )
     try:
         _, host, port, https = (folder / WHERE).read_text().splitlines()
+        here = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+        socket.create_connection((here, int(port)), _PATIENCE_S).close()
         for line in invitation(codes, address(host, int(port), bool(https)), chosen, sys.stdout.isatty()):
             print(line)
     except (OSError, ValueError) as error:

@@ -84,7 +84,7 @@ def invitation(codes: JoinCodes, origin: str, name: str, with_picture: bool) -> 
     address = phone_address(origin, name, codes.new_code(name, time.time()))
     if with_picture:
         yield from _blocks(squares(address))
-    yield f"Your phone is {name}, on this machine's network: {address}"
+    yield f"A phone in this machine's network becomes {name} at {address}"
     yield (
         f"For one phone, within {VALID_S / 60:.0f} minutes. Its browser warns once that the box made its "
         "certificate itself: go on."
