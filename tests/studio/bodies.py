@@ -72,12 +72,12 @@ def _depth_first(bones: list[Bone], above: str = "") -> list[Bone]:
 
 def moved(skeleton: Skeleton, seconds: float = 12.0, fps: float = 50.0, seed: int = 0) -> Recording:
     """A dance in which every joint swings about an axis of its own, the body turns, and the root walks."""
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * fps)) / fps
     poses = np.empty((len(time), len(skeleton), 4))
     for joint in range(len(skeleton)):
-        swing = chance.uniform(0.1, 0.5) * np.sin(time * chance.uniform(1, 3) + chance.uniform(0, 6))
-        poses[:, joint] = quaternion.from_axis_angle(chance.normal(size=3), swing)
+        swing = rng.uniform(0.1, 0.5) * np.sin(time * rng.uniform(1, 3) + rng.uniform(0, 6))
+        poses[:, joint] = quaternion.from_axis_angle(rng.normal(size=3), swing)
     poses[:, 0] = quaternion.multiply(quaternion.from_axis_angle([0.0, 1.0, 0.0], time), poses[:, 0])
     roots = np.stack([np.sin(time), 0.95 + 0.05 * np.sin(2 * time), np.cos(time)], axis=-1)
     return Recording(skeleton, quaternion.continuous(poses), roots, fps)

@@ -20,9 +20,9 @@ _SHARES[[skeleton().names[joint] for joint in moving()].index(ARM)] = [1.5, 0, 0
 
 def motions(seconds: float, seed: int) -> NDArray[np.float64]:
     """(T, MOTIONS): slow, irregular, of deviation 1."""
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     count = round(seconds * FPS)
-    noise = chance.normal(size=(count + 200, MOTIONS))
+    noise = rng.normal(size=(count + 200, MOTIONS))
     width = np.hanning(51)
     slow = np.stack([np.convolve(column, width, "same")[100:-100] for column in noise.T], axis=1)
     made: NDArray[np.float64] = slow / np.sqrt((width**2).sum())

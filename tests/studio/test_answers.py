@@ -1,4 +1,4 @@
-"""Lessons in answering: what the dancer does with a joint held so, and how a network learns to go there."""
+"""Batches in answering: what the dancer does with a joint held so, and how a network learns to go there."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from torch import Tensor
 
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.answers import Answers, AnswerSettings
-from appliance.studio.autoencoder.lessons import Hands, Lesson
+from appliance.studio.autoencoder.batches import Batch, HeldTargets
 from appliance.studio.autoencoder.repertoire import Nearness, Repertoire, change, middle
 
 ROOT, ARM, LEG, HEAD = range(4)
@@ -85,8 +85,8 @@ def test_signs_of_quaternions_do_not_matter_to_the_search(recorded: Tensor) -> N
 SETTINGS = AnswerSettings(reserve=400, uses=2, nearness=NEAR)
 
 
-def lessons(recorded: Tensor, danced: Tensor | None = None, **changed: float) -> Answers:
-    """Lessons in which one joint is held: the arm. danced: without mirror images; None: there are none."""
+def batches(recorded: Tensor, danced: Tensor | None = None, **changed: float) -> Answers:
+    """Batches in which one joint is held: the arm. danced: without mirror images; None: there are none."""
     torch.manual_seed(2)
     chances = torch.tensor([1e-6, 1.0, 1e-6, 1e-6])
     own = recorded if danced is None else danced
@@ -94,43 +94,43 @@ def lessons(recorded: Tensor, danced: Tensor | None = None, **changed: float) ->
     return Answers(recorded, own, takes, chances, replace(SETTINGS, **changed))
 
 
-def with_hands(answers: Answers) -> Lesson:
-    lesson, _ = answers.draw(400)
-    return lesson
+def with_hands(answers: Answers) -> Batch:
+    batch, _ = answers.draw(400)
+    return batch
 
 
-def without_hands(answers: Answers) -> Lesson:
-    _, lesson = answers.draw(400)
-    return lesson
+def without_hands(answers: Answers) -> Batch:
+    _, batch = answers.draw(400)
+    return batch
 
 
-def hands_of(lesson: Lesson) -> Hands:
-    assert lesson.hands is not None
-    return lesson.hands
+def hands_of(batch: Batch) -> HeldTargets:
+    assert batch.hands is not None
+    return batch.hands
 
 
 def test_a_window_without_a_hand_should_come_out_as_it_went_in(recorded: Tensor) -> None:
-    lesson = without_hands(lessons(recorded))
-    assert lesson.hands is None
-    torch.testing.assert_close(lesson.answer, lesson.windows, atol=1e-3, rtol=0)
+    batch = without_hands(batches(recorded))
+    assert batch.hands is None
+    torch.testing.assert_close(batch.answer, batch.windows, atol=1e-3, rtol=0)
 
 
 def test_mirror_images_are_copied_and_are_no_answers(recorded: Tensor) -> None:
     danced = recorded[recorded[:, 0, ARM, 3] > 0]  # the others bend the arm to the other side
-    answers = lessons(recorded, danced, wild=0.0)
+    answers = batches(recorded, danced, wild=0.0)
     assert without_hands(answers).answer[:, :, ARM, 3].min() < -0.3
-    lesson = with_hands(answers)
-    for windows in (lesson.windows, lesson.answer, hands_of(lesson).goal):
+    batch = with_hands(answers)
+    for windows in (batch.windows, batch.answer, hands_of(batch).goal):
         assert windows[:, :, ARM, 3].min() > -0.01
 
 
 def test_a_light_hand_asks_for_a_part_of_the_answer(recorded: Tensor) -> None:
-    answers = lessons(recorded, light=1.0, wild=0.0, frozen=0.0)
+    answers = batches(recorded, light=1.0, wild=0.0, frozen=0.0)
     light, firm = [], []
     for _ in range(30):
-        lesson = with_hands(answers)
-        hands = hands_of(lesson)
-        way = degrees(lesson.windows[:, 0, LEG], lesson.answer[:, 0, LEG])
+        batch = with_hands(answers)
+        hands = hands_of(batch)
+        way = degrees(batch.windows[:, 0, LEG], batch.answer[:, 0, LEG])
         alone = (hands.held[:, LEG] == 0) & (hands.held[:, HEAD] == 0)
         light.append(way[alone & (hands.held[:, ARM] < 0.3)])
         firm.append(way[alone & (hands.held[:, ARM] > 0.7)])

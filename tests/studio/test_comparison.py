@@ -49,7 +49,7 @@ def comparison(training: list[Take]) -> Comparison:
 def rows(comparison: Comparison, training: list[Take]) -> dict[str, Row]:
     """The figures of dancers that dance in a known way."""
     found: dict[str, list[np.ndarray]] = {}
-    chance = np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     for seed, one in enumerate(comparison.measurements):
         phrase, hand = one.rehearsal.phrase, one.pair.hand.poses[WINDOW - 1 :, PLACES][:, HELD]
         hand = hand[: len(phrase)].astype(np.float32)
@@ -57,7 +57,7 @@ def rows(comparison: Comparison, training: list[Take]) -> dict[str, Row]:
         sane[:, 0] = motions(SECONDS, seed + 50)[:, 0]  # what belongs to the arm, as the hand has it
         alive = danced(sane).poses[WINDOW - 1 :, PLACES][: len(phrase)]
         mean = np.repeat(quaternion.normalize(phrase.mean(axis=0))[None], len(phrase), axis=0)
-        noise = quaternion.normalize(chance.normal((4.0, 0, 0, 0), 1.0, phrase.shape))
+        noise = quaternion.normalize(rng.normal((4.0, 0, 0, 0), 1.0, phrase.shape))
         learned = training[0].recording.poses[: len(phrase), PLACES]
         known = {"copies": phrase, "pastes": phrase, "mean": mean, "random": noise, "repeats": learned}
         for name, poses in {**known, "sane": alive}.items():

@@ -44,11 +44,11 @@ def exported(network: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str
 @pytest.mark.parametrize(("coding", "interaction"), [(10, 0), (10, 9), (10, 10), (1, 1), (1, 0), (3, 10)])
 def test_onnx_is_pytorch(network: str, exported: dict[str, Path], coding: int, interaction: int) -> None:
     autoencoder, coder = untrained(network), OnnxCoder(exported["fp32"])
-    chance = np.random.default_rng(coding + interaction)
+    rng = np.random.default_rng(coding + interaction)
     mask = np.zeros(len(NAMES), dtype=bool)
-    mask[chance.choice(len(NAMES), 4, replace=False)] = True
-    targets = quaternion.normalize(chance.normal(size=(8, len(NAMES), 4)).astype(np.float32))
-    weights = chance.uniform(size=len(NAMES)).astype(np.float32)
+    mask[rng.choice(len(NAMES), 4, replace=False)] = True
+    targets = quaternion.normalize(rng.normal(size=(8, len(NAMES), 4)).astype(np.float32))
+    weights = rng.uniform(size=len(NAMES)).astype(np.float32)
     for window in some_windows(4):
         hold = HeldJoints(mask, targets[None], weights)
         with torch.no_grad():
@@ -68,12 +68,12 @@ def pass_of(model: onnx.ModelProto) -> onnx.GraphProto:
 
 def rows(coder: OnnxCoder, each: list[int] | slice = slice(None)) -> dict[str, np.ndarray]:
     """What four puppets give their network, or some of them: windows, hands and iterations of their own."""
-    chance, count = np.random.default_rng(11), len(NAMES)
+    rng, count = np.random.default_rng(11), len(NAMES)
     feed = resting_feed(coder.rest, 16, 4)
     feed["window"][:] = some_windows(4).numpy()
-    feed["targets"][:] = quaternion.normalize(chance.normal(size=(4, 8, count, 4)))
-    feed["mask"][:] = chance.uniform(size=(4, count)) < 0.2
-    feed["weights"][:] = chance.uniform(size=(4, count))
+    feed["targets"][:] = quaternion.normalize(rng.normal(size=(4, 8, count, 4)))
+    feed["mask"][:] = rng.uniform(size=(4, count)) < 0.2
+    feed["weights"][:] = rng.uniform(size=(4, count))
     feed["coding_iterations"][:], feed["interaction_iterations"][:] = TIMES
     return {name: values[each] for name, values in feed.items()}
 
@@ -109,9 +109,9 @@ def test_a_row_is_what_it_would_be_alone(exported: dict[str, Path]) -> None:
 
 def placed(feed: dict[str, np.ndarray], row: int) -> dict[str, np.ndarray]:
     """The same, and a hand holds two joints of one row at places."""
-    chance = np.random.default_rng(5)
+    rng = np.random.default_rng(5)
     places, weights = np.zeros_like(feed["places"]), np.zeros_like(feed["place_weights"])
-    places[row] = chance.normal(size=places[row].shape)
+    places[row] = rng.normal(size=places[row].shape)
     weights[row, [4, 7]] = 1.0, 0.6
     return {**feed, "places": places, "place_weights": weights}
 

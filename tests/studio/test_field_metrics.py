@@ -84,8 +84,8 @@ def test_a_body_that_accelerates_on_sliding_feet_has_no_contact() -> None:
 
 
 def test_frechet_distances_grow_with_what_differs() -> None:
-    chance = np.random.default_rng(1)
-    known = chance.normal(size=(4000, 3)) * [1.0, 5.0, 0.1]
+    rng = np.random.default_rng(1)
+    known = rng.normal(size=(4000, 3)) * [1.0, 5.0, 0.1]
     assert frechet_distance(known, known) == pytest.approx(0.0, abs=1e-6)
     assert frechet_distance(known + np.array([2.0, 0, 0]), known) == pytest.approx(4.0, rel=0.01)
     assert frechet_distance(known * [1, 0, 1], known) == pytest.approx(1.0, rel=0.01)  # one stands still

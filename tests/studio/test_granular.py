@@ -56,8 +56,8 @@ def test_seeds_tell_walks_and_samples_apart_and_repeat_them() -> None:
 
 
 def test_between_two_excerpts_the_ends_are_theirs_and_the_middle_is_as_long() -> None:
-    chance = np.random.default_rng(0)
-    one, other = (chance.standard_normal((30, LATENT)).astype(np.float32) for _ in range(2))
+    rng = np.random.default_rng(0)
+    one, other = (rng.standard_normal((30, LATENT)).astype(np.float32) for _ in range(2))
     np.testing.assert_allclose(latent_paths.between(one, other, 0.0, 0.0, 1), one, atol=1e-5)
     np.testing.assert_allclose(latent_paths.between(one, other, 1.0, 0.0, 1), other, atol=1e-5)
     half = latent_paths.between(one, other, 0.5, 0.0, 1)

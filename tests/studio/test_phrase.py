@@ -167,8 +167,8 @@ def test_trembling_freezing_and_haste_are_seen() -> None:
     usual = pace(still_after, moving(), 1.0).speed
     assert pace(still_after, moving(), usual).longest_still_s < 1
     assert 4 < pace(frozen, moving(), usual).longest_still_s <= 5.5
-    chance = np.random.default_rng(1)
-    shaken = quaternion.from_axis_angle(chance.normal(size=(*still_after.poses.shape[:2], 3)), 0.02)
+    rng = np.random.default_rng(1)
+    shaken = quaternion.from_axis_angle(rng.normal(size=(*still_after.poses.shape[:2], 3)), 0.02)
     trembling = replace(still_after, poses=quaternion.multiply(still_after.poses, shaken))
     assert pace(trembling, moving(), usual).trembling > 10 * pace(still_after, moving(), usual).trembling
     assert pace(trembling, moving(), usual).jerk_p99 > 10 * pace(still_after, moving(), usual).jerk_p99

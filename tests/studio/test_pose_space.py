@@ -55,11 +55,11 @@ def test_a_wobble_has_its_amplitude_and_its_frequency() -> None:
 
 
 def test_the_map_leads_there_and_back() -> None:
-    chance = np.random.default_rng(1)
-    latents = chance.standard_normal((3000, 5)).astype(np.float32)
-    effect = chance.standard_normal((5, 30)) * np.array([[1.0], [9.0], [0.5], [4.0], [0.1]])
+    rng = np.random.default_rng(1)
+    latents = rng.standard_normal((3000, 5)).astype(np.float32)
+    effect = rng.standard_normal((5, 30)) * np.array([[1.0], [9.0], [0.5], [4.0], [0.1]])
     pose_map = PoseMap.of(latents, latents @ effect, 2)
-    points = chance.standard_normal((20, 2))
+    points = rng.standard_normal((20, 2))
     np.testing.assert_allclose(pose_map.points(pose_map.latents(points)), points, atol=1e-5)
     assert pose_map.directions[0, 1] > 0.98 and pose_map.directions[1, 3] > 0.9, "what moves the body most"
     assert 0.9 < pose_map.explained < 1

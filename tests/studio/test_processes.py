@@ -103,7 +103,7 @@ def test_processes_that_answer_hands_draw_lessons_of_their_own(dancer: Dataset) 
     drawn: list[Any] = []
     for rank in (0, 1):
         training = Training(dancer, settings, processes=Processes(rank, 2))
-        drawn.append(training.lessons.draw(16)[0].windows)
+        drawn.append(training.batches.draw(16)[0].windows)
     assert drawn[0].shape == drawn[1].shape and not torch.equal(*drawn)
 
 

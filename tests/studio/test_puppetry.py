@@ -128,13 +128,13 @@ def test_a_followed_orientation_is_that_of_its_tick() -> None:
 
 
 def test_the_nearest_pose_is_the_nearest_one() -> None:
-    chance = np.random.default_rng(5)
-    known, asked = random_quaternions(chance, 700, 6), random_quaternions(chance, 40, 6)
+    rng = np.random.default_rng(5)
+    known, asked = random_quaternions(rng, 700, 6), random_quaternions(rng, 40, 6)
     reference = Reference(known)
     level = without_heading(asked)
     apart = np.degrees(quaternion.angle_between(level[:, None], without_heading(known)[None]))
     np.testing.assert_allclose(reference.nearest(asked), apart.mean(axis=-1).min(axis=1), atol=0.05)
-    hand = random_quaternions(chance, 40)
+    hand = random_quaternions(rng, 40)
     held = np.degrees(quaternion.angle_between(hand[:, None], known[None, :, 4])) <= 15.0
     others = [0, 1, 2, 3, 5]
     expected = np.where(held, apart[..., others].mean(axis=-1), np.inf).min(axis=1)

@@ -11,8 +11,8 @@ import torch
 
 from appliance.studio.autoencoder import losses
 from appliance.studio.autoencoder.answers import AnswerSettings
+from appliance.studio.autoencoder.batches import Batch
 from appliance.studio.autoencoder.held_joints import HeldPlaces
-from appliance.studio.autoencoder.lessons import Lesson
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder
@@ -64,7 +64,7 @@ def test_interrupted_and_resumed_is_uninterrupted_bit_for_bit(
 
     one, other = whole.state(), resumed.state()
     assert one["step"] == other["step"] == 40
-    for name in (*whole.saved, "lessons", "sequences", "random", "step"):
+    for name in (*whole.saved, "batches", "sequences", "random", "step"):
         assert same(one[name], other[name]), name
     assert one["history"][-1]["held_out_degrees"] == other["history"][-1]["held_out_degrees"]
 
@@ -175,7 +175,7 @@ def test_only_the_place_encoder_learns_from_places_and_joints_come_nearer_pass_b
         assert (parameter.grad is not None) == name.startswith("places."), name
     for _ in range(200):  # windows must come back from the latent before a latent can move them
         rows = torch.randint(len(windows), (64,))
-        _, parts = training._code(Lesson(windows[rows], windows[rows]))
+        _, parts = training._code(Batch(windows[rows], windows[rows]))
         training.optimizer.zero_grad()
         (parts["rotation"] + parts["position"] + parts["place"]).backward()
         training.optimizer.step()

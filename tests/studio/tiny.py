@@ -56,14 +56,12 @@ def moving() -> tuple[int, ...]:
 def swaying(seconds: float = 3.0, seed: int = 0, fps: float = 50.0) -> Recording:
     """Every moving joint swings smoothly about an axis of its own, the root turns a little."""
     bones = skeleton()
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * fps)) / fps
     poses = np.tile(np.array([1.0, 0, 0, 0]), (len(time), len(bones), 1))
     for joint in moving():
-        axis = chance.normal(size=3)
-        angle = chance.uniform(0.1, 0.5) * np.sin(
-            2 * np.pi * time / 3 * chance.integers(1, 4) + chance.uniform(0, 6)
-        )
+        axis = rng.normal(size=3)
+        angle = rng.uniform(0.1, 0.5) * np.sin(2 * np.pi * time / 3 * rng.integers(1, 4) + rng.uniform(0, 6))
         poses[:, joint] = quaternion.from_axis_angle(axis, angle)
     roots = np.stack([0.1 * np.sin(2 * np.pi * time / 3), np.full(len(time), 0.8), 0 * time], axis=-1)
     return Recording(bones, quaternion.continuous(poses), roots, fps)

@@ -51,7 +51,7 @@ WATCHDOG = "/sys/class/watchdog/watchdog0"
         (processor.governor, {GOVERNOR: "ondemand"}, "better", "ondemand"),
         *(
             (
-                processor.warmth,
+                processor.temperature,
                 {f"{THERMAL}/thermal_zone0/temp": "31000", f"{THERMAL}/thermal_zone1/temp": millidegrees},
                 verdict,
                 f"{int(millidegrees) / 1000:.0f} degrees",

@@ -41,7 +41,7 @@ def test_the_kernel_s_figures_are_found_for_this_process() -> None:
     [((0.1,) * 200, "ok"), ((0.1,) * 199 + (9.0,), "better"), ((0.1,) * 190 + (16.0,) * 10, "wrong")],
 )
 def test_late_wake_ups(late_ms: tuple[float, ...], verdict: str) -> None:
-    assert only(processor.wake_ups(quiet(late_ms))).verdict == verdict
+    assert only(processor.wakeup_latency(quiet(late_ms))).verdict == verdict
 
 
 def test_other_users_of_the_cores_are_named() -> None:

@@ -30,7 +30,7 @@ CHECKS = (
     processor.realtime_rights,
     processor.locked_memory,
     processor.governor,
-    processor.warmth,
+    processor.temperature,
     processor.power,
     storage.memory,
     storage.data_folders,
@@ -46,7 +46,7 @@ CHECKS = (
     venue.adapters,
     venue.display,
 )
-LOOKS = (processor.wake_ups, processor.others, processor.interrupts)
+LOOKS = (processor.wakeup_latency, processor.others, processor.interrupts)
 _COLOURS = {"wrong": "bold red", "better": "yellow", "ok": "green"}
 
 

@@ -1,4 +1,4 @@
-"""Real time and the processor: rights, wake-ups, others, pace, warmth, power."""
+"""Real time and the processor: rights, wakeup latency, others, pace, temperature, power."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def locked_memory(host: HostView) -> Iterator[Finding]:
         yield ok(what, "It can be had.")
 
 
-def wake_ups(seen: Sample) -> Iterator[Finding]:
+def wakeup_latency(seen: Sample) -> Iterator[Finding]:
     """How late a thread like the stage's wakes: no software can be more punctual than that."""
     what, late = "wake-ups", seen.late_ms
     worst = late[-1]
@@ -143,7 +143,7 @@ def governor(host: HostView) -> Iterator[Finding]:
         )
 
 
-def warmth(host: HostView) -> Iterator[Finding]:
+def temperature(host: HostView) -> Iterator[Finding]:
     """The warmest of all sensors that Linux knows."""
     found = [host.number(zone) for zone in host.found("/sys/class/thermal/thermal_zone*/temp")]
     degrees = [number / 1000.0 for number in found if number is not None]

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import slerp_towards
-from appliance.studio.autoencoder.lessons import Hands, Lesson
+from appliance.studio.autoencoder.batches import Batch, HeldTargets
 from appliance.studio.autoencoder.repertoire import Nearness, Repertoire
 
 _HANDS = (0.75, 0.17, 0.08)  # shares of dances with one, two, three hands
@@ -53,11 +53,11 @@ class Answers:
         self._order = torch.zeros(settings.uses * settings.reserve, dtype=torch.long)
         self._next = len(self._order)
 
-    def draw(self, batch: int) -> list[Lesson]:
+    def draw(self, size: int) -> list[Batch]:
         """Dances with hands, and windows without."""
-        count = max(round(self._settings.with_hands * batch), 1)
-        windows = self._moments(max(batch - count, 2))
-        return [self._dances(count), Lesson(windows, windows)]
+        count = max(round(self._settings.with_hands * size), 1)
+        windows = self._moments(max(size - count, 2))
+        return [self._dances(count), Batch(windows, windows)]
 
     def state(self) -> dict[str, Any]:
         return {"next": self._next, **{name: getattr(self, f"_{name}") for name in _TENSORS}}
@@ -67,12 +67,12 @@ class Answers:
         for name in _TENSORS:
             getattr(self, f"_{name}").copy_(state[name])
 
-    def _dances(self, count: int) -> Lesson:
+    def _dances(self, count: int) -> Batch:
         if self._next + count > len(self._order):
             self._refill()
         rows = self._order[self._next : self._next + count].to(self._held.device)
         self._next += count
-        return Lesson(self._start[rows], self._answer[rows], Hands(self._goal[rows], self._held[rows]))
+        return Batch(self._start[rows], self._answer[rows], HeldTargets(self._goal[rows], self._held[rows]))
 
     def _refill(self) -> None:
         """New dances and the answers to their hands."""

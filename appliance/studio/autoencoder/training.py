@@ -17,8 +17,8 @@ from appliance.studio.autoencoder import losses, motion_critic, rotation
 from appliance.studio.autoencoder.answers import Answers, AnswerSettings, held_weights
 from appliance.studio.autoencoder.architectures import DEFAULT, build
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
+from appliance.studio.autoencoder.batches import Batch, Batches, Copies, HeldTargets
 from appliance.studio.autoencoder.coupled import LEARNED_BODY, Coupled, share_of_pass
-from appliance.studio.autoencoder.lessons import Copies, Hands, Lesson, Lessons
 from appliance.studio.autoencoder.motion_critic import MotionCritic, Sequences
 from appliance.studio.autoencoder.networks import Mlp
 from appliance.studio.autoencoder.repertoire import Nearness
@@ -156,9 +156,9 @@ class Training(TrainingLoop[Report]):
         if isinstance(network, Coupled):
             own, takes = self._own_windows(mirror)
             answers = Answers(self.train_windows, own, takes, chances, settings.answers)
-            self.lessons: Lessons = answers
+            self.batches: Batches = answers
         else:
-            self.lessons = Copies(self.train_windows, settings.input_noise_degrees, processes)
+            self.batches = Copies(self.train_windows, settings.input_noise_degrees, processes)
         self._chances = chances
         self.sequences: Sequences | None = None
         if isinstance(network, Coupled) and settings.sequences:
@@ -178,8 +178,8 @@ class Training(TrainingLoop[Report]):
         total = torch.zeros((), device=self.device)
         reported: dict[str, Tensor] = {}
         latents = []
-        for lesson in self.lessons.draw(settings.batch // self.processes.count):
-            coded, parts = self._pull(lesson, lesson.hands) if lesson.hands else self._code(lesson)
+        for batch in self.batches.draw(settings.batch // self.processes.count):
+            coded, parts = self._pull(batch, batch.hands) if batch.hands else self._code(batch)
             for name, part in parts.items():
                 total = total + getattr(settings.weights, name) * part
                 reported[name] = part
@@ -201,13 +201,13 @@ class Training(TrainingLoop[Report]):
             reported |= {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
         return {name: part.detach() for name, part in reported.items()}
 
-    def _code(self, lesson: Lesson) -> tuple[Tensor, dict[str, Tensor]]:
+    def _code(self, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
         """Code a batch once: latents (B, Z), and the losses.
 
         The decoder sees noisy latents, or samples of a variational network's; those that are returned, for
         the critic, have no noise.
         """
-        windows, parts = lesson.windows, {}
+        windows, parts = batch.windows, {}
         if self.settings.variational:
             with self.mixed:
                 coded, log_variance = self.autoencoder.encode_gaussian(windows)
@@ -223,7 +223,7 @@ class Training(TrainingLoop[Report]):
             raw = self.autoencoder.decode_raw(seen).float()
         if isinstance(self.autoencoder.network, Coupled):
             parts["place"] = self._place_loss(windows[:PLACED], coded[:PLACED])
-        parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body, self.settings.weights))
+        parts.update(losses.reconstruction_losses(raw, batch.answer, self.body, self.settings.weights))
         return coded, parts
 
     def _place_loss(self, windows: Tensor, coded: Tensor) -> Tensor:
@@ -251,19 +251,19 @@ class Training(TrainingLoop[Report]):
         rows = torch.linspace(0, len(self.train_windows) - 1, min(sample, len(self.train_windows))).long()
         return self.train_windows[rows]
 
-    def _pull(self, lesson: Lesson, hands: Hands) -> tuple[Tensor, dict[str, Tensor]]:
+    def _pull(self, batch: Batch, hands: HeldTargets) -> tuple[Tensor, dict[str, Tensor]]:
         """Latents (B, Z) of a batch, and how far the hands' pulls are from where the answers lie."""
         network = self.autoencoder.network
         assert isinstance(network, Coupled)
         with self.mixed:
-            coded = self.autoencoder.encode(lesson.windows).float()
+            coded = self.autoencoder.encode(batch.windows).float()
             with torch.no_grad():
-                way = self.autoencoder.encode(lesson.answer).float() - coded
+                way = self.autoencoder.encode(batch.answer).float() - coded
             held = (hands.held > 0).float()
-            there, here = network.difference(coded.detach(), lesson.windows, hands.goal, held)
+            there, here = network.difference(coded.detach(), batch.windows, hands.goal, held)
         return coded, {"pull": ((there - here).float() - way).square().mean()}
 
-    def _led(self, windows: Tensor, hands: Hands, passes: int) -> Tensor:
+    def _led(self, windows: Tensor, hands: HeldTargets, passes: int) -> Tensor:
         """Heading-free windows (B, T, M, 4) after passes in which the hands hold their joints."""
         network = self.autoencoder.network
         assert isinstance(network, Coupled)
@@ -333,7 +333,7 @@ class Training(TrainingLoop[Report]):
         facing = autoencoder.facing(windows)
         start = autoencoder.without_heading(windows, facing)
         each = held.repeat_interleave(len(windows) // len(held), dim=0)
-        x = self._led(start, Hands(autoencoder.without_heading(goal, facing), each), passes - 1)
+        x = self._led(start, HeldTargets(autoencoder.without_heading(goal, facing), each), passes - 1)
         with self.mixed:
             x = rotation.normalize(autoencoder.decode_raw(autoencoder.encode(x)).float())
         return autoencoder.with_heading(x, facing)
@@ -377,13 +377,13 @@ class Training(TrainingLoop[Report]):
             "shape": asdict(self.autoencoder.shape),
             "random_gpu": torch.cuda.get_rng_state(self.device) if self.device.type == "cuda" else None,
             "latent_moments": self.latent_moments(),
-            "lessons": self.lessons.state(),
+            "batches": self.batches.state(),
             "sequences": {} if self.sequences is None else self.sequences.state(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         super().restore(state)
-        self.lessons.restore(state["lessons"])
+        self.batches.restore(state["batches"])
         if self.sequences is not None:
             self.sequences.restore(state["sequences"])
         if self.device.type == "cuda" and state.get("random_gpu") is not None:
@@ -394,7 +394,7 @@ class Training(TrainingLoop[Report]):
         """When batches contain simulated hands, each rank is seeded differently: building a batch costs more
         than the step. All other random numbers are the same in all ranks, and each takes its share.
         """
-        if isinstance(self.lessons, Answers) and not self.processes.leads:
+        if isinstance(self.batches, Answers) and not self.processes.leads:
             torch.manual_seed(1_000_003 * (self.step + 1) + 1009 * self.settings.seed + self.processes.rank)
 
     def _training_windows(self, mirror: bool) -> Tensor:

@@ -43,14 +43,14 @@ def critic(
     sees. takes: pairs of one name are left out together; a single take is halved in time, with a gap of a
     second. moving: it also sees how fast and how jerky each joint is. NaN if the dances are too short.
     """
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     places = list(joints)
     groups = list(dict.fromkeys(takes))
     if len(groups) == 1:
         recorded, danced, takes = _halves(recorded), _halves(danced), [*"ab"] * len(recorded)
         groups = ["a", "b"]
-    real = [critic_rows(poses[:, places], chance, moving) for poses in recorded]
-    made = [critic_rows(poses[:, places], chance, moving) for poses in danced]
+    real = [critic_rows(poses[:, places], rng, moving) for poses in recorded]
+    made = [critic_rows(poses[:, places], rng, moving) for poses in danced]
     areas = []
     for group in groups:
         parts = [
@@ -60,7 +60,7 @@ def critic(
         ]
         if min(map(len, parts)) < LEAST_ROWS:
             return float("nan")
-        tells = _learned(parts[0], parts[1], chance)
+        tells = _learned(parts[0], parts[1], rng)
         areas.append(area_under_curve(tells(parts[2]), tells(parts[3])))
     return float(np.mean(areas))
 
@@ -74,21 +74,21 @@ def area_under_curve(real: Array, made: Array) -> float:
     return float(1.0 - (ranks[:n].sum() - n * (n + 1) / 2) / (n * m))
 
 
-def critic_rows(poses: Array, chance: np.random.Generator, moving: bool = False) -> Floats:
+def critic_rows(poses: Array, rng: np.random.Generator, moving: bool = False) -> Floats:
     """(N, D): half seconds of poses (T, M, 4), headings removed, as the critic sees them.
 
     Rotations are the first two columns of their matrices (Zhou et al. 2019).
     """
     starts = np.arange(0, max(0, len(poses) - LENGTH + 1), EVERY)
     seen = poses[starts[:, None] + POSES]
-    half = np.radians(NOISE_DEGREES) / 2 * chance.standard_normal((*seen.shape[:-1], 3))
+    half = np.radians(NOISE_DEGREES) / 2 * rng.standard_normal((*seen.shape[:-1], 3))
     shaken = quaternion.normalize(np.concatenate([np.ones((*seen.shape[:-1], 1)), half], axis=-1))
     six = quaternion.to_6d(quaternion.multiply(seen, shaken))
     rows = six.reshape(len(starts), len(POSES) * 6 * poses.shape[1])
     if moving and len(starts):
         speed, jerkiness = _pace(poses, starts)
         rows = np.concatenate(
-            [rows, *(part + PACE_NOISE * chance.standard_normal(part.shape) for part in (speed, jerkiness))],
+            [rows, *(part + PACE_NOISE * rng.standard_normal(part.shape) for part in (speed, jerkiness))],
             1,
         )
     return rows.astype(np.float32)
@@ -119,7 +119,7 @@ def _halves(dances: Sequence[Array]) -> list[Array]:
     return parts
 
 
-def _learned(real: Floats, made: Floats, chance: np.random.Generator) -> Callable[[Floats], Floats]:
+def _learned(real: Floats, made: Floats, rng: np.random.Generator) -> Callable[[Floats], Floats]:
     """A perceptron of two hidden layers that learned to score `made` rows above `real` ones."""
     rows = np.concatenate([real, made])
     wanted = np.concatenate([np.zeros(len(real)), np.ones(len(made))]).astype(np.float32)[:, None]
@@ -130,15 +130,14 @@ def _learned(real: Floats, made: Floats, chance: np.random.Generator) -> Callabl
     for inputs, outputs in pairwise(sizes):
         bound = 1 / np.sqrt(inputs)
         layers += [
-            chance.uniform(-bound, bound, shape).astype(np.float32)
-            for shape in ((inputs, outputs), (outputs,))
+            rng.uniform(-bound, bound, shape).astype(np.float32) for shape in ((inputs, outputs), (outputs,))
         ]
     first, second = [np.zeros_like(layer) for layer in layers], [np.zeros_like(layer) for layer in layers]
-    blur = BLUR * chance.standard_normal((4 * BATCH, rows.shape[1]), dtype=np.float32)
+    blur = BLUR * rng.standard_normal((4 * BATCH, rows.shape[1]), dtype=np.float32)
     for step in range(1, min(STEPS, max(FEWEST_STEPS, PASSES * len(rows) // BATCH)) + 1):
-        chosen, shift = chance.integers(len(rows), size=BATCH), chance.integers(3 * BATCH)
+        chosen, shift = rng.integers(len(rows), size=BATCH), rng.integers(3 * BATCH)
         seen = rows[chosen] + blur[shift : shift + BATCH]
-        kept = (chance.random((BATCH, SIZES[0])) >= DROPPED).astype(np.float32) / np.float32(1 - DROPPED)
+        kept = (rng.random((BATCH, SIZES[0])) >= DROPPED).astype(np.float32) / np.float32(1 - DROPPED)
         for place, gradient in enumerate(_gradients(layers, seen, wanted[chosen], kept)):
             first[place] += np.float32(0.1) * (gradient - first[place])
             second[place] += np.float32(0.001) * (gradient**2 - second[place])

@@ -184,11 +184,11 @@ def _puppet(
 
 def _recorded_moment(dataset: Dataset, seed: int) -> Recording:
     """A few seconds of a training take, its floor at height 0."""
-    chance, frames = np.random.default_rng(seed), round(PROMPT_S * FPS)
+    rng, frames = np.random.default_rng(seed), round(PROMPT_S * FPS)
     starts = [(take, first) for take in dataset.training for first in window_starts(take, window=frames)]
     if not starts:
         raise StudioError(f"No recording has {PROMPT_S:g} s without a capture error. Give a --prompt.")
-    take, first = starts[int(chance.integers(len(starts)))]
+    take, first = starts[int(rng.integers(len(starts)))]
     moment = take.recording.excerpt(first / FPS, (first + frames) / FPS)
     roots = moment.roots.copy()
     roots[:, 1] -= floor_under(moment)

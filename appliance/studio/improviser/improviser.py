@@ -49,10 +49,10 @@ class Mixture:
         joined = torch.logsumexp(functional.log_softmax(self.logits, -1) + each, -1)
         return -joined / x.shape[-1]
 
-    def sample(self, temperature: float, chance: np.random.Generator) -> Tensor:
+    def sample(self, temperature: float, rng: np.random.Generator) -> Tensor:
         """Samples (B, D); temperature 1: as learned, 0: the mean of the likeliest Gaussian."""
         logits, means, log_scales = (part.numpy() for part in (self.logits, self.means, self.log_scales))
-        return torch.from_numpy(drawn(logits, means, log_scales, temperature, chance))
+        return torch.from_numpy(drawn(logits, means, log_scales, temperature, rng))
 
 
 State = list[tuple[Tensor, Tensor]]

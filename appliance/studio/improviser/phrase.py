@@ -83,11 +83,11 @@ def improvise(
     improviser: Improviser, recorded: Sequence[Steps], options: PhraseOptions, say: Callable[[str], None]
 ) -> list[Steps]:
     """Dances, each of which continues another recorded stretch."""
-    chance = np.random.default_rng(options.seed)
+    rng = np.random.default_rng(options.seed)
     long = [stretch for stretch in recorded if len(stretch) >= PRIMER]
     starts = []
-    for number in chance.choice(len(long), options.dances, replace=len(long) < options.dances):
-        first = int(chance.integers(len(long[number]) - PRIMER + 1))
+    for number in rng.choice(len(long), options.dances, replace=len(long) < options.dances):
+        first = int(rng.integers(len(long[number]) - PRIMER + 1))
         starts.append(torch.tensor(long[number].features[first : first + PRIMER]))
     moves = int(np.ceil(options.minutes * 60 * STEPS_S / MOVE))
     say(f"improvising {options.dances} dances of {options.minutes:g} minutes")

@@ -58,11 +58,11 @@ class PoseMixtures(nn.Module):
     @torch.no_grad()
     def improvise(self, primer: Tensor, steps: int, temperature: float, seed: int) -> Tensor:
         """Continue a primer (B, back or more, features) by (B, steps, features), on its own output."""
-        chance, shape = np.random.default_rng(seed), self.shape
+        rng, shape = np.random.default_rng(seed), self.shape
         x = self.scale.inside(primer)[:, -shape.back :]
         danced = []
         for _ in range(math.ceil(steps / shape.ahead)):
-            drawn = self(x).sample(temperature, chance).clamp(-FARTHEST, FARTHEST)
+            drawn = self(x).sample(temperature, rng).clamp(-FARTHEST, FARTHEST)
             danced.append(drawn.view(len(x), shape.ahead, shape.inside))
             x = torch.cat([x, danced[-1]], 1)[:, -shape.back :]
         return self.scale.features(torch.cat(danced, 1)[:, :steps])

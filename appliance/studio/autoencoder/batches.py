@@ -1,4 +1,4 @@
-"""Lessons: the input of a training step and the output that it should give."""
+"""Batches: the input of a training step and the output that it should give."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from appliance.studio.training_loop import ALONE
 
 
 @dataclass(frozen=True)
-class Hands:
+class HeldTargets:
     """Held joints of a batch.
 
     goal (B, T, M, 4): the orientations to reach, hands that hold lightly on the way from the windows'; held
@@ -27,19 +27,19 @@ class Hands:
 
 
 @dataclass(frozen=True)
-class Lesson:
+class Batch:
     """A batch of heading-free windows (B, T, M, 4) and what should become of them."""
 
     windows: Tensor
     answer: Tensor
-    hands: Hands | None = None
+    hands: HeldTargets | None = None
 
 
-class Lessons(Protocol):
-    """A source of lessons."""
+class Batches(Protocol):
+    """A source of batches."""
 
-    def draw(self, batch: int) -> list[Lesson]:
-        """The next lessons of this process, `batch` windows in all."""
+    def draw(self, size: int) -> list[Batch]:
+        """The next batches of this process, `batch` windows in all."""
 
     def state(self) -> dict[str, Any]:
         """The state that later batches depend on besides the random numbers, for `restore`."""
@@ -49,16 +49,16 @@ class Lessons(Protocol):
 
 
 class Copies:
-    """Lessons of the papers' autoencoder: the output should equal the input."""
+    """Batches of the papers' autoencoder: the output should equal the input."""
 
     def __init__(self, windows: Tensor, noise_degrees: float = 0.0, processes: Processes = ALONE) -> None:
         self._windows, self._noise_degrees, self._processes = windows, noise_degrees, processes
 
-    def draw(self, batch: int) -> list[Lesson]:
-        whole = batch * self._processes.count
+    def draw(self, size: int) -> list[Batch]:
+        whole = size * self._processes.count
         rows = torch.randint(len(self._windows), (whole,), device=self._windows.device)
         windows = self._windows[self._processes.share(rows)]
-        return [Lesson(_shaken(windows, self._noise_degrees), windows)]
+        return [Batch(_shaken(windows, self._noise_degrees), windows)]
 
     def state(self) -> dict[str, Any]:
         return {}
