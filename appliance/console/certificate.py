@@ -7,7 +7,6 @@ import ipaddress
 import re
 import ssl
 import subprocess
-import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -55,16 +54,15 @@ def certificate_in(folder: Path, names: Sequence[str], now: float | None = None)
         )
         _keep(authority, made, [name for name in own if name in more], now + _AUTHORITY_DAYS * _DAY_S)
     meant = ",".join(f"{'IP' if _is_address(name) else 'DNS'}:{name}" for name in own)
-    with tempfile.NamedTemporaryFile("w", suffix=".conf") as settings:
-        settings.write(
-            f"subjectAltName={meant}\nextendedKeyUsage=serverAuth\nbasicConstraints=critical,CA:FALSE\n"
-        )
-        settings.flush()
-        asked = _openssl("req", "-new", *_NEW_KEY, "-subj", "/CN=Bunraku box", "-keyout", "-", "-out", "-")
-        signed = _openssl(
-            *("x509", "-req", "-CA", str(authority), "-days", str(_DAYS), "-extfile", settings.name),
-            said=asked,
-        )
+    wanted = (f"subjectAltName={meant}", "extendedKeyUsage=serverAuth", "basicConstraints=critical,CA:FALSE")
+    asked = _openssl(
+        *("req", "-new", *_NEW_KEY, "-subj", "/CN=Bunraku box", "-keyout", "-", "-out", "-"),
+        *(word for extension in wanted for word in ("-addext", extension)),
+    )
+    signed = _openssl(
+        *("x509", "-req", "-CA", str(authority), "-days", str(_DAYS), "-copy_extensions", "copyall"),
+        said=asked,
+    )
     key = asked[: asked.index(b"-----BEGIN CERTIFICATE REQUEST-----")]
     _keep(path, key + signed + authority_certificate(folder).encode(), own, now + _DAYS * _DAY_S)
     return path
