@@ -158,10 +158,8 @@ class Generator:
     def _told(self, puppet: int) -> Mapping[str, Any]:
         """The stage's report on a puppet."""
         health = self._stage.health() or {}
-        if puppet == 0:
-            return health
-        others = health.get("others", ())
-        return {**health, **others[puppet - 1]} if puppet <= len(others) else {}
+        puppets = health.get("puppets", ())
+        return {**health, **puppets[puppet]} if puppet < len(puppets) else {}
 
     def _danced(self, puppet: int) -> str:
         """The recipe that a puppet dances; "" for none."""

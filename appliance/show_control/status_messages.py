@@ -72,8 +72,8 @@ def status(
     live: str = "",
 ) -> Status:
     """The stage's last report, and what show control sees of a stage that hangs or is absent."""
-    stage, health, facts = observer.state(now), observer.health(), observer.facts
-    seen = Status.reported({} if stage == "absent" else health)
+    stage, facts = observer.state(now), observer.facts
+    seen = Status.reported({} if stage == "absent" else observer.health() | led(observer))
     return seen._replace(
         state=_state(stage, show_state),
         show=facts.show_name if facts else "",
@@ -129,11 +129,17 @@ def names_of(
     return [(name, name == (show_state[lever].value or shown[0])) for name in shown]
 
 
+def led(observer: Seen) -> dict[str, Any]:
+    """The stage's report on the puppet that cues and orders lead; empty before the first."""
+    puppets = observer.health().get("puppets") or [{}]
+    return dict(puppets[0])
+
+
 def hands_of(observer: Seen) -> Iterator[HandLine]:
     """The hands of the show."""
     if (facts := observer.facts) is None:
         return
-    let_go = observer.health().get("let_go", ())
+    let_go = led(observer).get("let_go", ())
     for hand, (joint, source) in enumerate(zip(facts.held, facts.hands, strict=True)):
         name = facts.skeleton.names[joint]
         yield HandLine(
@@ -149,7 +155,7 @@ def _fallbacks(observer: Seen, now: float) -> Iterator[Message]:
 
 def _made(status: Status, observer: Seen) -> Iterator[Message]:
     """The recipe of the motion that is danced, number by number; nothing while it is a phrase or live."""
-    recipe = plain_json(str(observer.health().get("made") or "{}"))
+    recipe = plain_json(str(led(observer).get("made") or "{}"))
     recipe = recipe.get("of", recipe)
     for name, value in recipe.items() if status.phrase else ():
         if name not in ("number", "after", "prompt") and value is not None:

@@ -115,34 +115,30 @@ class Sharing:
         `sensors`: a line of the roster for each; `fallbacks`: those that ever happened; `sensor_age_s`: None
         without a sensor, infinite if unheard.
         """
-        parts, iterations = reconciler.parts, reconciler.parts.led.iterations
+        parts = reconciler.parts
         told = health.snapshot(now)
         told |= {
             "state": "dancing" if parts.led.motion.rate else "stopped",
             "sensor_age_s": None if sensor_age_s in (None, float("inf")) else sensor_age_s,
             "locked": locked,
-            "coding": iterations.coding,
-            "interaction": iterations.interaction,
             "liveliness": parts.liveliness.level,
             "seed": parts.liveliness.seed,
-            "phrase": parts.led.source,
-            "base": parts.led.motion.base,
             "wanted": reconciler.wanted,
             "motion": dict(reconciler.motion),
-            "made": parts.led.motion.made.recipe if parts.led.motion.made else "",
-            "position_s": parts.led.motion.position_s,
-            "others": [
+            "puppets": [
                 {
+                    "coding": one.iterations.coding,
+                    "interaction": one.iterations.interaction,
                     "phrase": one.source,
                     "base": one.motion.base,
                     "made": one.motion.made.recipe if one.motion.made else "",
                     "position_s": one.motion.position_s,
+                    "let_go": [held.joint for held in one.hands.puppeteers if not held.enabled],
                 }
-                for one in parts.puppets[1:]
+                for one in parts.puppets
             ],
             "cue": reconciler.cue,
             "applied": [reconciler.generation, reconciler.words],
-            "let_go": [puppeteer.joint for puppeteer in parts.led.hands.puppeteers if not puppeteer.enabled],
             "looked_at": now,
             "sensors": sensors,
             "temperature_c": self._thermometer.celsius(),

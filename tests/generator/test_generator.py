@@ -55,9 +55,9 @@ def test_one_variation_ahead_and_no_more(bench: Benches, tmp_path: Path) -> None
     assert second["seed"] == 2 and not newest(one.made).at_once
     assert one.recipe() == second
     assert one.dance()["seed"] == 3
-    one.health["base"] = "other"
+    one.told["base"] = "other"
     one.declare(phrase=("path", (0.5,)))
-    one.health["base"] = "main"
+    one.told["base"] = "main"
     assert one.recipe()["source"] == "path"
     assert one.dance() == one.recipe(), "a path loops: the next one comes when another is asked for"
     assert len(list((one.folder / "material").iterdir())) <= 4
@@ -66,7 +66,8 @@ def test_one_variation_ahead_and_no_more(bench: Benches, tmp_path: Path) -> None
 def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: Path) -> None:
     show = write_show_with_sources(tmp_path / "show")
     one = bench(show)
-    one.health |= {"position_s": 0.5, "looked_at": time.monotonic()}
+    one.told["position_s"] = 0.5
+    one.health["looked_at"] = time.monotonic()
     one.declare(phrase=("improvise", NO_FADE))
     first = one.recipe()
     assert first["source"] == "improvise" and first["after"] == 0
@@ -76,7 +77,7 @@ def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: 
     assert made is not None and not made.at_once
     assert second["after"] == first["number"] and second["seed"] == first["seed"] + 1
     assert 2.0 < second["from_s"] < 4.5 and second["prompt"] != first["prompt"]
-    one.health["position_s"] = 1.0
+    one.told["position_s"] = 1.0
     one.declare(motion_improvise_temperature=("", (0.25,)))
     third = one.recipe()
     assert third["temperature"] == 0.25 and third["after"] == first["number"]
@@ -96,7 +97,7 @@ def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
     puppets = [{"name": "a"}, {"name": "b", "phrase": "vary"}, {"name": "c"}, {"name": "d", "phrase": "path"}]
     one = bench(write_show_with_sources(tmp_path / "show", puppets=puppets))
     told = [{"base": "main", "made": "", "position_s": 0.0} for _ in puppets[1:]]
-    one.health |= {"others": told, "looked_at": time.monotonic()}
+    one.health |= {"puppets": [one.told, *told], "looked_at": time.monotonic()}
     made = [MadeMotionReader(one.folder, puppet) for puppet in range(4)]
     one.recipe()
     told[0]["made"] = newest(made[1]).recipe
@@ -164,7 +165,7 @@ def test_a_generator_that_was_killed_goes_on_where_it_was(bench: Benches, tmp_pa
     one.declare(phrase=("vary", NO_FADE))
     one.recipe()
     danced = one.dance()
-    health = one.health | {"made": newest(one.made).recipe}
+    health = {"puppets": [one.told | {"made": newest(one.made).recipe}]}
     one.close()
     other = bench(show)
     other.health = health

@@ -31,6 +31,7 @@ from appliance.show_control.settings import Settings
 from tests.bundles import FIGURE
 
 HOST = "127.0.0.1"
+OF_PUPPET = {"coding", "interaction", "phrase", "base", "made", "position_s", "let_go"}
 PATIENCE_S = 20.0
 CUES: tuple[dict[str, Any], ...] = (
     {"name": "1", "look": "lines", "lights": None, "master": None, "fade_s": 0.0},
@@ -94,7 +95,7 @@ class StageDouble:
         self.obeys = True
         self.answer: Callable[[Order], tuple[bool, str]] = lambda order: (True, f"{order.name} it is.")
         self.orders: list[Order] = []
-        self.told: dict[str, Any] = {"state": "dancing", "rate_hz": 50.0}
+        self.told: dict[str, Any] = {"state": "dancing", "rate_hz": 50.0, "puppets": [{}]}
         self.remark = ""
         self._show_state = ShowStateReader(folder)
         self._telling = threading.Lock()
@@ -121,8 +122,10 @@ class StageDouble:
         self._show_state.close()
 
     def tell(self, **health: Any) -> None:
-        """Say this about itself from now on."""
+        """Say this about itself and its puppet from now on."""
         with self._telling:
+            of_puppet = {name: health.pop(name) for name in OF_PUPPET & health.keys()}
+            self.told["puppets"] = [self.told["puppets"][0] | of_puppet]
             self.told |= health
             self._writer.write_health(self.told)
 

@@ -34,24 +34,13 @@ def show(tmp_path: Path) -> Path:
     return write_show_with_sources(tmp_path / "show", {"kept": ["anna"]}, cues=CUES, puppets=puppets)
 
 
-def await_made(box: Box, reader: FrameReader, **wanted: Any) -> dict[str, Any]:
-    """The recipe of what is danced, once it is as wanted."""
+def await_made(box: Box, reader: FrameReader, puppet: int = 0, **wanted: Any) -> dict[str, Any]:
+    """The recipe of what a puppet dances, once it is as wanted."""
 
     def danced() -> dict[str, Any] | None:
         reader.newest(time.monotonic())
-        recipe: dict[str, Any] = json.loads((reader.health() or {}).get("made") or "{}")
-        return recipe if recipe and all(recipe.get(name) == value for name, value in wanted.items()) else None
-
-    return wait_until(danced, lambda: f"{wanted}\n{box.words}")
-
-
-def await_other(box: Box, reader: FrameReader, **wanted: Any) -> dict[str, Any]:
-    """The same of the second puppet."""
-
-    def danced() -> dict[str, Any] | None:
-        reader.newest(time.monotonic())
-        (other,) = (reader.health() or {}).get("others") or [{}]
-        recipe: dict[str, Any] = json.loads(other.get("made") or "{}")
+        puppets = (reader.health() or {}).get("puppets")
+        recipe: dict[str, Any] = json.loads(puppets[puppet]["made"] or "{}") if puppets else {}
         return recipe if recipe and all(recipe.get(name) == value for name, value in wanted.items()) else None
 
     return wait_until(danced, lambda: f"{wanted}\n{box.words}")
@@ -97,15 +86,15 @@ def test_varied_kept_killed_and_danced_again(show: Path, tmp_path: Path) -> None
         assert desk.order("/phrase", "improvise", 0.2)[2] == 1
         going_on = await_made(box, reader, source="improvise", temperature=0.5)
         await_made(box, reader, source="improvise", after=going_on["number"], seed=going_on["seed"] + 1)
-        other = await_other(box, reader, source="vary")
+        other = await_made(box, reader, 1, source="vary")
         box.kill_and_restart()
         box.frames(1)
         reader.newest(time.monotonic())
-        assert json.loads((reader.health() or {})["made"])["source"] == "improvise", (
+        assert json.loads((reader.health() or {})["puppets"][0]["made"])["source"] == "improvise", (
             "at once, not after a phrase"
         )
         await_made(box, reader, source="improvise", seed=going_on["seed"] + 3)
-        assert await_other(box, reader, source="vary")["seed"] >= other["seed"]
+        assert await_made(box, reader, 1, source="vary")["seed"] >= other["seed"]
         wait_until(lambda: (tmp_path / "state/kept/anna.material").exists(), "nothing was kept on the disk")
         assert box.end() == 0
     assert "Traceback" not in box.words

@@ -50,7 +50,7 @@ def test_readers_get_frames_facts_and_health(show: Path, tmp_path: Path) -> None
         assert all(0.0 < frame.left - frame.frame_time < PATIENCE_S for frame in seen)
 
         health = wait_until(lambda: (reader.health() or {}).get("ticks", 0) > 100 and reader.health())
-        assert health["state"] == "dancing" and health["phrase"] == "main"
+        assert health["state"] == "dancing" and health["puppets"][0]["phrase"] == "main"
         assert health["rate_hz"] > 0 and health["tick_p50_ms"] > 0
         assert health["sensors"][0][:3] == ["left-wrist", f"{box.key.device_id:08x}", "absent"]
         assert [one["dropped"] for one in health["receivers"]] == [0]
