@@ -54,7 +54,8 @@ export class PhoneLink extends EventTarget {
     if (this.isClosed) return;
     this.isClosed = true;
     clearInterval(this.timer);
-    navigator.sendBeacon("/api/phones/leave", JSON.stringify({ session: this.session }));
+    // Outlives the page. A beacon does so too, but some browsers send none of this page's origin with it.
+    fetch("/api/phones/leave", { method: "POST", body: JSON.stringify({ session: this.session }), keepalive: true }).catch(() => {});
     this.socket?.close();
   }
 
