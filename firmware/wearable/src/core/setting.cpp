@@ -84,7 +84,7 @@ constexpr struct {
                  {"port", set_port, "a port is 1 to 65535"},
                  {"fusion", set_fusion, "fusion is imuplus or ndof"},
                  {"crystal", set_crystal, "crystal is yes or no: a 32 kHz crystal beside the BNO055"},
-                 {"axes", set_axes, "axes are a turn of the BNO055's axes as two registers, as in: 24 00"}};
+                 {"axes", set_axes, "axes are a turn of the IMU's axes as two bytes, as in: 24 00"}};
 
 }  // namespace
 
