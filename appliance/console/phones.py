@@ -27,15 +27,10 @@ from appliance.console.fallback import PHONE_REFUSED
 from appliance.console.guard import Guard, peer
 from appliance.console.join_codes import VALID_S, JoinCodes
 from appliance.pose.foreign_file import plain_json
+from appliance.pose.turns import UNTURNED, Vector, multiplied
 from appliance.sensor.foreign.door import Door
 from appliance.sensor.foreign.foreign_sensor import ForeignSensor
-from appliance.sensor.foreign.orientations import (
-    IDENTITY,
-    Vector,
-    facing_front,
-    from_device_angles,
-    multiplied,
-)
+from appliance.sensor.foreign.orientations import facing_front, from_device_angles
 from appliance.sensor.wire import BATTERY_UNKNOWN
 
 AWAY_S = 5.0  # a phone that is silent for this long loses its place
@@ -68,7 +63,7 @@ class _Place:
     def __init__(self, name: str, door: Door) -> None:
         self.sensor = ForeignSensor(name, "phone", door)
         self.session, self.owner = "", ""
-        self.front = IDENTITY
+        self.front = UNTURNED
         self.counts: Counter[str] = Counter()
         self._heard = self._clock = self._second = -math.inf
         self._in_second = 0

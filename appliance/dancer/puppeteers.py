@@ -11,10 +11,15 @@ from numpy.typing import NDArray
 
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
+from appliance.pose.turns import Vector, about, inverse, multiplied
 
 HOLD_S = 0.1  # seconds of silence after which a sensor's joint is released
 GIVE_BACK_S = 1.0
 TAKE_S = 0.5
+AHEAD_S = 0.01  # how far a reading is turned on, by its angular velocity; further it would overshoot
+PAIR_S = 0.001, 0.05  # two readings this far apart tell an angular velocity
+_LEAST_TURN = 1e-6  # sine of half an angle
+_STILL = 0.0, (1.0, 0.0, 0.0)  # angular velocity in radians a second, and its axis
 LONGEST_STEP_S = 0.12  # six ticks; after a longer stall the targets continue from their last state
 
 
@@ -91,11 +96,24 @@ class WornSensor(Puppeteer):
     return, the joint is taken over 0.5 s, and the target is led to them over the length of the silence (0.5 s
     at most): the difference at its end is removed evenly while the readings continue.
 
+    A reading with a time of measurement is turned on to the time of the pull by the angular velocity of the
+    last two, for AHEAD_S at most.
+
     joint_from_reading: the matrix (4, 4) from a reading (w, x, y, z; sensor axes) to the joint's local
     orientation; it preserves length. None: the readings are local orientations already.
     """
 
-    SNAPSHOT = ("_joint_from_reading", "_reading", "_local", "_heard_at", "_leading_s", "_led_s", "_apart")
+    SNAPSHOT = (
+        "_joint_from_reading",
+        "_reading",
+        "_local",
+        "_heard_at",
+        "_leading_s",
+        "_led_s",
+        "_apart",
+        "_measured_at",
+        "_turn",
+    )
 
     def __init__(
         self, joint: str, weight: float = 1.0, joint_from_reading: NDArray[np.float32] | None = None
@@ -108,27 +126,39 @@ class WornSensor(Puppeteer):
         self._heard_at: float | None = None
         self._leading_s = self._led_s = 0.0  # rest and total of the time in which the target is led
         self._apart = 0.0, 0.0, 0.0, 0.0  # half the angle from reading to target, and its axis
+        self._measured_at: float | None = None
+        self._turn = _STILL
 
     def wear(self, joint_from_reading: NDArray[np.float32]) -> None:
         """Use the matrix of a new neutral pose; the target is led over, as after a silence."""
-        self._joint_from_reading = joint_from_reading
+        self._joint_from_reading, self._measured_at = joint_from_reading, None
         if self._heard_at is not None:
             np.matmul(joint_from_reading, self._reading, out=self._local)
             self._lead(TAKE_S)
 
     def adjust(self, joint_from_reading: NDArray[np.float32]) -> None:
         """Use a matrix that differs by less than can be seen: the target is not led."""
-        self._joint_from_reading = joint_from_reading
+        self._joint_from_reading, self._measured_at = joint_from_reading, None
 
     @property
     def local(self) -> FloatArray:
         """The joint's orientation by the newest reading, (4,); overwritten by the next."""
         return self._local
 
-    def take_reading(self, orientation: Sequence[float] | FloatArray, arrival: float) -> None:
-        """Take a reading (unit quaternion w, x, y, z) that arrived at this time."""
+    def take_reading(
+        self,
+        orientation: Sequence[float] | FloatArray,
+        arrival: float,
+        measured_at: float | None = None,
+    ) -> None:
+        """Take a reading (unit quaternion w, x, y, z) that arrived at this time. measured_at: on the same
+        clock; None: unknown.
+        """
+        before = self._local.tolist()
         self._reading[:] = orientation
         np.matmul(self._joint_from_reading, self._reading, out=self._local)
+        self._turn = self._turned_since(before, measured_at)
+        self._measured_at = measured_at
         if self._heard_at is not None and arrival - self._heard_at > HOLD_S:
             self._lead(max(self._leading_s, min(arrival - self._heard_at, TAKE_S)))
         self._heard_at = arrival
@@ -140,17 +170,40 @@ class WornSensor(Puppeteer):
     def _holds(self, now: float) -> bool:
         return self.silent_s(now) <= HOLD_S
 
+    def _turned_since(self, before: Sequence[float], measured_at: float | None) -> tuple[float, Vector]:
+        """The angular velocity from the reading before to the newest one; none where a time is unknown."""
+        if measured_at is None or self._measured_at is None:
+            return _STILL
+        between_s = measured_at - self._measured_at
+        if not PAIR_S[0] <= between_s <= PAIR_S[1]:
+            return _STILL
+        w, *axis = multiplied(_four(self._local.tolist()), inverse(_four(before)))
+        sine = math.hypot(*axis)
+        if sine < _LEAST_TURN:
+            return _STILL
+        x, y, z = (math.copysign(part, part * w) / sine for part in axis)
+        return 2.0 * math.atan2(sine, abs(w)) / between_s, (x, y, z)
+
+    def _turned_on(self, now: float) -> Sequence[float]:
+        """The newest reading, turned on to the time `now`."""
+        rate, axis = self._turn
+        local: list[float] = self._local.tolist()
+        if self._measured_at is None or rate == 0.0:
+            return local
+        return multiplied(about(axis, rate * min(max(now - self._measured_at, 0.0), AHEAD_S)), _four(local))
+
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        local = self._turned_on(now)
         if self._leading_s <= elapsed:
             self._leading_s = 0.0
-            orientation[:] = self._local
+            orientation[:] = local
         elif elapsed:
             self._leading_s -= elapsed
             half_angle, x, y, z = self._apart
             half_angle *= self._leading_s / self._led_s
             sine = math.sin(half_angle)
             left = np.array((math.cos(half_angle), sine * x, sine * y, sine * z), np.float32)
-            orientation[:] = quaternion.multiply(left, self._local)
+            orientation[:] = quaternion.multiply(left, np.array(local, np.float32))
 
     def _lead(self, seconds: float) -> None:
         """Lead the target from its present orientation to the readings, by half a turn in TAKE_S at most.

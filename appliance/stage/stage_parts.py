@@ -99,7 +99,7 @@ class StageParts:
     def hear(self, reading: SensorReading) -> None:
         """Give a reading to the joints that its sensor holds."""
         for puppeteer in self.worn.get(reading.sensor, ()):
-            puppeteer.take_reading(reading.orientation, reading.arrival)
+            puppeteer.take_reading(reading.orientation, reading.arrival, reading.measured_at)
         if reading.sensor == self.primary:
             self.newest_primary = reading
 

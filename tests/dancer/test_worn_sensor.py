@@ -166,3 +166,36 @@ def test_a_hand_that_is_disabled_lets_go_over_one_second_and_takes_again_over_ha
     assert course[12] == pytest.approx(0.5, abs=0.06)
     assert course[26] == pytest.approx(1.0)
     assert quaternion.angle_between(sensor.pull(3.0).orientation, np.array(RIGHT)) < 1e-3
+
+
+def hand_at(seconds: float) -> np.ndarray:
+    """A hand that swings by 60 degrees to each side, once a second."""
+    return quaternion.from_axis_angle(np.array([0.6, 0.8, 0.0]), np.radians(60) * np.sin(2 * np.pi * seconds))
+
+
+@pytest.mark.parametrize(("every_s", "age_s"), [(0.02, 0.004), (0.02, 0.009), (0.01, 0.008)])
+def test_a_reading_is_turned_on_to_the_time_of_the_tick(every_s: float, age_s: float) -> None:
+    """Against a sensor whose readings have no time: the hand that is held is the older one."""
+    told, untold = WornSensor("lShldr"), WornSensor("lShldr")
+    apart: list[list[float]] = []
+    for tick in range(1, 200):
+        now = tick * TICK_S
+        for part in range(round(TICK_S / every_s), 0, -1):
+            measured_at = now - age_s - (part - 1) * every_s
+            told.take_reading(hand_at(measured_at), now, measured_at)
+            untold.take_reading(hand_at(measured_at), now)
+        held = [sensor.pull(now).orientation.copy() for sensor in (told, untold)]
+        apart.append([float(quaternion.angle_between(one, hand_at(now))) for one in held])
+    turned_on, as_it_came = np.median(np.degrees(apart[50:]), axis=0)
+    assert turned_on < 0.3 * as_it_came
+
+
+def test_a_hand_that_stops_is_not_thrown_further() -> None:
+    sensor = WornSensor("lShldr")
+    for tick in range(1, 60):
+        angle = min(tick, 50) * 0.1
+        orientation = quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), angle)
+        sensor.take_reading(orientation, tick * TICK_S, tick * TICK_S)
+        held = sensor.pull(tick * TICK_S + 0.019).orientation
+        most = 0.5 * 0.1 + 1e-3 if tick <= 50 else 1e-3  # AHEAD_S is half of a tick
+        assert quaternion.angle_between(held, orientation) < most

@@ -10,10 +10,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from appliance.pose.turns import Vector, about, multiplied, swing
 from appliance.sensor.state import Orientation
 
-Vector = tuple[float, float, float]
-IDENTITY: Orientation = (1.0, 0.0, 0.0, 0.0)
 _UNIT = 0.1
 _AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -54,21 +53,7 @@ CONVENTIONS = {
 
 def facing_front(facing: Vector) -> Orientation:
     """The rotation that brings the sensor's x axis to a unit axis of the case, by the shortest way."""
-    x, y, z = facing
-    if x < -0.999:
-        return 0.0, 0.0, 0.0, 1.0
-    length = math.sqrt(2.0 * (1.0 + x))
-    return length / 2.0, 0.0, -z / length, y / length
-
-
-def multiplied(a: Orientation, b: Orientation) -> Orientation:
-    """The product of two quaternions: first b, then a."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
+    return swing(_AXES["x"], facing)
 
 
 def _from_xyzw(values: Sequence[float]) -> Orientation:
@@ -83,20 +68,14 @@ def _from_wxyz(values: Sequence[float]) -> Orientation:
 
 def _from_euler(values: Sequence[float]) -> Orientation:
     """Degrees about x, y and z of the case, turned about z first, then y, then x: yaw, pitch, roll."""
-    x, y, z = (math.radians(value) / 2.0 for value in values)
-    about_x: Orientation = (math.cos(x), math.sin(x), 0.0, 0.0)
-    about_y: Orientation = (math.cos(y), 0.0, math.sin(y), 0.0)
-    about_z: Orientation = (math.cos(z), 0.0, 0.0, math.sin(z))
-    return multiplied(multiplied(about_z, about_y), about_x)
+    x, y, z = map(math.radians, values)
+    return multiplied(multiplied(about(_AXES["z"], z), about(_AXES["y"], y)), about(_AXES["x"], x))
 
 
 def from_device_angles(alpha: float, beta: float, gamma: float) -> Orientation:
     """Degrees of a browser's DeviceOrientationEvent: about z, then x, then y of the phone (W3C, 2024)."""
-    z, x, y = (math.radians(value) / 2.0 for value in (alpha, beta, gamma))
-    about_z: Orientation = (math.cos(z), 0.0, 0.0, math.sin(z))
-    about_x: Orientation = (math.cos(x), math.sin(x), 0.0, 0.0)
-    about_y: Orientation = (math.cos(y), 0.0, math.sin(y), 0.0)
-    return multiplied(multiplied(about_z, about_x), about_y)
+    z, x, y = map(math.radians, (alpha, beta, gamma))
+    return multiplied(multiplied(about(_AXES["z"], z), about(_AXES["x"], x)), about(_AXES["y"], y))
 
 
 def _from_matrix(values: Sequence[float]) -> Orientation:

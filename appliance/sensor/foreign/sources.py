@@ -7,12 +7,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
+from appliance.pose.turns import UNTURNED, multiplied
 from appliance.sensor.foreign.mocopi import MOCOPI_PARENTS
 from appliance.sensor.foreign.orientations import (
     CONVENTIONS,
-    IDENTITY,
     facing_front,
-    multiplied,
     read_orientation,
 )
 from appliance.sensor.state import Orientation
@@ -99,9 +98,9 @@ class BoneSource:
             else:
                 whole = turned
         if whole is None and came:
-            whole = IDENTITY
+            whole = UNTURNED
             for name in reversed(self._chain):
-                at, turned = self._known.get(name, (-math.inf, IDENTITY))
+                at, turned = self._known.get(name, (-math.inf, UNTURNED))
                 if now - at <= _FRESH_S:
                     whole = multiplied(whole, turned)
         return None if whole is None else multiplied(self._axes.to_sensor(whole), self._front)

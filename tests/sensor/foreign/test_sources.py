@@ -8,11 +8,11 @@ from collections.abc import Sequence
 
 import pytest
 
+from appliance.pose.turns import multiplied
 from appliance.sensor.foreign.mocopi import mocopi_messages
 from appliance.sensor.foreign.orientations import (
     CONVENTIONS,
     from_device_angles,
-    multiplied,
     read_orientation,
 )
 from appliance.sensor.foreign.sources import SourceSettings
