@@ -133,6 +133,7 @@ Quaternion Bno085Model::fused(uint64_t at_us, bool has_field) const {
 bool Bno085Model::receive(uint8_t address, uint8_t* data, uint8_t count) {
   if (!is_reached(address)) return false;
   memset(data, 0, count);
+  if (is_shy && waiting_.empty()) return spend(1), false;
   if (!waiting_.empty()) {
     Cargo& cargo = waiting_.front();
     if (!is_announced_ && cargo.base_us != 0) {

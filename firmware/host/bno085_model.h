@@ -29,6 +29,7 @@ class Bno085Model final : public ImuModel {
   uint32_t interval_us(uint8_t report) const { return features_[report].interval_us; }
   uint32_t saves() const { return saves_; }
   bool refuses_saves = false;
+  bool is_shy = false;  // does not acknowledge a read while it has nothing to say
 
  private:
   static constexpr uint8_t kReports = 16;

@@ -61,6 +61,20 @@ TEST_CASE("BNO085: 50 and 100 readings a second, young, and 100 accelerations") 
   }
 }
 
+TEST_CASE("BNO085: a hub that does not acknowledge a read while it has nothing to say is driven too") {
+  HubRig rig(3);
+  rig.model.is_shy = true;
+  rig.model.set_motion(dance);
+  rig.power_on();
+  CHECK(rig.run_until_reading() < 0.4);
+  const uint32_t readings = rig.readings;
+  rig.run(20);
+  CHECK(rig.readings - readings >= 999);
+  CHECK(rig.imu.recoveries() == 0);
+  CHECK(rig.imu.counts().silences == 0);
+  rig.check_manners();
+}
+
 TEST_CASE("BNO085: a knock reaches the taps") {
   HubRig rig;
   rig.power_on();

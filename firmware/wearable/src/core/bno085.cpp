@@ -18,7 +18,7 @@ constexpr uint32_t kStableUs = 10000000;       // after running this long, earli
 constexpr uint32_t kCalibratedUs = 1000000;    // levels that held this long
 constexpr uint32_t kLongestAgeUs = 200000;     // of a report; what says it is older has its time damaged
 constexpr int32_t kLargestAcceleration = 8000;  // 1/100 m/s^2: at 8 g nothing larger is measured
-constexpr uint8_t kMostMisses = 8;             // bus errors in a row, then the hub is searched for
+constexpr uint8_t kMissesToRecover = 8;  // bus errors in a row
 constexpr uint8_t kMedium = 2;                 // of the levels 0 to 3
 
 uint8_t report_bytes(uint8_t report) {  // 0: none that was asked for
@@ -56,10 +56,6 @@ void Bno085::step(uint32_t now_us) {
     count(counts_.bus_recoveries);
     return bus_.recover();
   }
-  if (misses_ >= kMostMisses && state_ != State::kSearch) {
-    searching_us_ = now_us;
-    search();
-  }
   look_at_clock(now_us);
   if (pause_us_ != 0 || (!is_reading_ && ask(now_us)) || pause_us_ != 0) return;
   hear(now_us);
@@ -89,18 +85,16 @@ void Bno085::hear(uint32_t now_us) {
   const bool is_header = !is_reading_;
   const Shtp::Heard heard = hub_.listen();
   is_reading_ = heard == Shtp::Heard::kPart;
-  if (!has_answered(heard != Shtp::Heard::kError)) {
-    hub_.forget();
-    if (state_ == State::kSearch) keep_looking(now_us);
-    return;
-  }
-  if (is_header) announced_us_ = now_us;
+  const bool is_answered = has_answered(heard != Shtp::Heard::kError);
+  if (is_header && is_answered && !is_interrupted_) announced_us_ = now_us;
+  is_interrupted_ = !is_answered && (!is_header || is_interrupted_);
   if (heard == Shtp::Heard::kCargo) return take_cargo(now_us);
-  if (heard != Shtp::Heard::kNothing) return;
+  if (is_answered && heard != Shtp::Heard::kNothing) return;
+  if (!is_answered) hub_.forget();  // no hub, trouble, or a hub that says no when it has nothing to say
   is_idle_ = true;
   idle_us_ = now_us;
   if (quiet_looks_ < kQuietLooks) ++quiet_looks_;
-  if (state_ == State::kSearch) go(State::kAskProduct, now_us);  // it has said all, and can be asked
+  if (state_ == State::kSearch) go(State::kAskProduct, now_us);  // it has said all, or never will: it is asked
 }
 
 void Bno085::take_cargo(uint32_t now_us) {
@@ -221,8 +215,8 @@ bool Bno085::has_answered(bool is_answered) {
     return true;
   }
   count(counts_.bus_errors);
-  if (misses_ < 0xFF) ++misses_;
-  if (misses_ % 2 == 0) needs_bus_recovery_ = true;
+  ++misses_;
+  if (misses_ % kMissesToRecover == 0) needs_bus_recovery_ = true;
   return false;
 }
 

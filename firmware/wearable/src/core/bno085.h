@@ -127,6 +127,7 @@ class Bno085 final : public Imu {
   bool has_profile_ = false;
   bool is_asked_ = false;
   bool is_idle_ = false;  // nothing to hear at the last look
+  bool is_interrupted_ = false;  // a cargo was announced, and an error came: it is still the same
   bool is_reading_ = false;  // in the middle of a cargo
   bool is_fusion_lost_ = false;  // restarted since it last ran
   bool is_reset_expected_ = true;  // power-on, or commanded

@@ -26,12 +26,13 @@ constexpr char kFamily[] = "BNO8";
 
 void Bno085::search() {
   hub_.forget();
-  is_reading_ = is_idle_ = is_asked_ = is_saving_ = false;
+  is_reading_ = is_interrupted_ = is_idle_ = is_asked_ = is_saving_ = false;
   misses_ = tries_ = 0;
   state_ = State::kSearch;
 }
 
 void Bno085::keep_looking(uint32_t now_us) {
+  state_ = State::kSearch;
   if (now_us - searching_us_ > kSearchUs) has_failed_ = true;
   if (!has_run_) hub_.use(static_cast<uint8_t>(hub_.address() ^ kAddress ^ kOtherAddress));
   pause(has_failed_ ? kFailedLookUs : kNextLookUs, now_us);
@@ -84,7 +85,9 @@ bool Bno085::ask(uint32_t now_us) {
   if (state_ == State::kAskSerial) is_said = ask_for_record(kSerialNumber);
   if (state_ == State::kAskCalibration) is_said = ask_for_record(kDynamicCalibration);
   if (state_ == State::kAskFeature) is_said = say(feature, sizeof feature);
-  if (!has_answered(is_said)) is_asked_ = false;
+  if (has_answered(is_said)) return true;
+  is_asked_ = false;
+  if (state_ == State::kAskProduct) keep_looking(now_us);  // nobody listens either
   return true;
 }
 
