@@ -19,7 +19,7 @@ class RosterLine(NamedTuple):
     round_trip_s: float
     age_s: float
     battery: int  # percent; 255 unknown
-    calibration: int  # BNO055 register 0x35
+    calibration: int  # system, gyroscope, accelerometer, magnetometer: two bits each, 3 is best
     flags: int  # wire.HAS_PROFILE and the others, wire.signal_dbm
     firmware: str
     imu_id: str

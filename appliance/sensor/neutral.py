@@ -1,6 +1,6 @@
 """The neutral pose: from a sensor's readings to its joint, for any mounting and any heading.
 
-Sensor axes are those of the BNO055: z up, heading arbitrary. Stage axes: y up, the dancer faces +z and has x
+Sensor axes are those of the wire: z up, heading arbitrary. Stage axes: y up, the dancer faces +z and has x
 on the left. A permutation maps one to the other, world and body alike: a sensor with its x axis (the arrow on
 its case) to the front and z up reads the identity in both.
 """

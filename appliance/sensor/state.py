@@ -21,7 +21,7 @@ class SensorReading(NamedTuple):
     measured_at: float
     arrival: float
     battery: int  # percent; 255 unknown
-    calibration: int  # BNO055 register 0x35
+    calibration: int  # system, gyroscope, accelerometer, magnetometer: two bits each, 3 is best
     boot_nonce: int = 0  # changes at each power-on
     taps: int = 0  # double taps since power-on; wraps at 256
     recoveries: int = 0  # restarts of the IMU since power-on; wraps at 256; its heading is lost
@@ -50,7 +50,7 @@ class SensorState(NamedTuple):
     round_trip_s: float | None
     age_s: float | None  # since the newest accepted reading
     battery: int  # percent; 255 unknown
-    calibration: int  # BNO055 register 0x35
+    calibration: int  # system, gyroscope, accelerometer, magnetometer: two bits each, 3 is best
     firmware: str  # "1.0.0", or "" before the first hello
     imu_id: str  # hexadecimal, or ""
     flags: int  # wire.HAS_PROFILE and the others, wire.signal_dbm

@@ -115,7 +115,7 @@ def _seconds(seconds: float) -> float | None:
 
 
 def _levels(register: int) -> dict[str, int]:
-    """BNO055 register 0x35: two bits each, 3 is best."""
+    """System, gyroscope, accelerometer, magnetometer: two bits each, 3 is best."""
     return {
         "system": register >> 6 & 3,
         "gyro": register >> 4 & 3,

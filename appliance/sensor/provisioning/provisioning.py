@@ -40,7 +40,7 @@ class Settings:
     password: str = field(default="", repr=False)
     port: int = DEFAULT_PORT
     fusion: str | None = None
-    axes: tuple[int, int] | None = None  # BNO055 registers 0x41 (map) and 0x42 (sign)
+    axes: tuple[int, int] | None = None  # as the BNO055 has them, registers 0x41 (map) and 0x42 (sign)
     crystal: bool | None = None  # a 32 kHz crystal is fitted beside the BNO055
 
     def __post_init__(self) -> None:

@@ -25,7 +25,7 @@ LONGEST_LINE = 128
 # Resets the wearable's reader to text: ends an open frame, then sends an empty one.
 _TO_TEXT = b"\x00\x00\x01\x00\n"
 _ASK_AGAIN_S = 3.0
-_IMU_STARTS_S = 2.0  # the BNO055 takes 0.65 s after power-on, and some tries
+_IMU_STARTS_S = 2.0  # a BNO055 takes 0.65 s after power-on, and some tries
 _ASK_FOR_IMU_S = 0.2
 _QUIET_S = 0.15
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f]")  # control characters never reach the terminal
