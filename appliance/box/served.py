@@ -62,6 +62,14 @@ def _interfaces() -> list[tuple[str, str]]:
     return [one for one in found if one not in loopback]
 
 
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches this host."""
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
 class OwnNames:
     """The names by which browsers reach this machine; more: those that the box file lists."""
 

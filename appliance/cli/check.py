@@ -13,6 +13,7 @@ import typer
 from appliance.body.mesh_file import MESH_FILE, read_mesh, write_mesh
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import SHOW_OR_NAME, BoxFile
+from appliance.cli.phones import out_of_phones_reach
 from appliance.dancer.material.maker import open_network
 from appliance.dancer.material.map_reach import MapReach
 from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
@@ -81,7 +82,14 @@ def _check(directory: Path, box_file: Path | None) -> None:
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
     too_many = too_much(show.config.cues, verdict.most_coding, show.file)
-    found = (*reach(list(parts.worn), box), *unwired(show, box), *too_many, *_dead_map(show), *_no_mesh(show))
+    found = (
+        *reach(list(parts.worn), box),
+        *out_of_phones_reach(box),
+        *unwired(show, box),
+        *too_many,
+        *_dead_map(show),
+        *_no_mesh(show),
+    )
     for warning in found:
         print(warning)
 

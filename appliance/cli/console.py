@@ -24,7 +24,7 @@ from appliance.cli.options import (
     is_for_subcommand,
 )
 from appliance.cli.page_address import address, address_of, open_console_port
-from appliance.cli.phones import offer_phones, phone_names
+from appliance.cli.phones import offer_phones, out_of_phones_reach, phone_names
 from appliance.console.devices import Devices
 from appliance.console.settings import WHERE, Settings
 from appliance.show.config_error import NotAskedForError, Problem
@@ -208,6 +208,8 @@ def page_companion(
         if names := phone_names(box):
             option = "" if box.path is None else f" --box {box.path}"
             offer_phones(runtime_of(box), origin, names, option, say)
+            for line in out_of_phones_reach(box):
+                say(line)
     return Companion(
         "The page",
         command,

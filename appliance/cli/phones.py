@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from appliance.box.served import own_networks
+from appliance.box.served import is_loopback, own_networks
 from appliance.console.join_codes import VALID_S, JoinCodes
 from appliance.stage.stage_error import StageError
 
@@ -25,13 +25,29 @@ def phone_names(box: BoxConfig) -> tuple[str, ...]:
     return tuple(one.name for one in box.sensors.foreign if one.from_ == "phone")
 
 
+def out_of_phones_reach(box: BoxConfig) -> list[str]:
+    """Why phones cannot be the sensors that the box file lets them be."""
+    names, console = ", ".join(phone_names(box)), box.console
+    if not names:
+        return []
+    moves_freely = f"The dancer moves freely where {names} should hold."
+    if console is None:
+        return [f"Phones open the page, and this box file says `console: null`. {moves_freely} Remove it."]
+    if is_loopback(console.host):
+        cure = "Write `console: {host: '::', https: true, viewers: [192.168.0.0/24]}`."
+        return [f"No phone reaches the page: it is served on {console.host}. {moves_freely} {cure}"]
+    if not console.https:
+        cure = "Write `https: true` under console."
+        return [f"Browsers give no motion to a page without HTTPS. {moves_freely} {cure}"]
+    return []
+
+
 def with_phone(show: Show, box: BoxConfig) -> BoxConfig:
     """The box with a phone as the show's first sensor, and with a page that phones in this machine's networks
     can open.
 
     Raises StageError where the show has no sensor, the box no page, or this machine no openssl.
     """
-    from appliance.console.phone_address import is_loopback
     from appliance.show.foreign_sensors import ForeignSensorConfig
 
     worn = [hand.sensor for _, hand in show.config.hands_at if hand.sensor]

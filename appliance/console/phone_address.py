@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import ipaddress
 from urllib.parse import quote
 
 import segno
 
-from appliance.box.served import outward_host
+from appliance.box.served import is_loopback, outward_host
 
 
 def phone_address(origin: str, name: str, code: str) -> str:
@@ -22,14 +21,6 @@ def address_here(scheme: str, host: str, name: str, code: str) -> str:
     if is_loopback(plain):
         plain = outward_host()
     return phone_address(f"{scheme}://{plain}{f':{port}' if port else ''}", name, code)
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches this host."""
-    try:
-        return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def squares(address: str) -> list[str]:

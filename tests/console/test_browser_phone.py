@@ -22,6 +22,7 @@ from tests.system.processes import run_bunraku, wait_until
 pytestmark = pytest.mark.realtime
 
 NAME, JOINT = WORN["sensor"], FIGURE.index(WORN["joint"])
+OTHER, OTHERS_JOINT = "right-wrist", FIGURE.index("rThigh")
 UPRIGHT = {"alpha": 100.0, "beta": 90.0, "gamma": 0.0}  # the screen faces somewhere, its top edge is up
 TURN_DEGREES = 40.0
 NEAR = 0.02  # radians
@@ -37,11 +38,10 @@ Stage = tuple[Box, Page, FrameReader]
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
     folder = tmp_path_factory.mktemp("phones")
-    settings = {"sensors": {"foreign": [{"name": NAME, "from": "phone"}], "keys": None}}
-    with box_with_page(write_show(folder / "show"), folder, settings=settings, has_sensors=False) as (
-        box,
-        page,
-    ):
+    show = write_show(folder / "show", hands=[WORN, {"sensor": OTHER, "joint": "rThigh"}])
+    phones = [{"name": name, "from": "phone"} for name in (NAME, OTHER)]
+    settings = {"sensors": {"foreign": phones, "keys": None}}
+    with box_with_page(show, folder, settings=settings, has_sensors=False) as (box, page):
         reader = FrameReader(box.runtime)
         yield box, page, reader
         reader.close()
@@ -92,9 +92,9 @@ class Phone:
         self.await_lamp("on")
 
 
-def invited(page: Page) -> str:
+def invited(page: Page, name: str = NAME) -> str:
     """The address that `bunraku console phone` prints."""
-    done = run_bunraku("console", "phone", "--box", page.box_file)
+    done = run_bunraku("console", "phone", name, "--box", page.box_file)
     assert done.returncode == 0, done.stderr
     return next(word for word in done.stdout.split() if "/phone#" in word)
 
@@ -107,10 +107,10 @@ def angle(stage: Stage, degrees: float) -> float:
     return float(quaternion.angle_between(frame.pose[JOINT], wanted))
 
 
-def held(stage: Stage) -> float:
+def held(stage: Stage, joint: int = JOINT) -> float:
     frame = stage[2].newest(time.monotonic())
     assert frame is not None
-    return float(frame.holds[JOINT])
+    return float(frame.holds[joint])
 
 
 @pytest.mark.parametrize("script", ["", NO_SOCKETS], ids=["WebSocket", "POST"])
@@ -155,6 +155,10 @@ def test_one_phone_is_a_sensor_and_another_takes_its_place_only_when_asked(
     press(stranger.tab, "#take-over")
     expect(stranger.tab.locator("#phone-said")).to_contain_text("not valid any more")
     assert held(stage) == 1.0, "a used code took the joint away"
+    second = Phone(other, invited(page, OTHER))
+    second.begin()
+    wait_until(lambda: held(stage, OTHERS_JOINT) == held(stage) == 1.0)
+    second.tab.close()
     stranger.tab.fill("#phone-pin", page.pin)
     stranger.begin()
     press(stranger.tab, "#take-over")
