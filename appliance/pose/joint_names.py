@@ -97,7 +97,7 @@ _LEFT = ("left", "l", "左")
 _SEAM = re.compile(r"(?<=[_.:|/\\\- ])(?=.)|(?<=[a-z0-9])(?=[A-Z])")
 
 
-class Place(NamedTuple):
+class JointRole(NamedTuple):
     """Where a joint belongs: the chain, its side (1 left, -1 right, 0 middle), its place, its number."""
 
     chain: str
@@ -106,7 +106,7 @@ class Place(NamedTuple):
     number: int
 
 
-def place_of(name: str) -> Place | None:
+def place_of(name: str) -> JointRole | None:
     """Where on a human figure a joint of this name is; None for a name that is not in the table."""
     folded = "".join(letter for letter in _without_frills(name).casefold() if letter.isalnum())
     for side, bone in ((0, folded), *_sided(folded)):
@@ -117,7 +117,7 @@ def place_of(name: str) -> Place | None:
         known = _PLACES.get((plain, side == 0)) or _PLACES.get((re.sub(r"\d", "", plain), side == 0))
         if known is not None:
             digits = re.findall(r"\d+", word if plain != word else "")
-            return Place(known[0], side, known[1], int(digits[-1]) if digits else 0)
+            return JointRole(known[0], side, known[1], int(digits[-1]) if digits else 0)
     return None
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import UnknownJointError
-from appliance.pose.stage_frame import CENTIMETRE, Guess, Reading, in_stage_frame
+from appliance.pose.stage_frame import CENTIMETRE, FileConventions, Guess, in_stage_frame
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class ReadingOptions:
     root: Mapping[str, str] = field(default_factory=dict)
     all_frames: bool = False
 
-    def reading_of(self, name: str) -> Reading:
+    def conventions_of(self, name: str) -> FileConventions:
         """How a recording of this name, without its ending, is to be read."""
         found = (first_fit(one, name) for one in (self.metres_per_unit, self.up, self.facing, self.root))
-        return Reading(*found)
+        return FileConventions(*found)
 
     def fps_of(self, name: str) -> float | None:
         """Its rate, where its header is wrong."""
@@ -65,18 +65,18 @@ def read_upright(path: Path, options: ReadingOptions = AS_THE_FILES_SAY) -> tupl
     Raises BvhError, also for a root that it does not have, or OSError.
     """
     recording = read_bvh(path, true_fps=options.fps_of(path.stem))
-    return brought_in(path, recording, options.reading_of(path.stem))
+    return brought_in(path, recording, options.conventions_of(path.stem))
 
 
 def brought_in(
-    path: Path, recording: Recording, reading: Reading, unit_m: float = CENTIMETRE
+    path: Path, recording: Recording, conventions: FileConventions, unit_m: float = CENTIMETRE
 ) -> tuple[Recording, list[Guess]]:
     """A recording of this file in the stage's frame, and what was lost or changed.
 
     unit_m: of the file's lengths, as it was read. Raises BvhError for a root that it does not have.
     """
     try:
-        found, guesses = in_stage_frame(recording, reading, unit_m=unit_m)
+        found, guesses = in_stage_frame(recording, conventions, unit_m=unit_m)
     except UnknownJointError as error:
         raise BvhError(path, 1, f"{error} Give another --root.") from error
     return found, [*(Guess(note, "") for note in recording.notes), *guesses]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from appliance.pose.joint_names import Place, place_of, shared_prefix
+from appliance.pose.joint_names import JointRole, place_of, shared_prefix
 
 MIDDLE = ("hips", "spine", "chest", "neck", "head")
 LIMBS = ("collar", "upper arm", "forearm", "hand", "thigh", "shin", "foot", "toe")
@@ -18,7 +18,7 @@ _HELD = (*UPPER_ARMS, "left forearm", "head", "chest", "left thigh")
 _HIPS, _WAIST, _SPINE, _CHEST, _UPPER_CHEST, _NECK, _HEAD = range(7)
 
 
-def places_of(names: Sequence[str]) -> list[Place | None]:
+def places_of(names: Sequence[str]) -> list[JointRole | None]:
     """For each joint its place on a figure, None for an unknown name; a prefix of most names is ignored."""
     prefix = shared_prefix(names)
     return [place_of(name) or place_of(name.removeprefix(prefix)) for name in names]
@@ -62,7 +62,7 @@ def roles_of(names: Sequence[str]) -> dict[str, int]:
     return found
 
 
-def trunk_of(places: Sequence[Place | None]) -> list[int]:
+def trunk_of(places: Sequence[JointRole | None]) -> list[int]:
     """Joints between hips and neck, upwards; a waist below a named spine is left out."""
     trunk = [j for j, p in enumerate(places) if p is not None and p.chain == "spine" and 0 < p.place < _NECK]
     spine = [j for j in trunk if (p := places[j]) is not None and p.place == _SPINE]

@@ -40,7 +40,7 @@ UPS = ("y", "z")
 
 
 @dataclass(frozen=True)
-class Reading:
+class FileConventions:
     """How a file is to be read; None: guessed. root: name of the joint that becomes the root; up: 'y' or 'z';
     facing: where the dancer of the file faces once it is upright, a key of FACINGS.
     """
@@ -62,38 +62,39 @@ class Guess(NamedTuple):
         return f"{self.words} (otherwise: {self.option})" if self.option else self.words
 
 
-AS_GUESSED = Reading()
+AS_GUESSED = FileConventions()
 
 
 def in_stage_frame(
-    recording: Recording, reading: Reading = AS_GUESSED, *, unit_m: float = CENTIMETRE
+    recording: Recording, conventions: FileConventions = AS_GUESSED, *, unit_m: float = CENTIMETRE
 ) -> tuple[Recording, list[Guess]]:
     """The recording in the stage's frame, and what was changed.
 
     unit_m: of the file's lengths, as it was read. Raises UnknownJointError for a root that it does not have.
     """
     guesses = []
-    if reading.metres_per_unit is None:
+    if conventions.metres_per_unit is None:
         scale, words = _guessed_scale(recording.skeleton, unit_m)
     else:
-        scale, words = reading.metres_per_unit / unit_m, ""
+        scale, words = conventions.metres_per_unit / unit_m, ""
     if scale != 1.0:
         recording = _scaled(recording, scale)
     if words:
         guesses.append(Guess(words, "--metres-per-unit"))
     if not len(recording):
         return recording, guesses
-    root, why = _root_of(recording) if reading.root is None else (recording.skeleton.index(reading.root), "")
+    wanted = conventions.root
+    root, why = _root_of(recording) if wanted is None else (recording.skeleton.index(wanted), "")
     if root:
         recording = _rerooted(recording, root)
     if why:
         guesses.append(Guess(why, "--root"))
-    if (reading.up or ("z" if _is_z_up(recording) else "y")) == "z":
-        guesses.append(Guess("turned from Z up to Y up", "" if reading.up else "--up y"))
+    if (conventions.up or ("z" if _is_z_up(recording) else "y")) == "z":
+        guesses.append(Guess("turned from Z up to Y up", "" if conventions.up else "--up y"))
         recording = _turned_upright(recording)
-    recording, words = _faced(recording, reading.facing)
+    recording, words = _faced(recording, conventions.facing)
     if words:
-        guesses.append(Guess(words, "" if reading.facing else "--facing z"))
+        guesses.append(Guess(words, "" if conventions.facing else "--facing z"))
     floor = floor_m(recording.skeleton, sampled_positions(recording)) if recording.skeleton.feet else 0.0
     if abs(floor) > FLOOR_M:
         recording = replace(recording, roots=recording.roots - np.array([0.0, floor, 0.0]))

@@ -15,7 +15,7 @@ Pair = Annotated[tuple[float, float], Field(strict=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Colour = Annotated[tuple[Share, Share, Share], Field(strict=False)]
 Feature = Literal["qom", "weight_effort", "time_effort", "flow_effort", "space_effort"]
-Reading = Literal["place", "across", "height", "depth", "speed", "turn", "lean", "steady", Feature]
+ReadValue = Literal["place", "across", "height", "depth", "speed", "turn", "lean", "steady", Feature]
 FEATURES: tuple[Feature, ...] = get_args(Feature)
 
 USUAL_RANGES: dict[str, tuple[float, float]] = {
@@ -41,7 +41,7 @@ class RuleConfig(Section):
     fixtures: list[str] = key(
         "Names of the fixtures; []: all that have what `drives` names.", [], length=(0, 512)
     )
-    reads: Reading = key(
+    reads: ReadValue = key(
         "place (for aim), across, height and depth in metres, speed in metres a second, turn "
         "about `axis` and lean of `axis` away from its rest direction in degrees, steady (a constant); "
         "of the whole body qom (quantity of motion) and the efforts after Laban."

@@ -41,7 +41,7 @@ from appliance.stage.liveliness import Liveliness
 from appliance.stage.open_sensors import open_sensors
 from appliance.stage.puppeteers_of_show import mounting_of, puppeteers_of
 from appliance.stage.stage_error import StageError
-from appliance.stage.stage_puppet import Place, StagePuppet
+from appliance.stage.stage_puppet import StagePosition, StagePuppet
 
 
 @dataclass(slots=True)
@@ -280,7 +280,7 @@ def _stage_puppet(
     puppeteers = puppeteers_of(show, hands, puppet, grounding, motion)
     joints, window, placed = puppet.joints, puppet.network.window, config.puppets
     blending = Blending(len(joints), window, config.dancer.hop, config.dancer.blending)
-    place = Place(placed[number], motion.roots()[0]) if placed else None
+    place = StagePosition(placed[number], motion.roots()[0]) if placed else None
     made = StagePuppet(
         puppet=puppet,
         motion=motion,

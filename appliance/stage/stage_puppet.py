@@ -31,7 +31,7 @@ from appliance.stage.iterations import Iterations
 _STANDING = ("pose", "world", "positions", "root")  # arrays of a frame
 
 
-class Place:
+class StagePosition:
     """Where a puppet's dance stands on the stage: its first root at x, z (metres), turned about it."""
 
     def __init__(self, config: PuppetConfig, root: FloatArray) -> None:
@@ -83,7 +83,7 @@ class StagePuppet:
     live: Live | None = None  # None: the show has no such source
     feet: Sequence[int] = ()  # joints of the skeleton
     springs: Springs | None = None  # those among the hands
-    place: Place | None = None
+    place: StagePosition | None = None
     network_failed: bool = False
     figures_refused: int = 0
     liveliness: float = 1.0

@@ -9,7 +9,7 @@ import pytest
 
 from appliance.pose.body_facts import fronts, height_m, sampled_positions
 from appliance.pose.skeleton import UnknownJointError
-from appliance.pose.stage_frame import Reading, in_stage_frame
+from appliance.pose.stage_frame import FileConventions, in_stage_frame
 from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of
 
 
@@ -41,17 +41,17 @@ def test_a_dance_with_its_back_to_the_audience_is_turned_and_left_where_asked() 
     found, guesses = in_stage_frame(away)
     assert_the_same_dance(found, meant)
     assert "faces -z" in guesses[0].sentence() and "--facing z" in guesses[0].sentence()
-    kept, guesses = in_stage_frame(away, Reading(facing="z"))
+    kept, guesses = in_stage_frame(away, FileConventions(facing="z"))
     np.testing.assert_array_equal(kept.poses, away.poses)
     assert guesses == []
 
 
 def test_a_root_can_be_named_and_an_unknown_one_is_refused() -> None:
     meant = dance_of("Mixamo", seconds=1.0)
-    found, guesses = in_stage_frame(meant, Reading(root="mixamorig:Spine"))
+    found, guesses = in_stage_frame(meant, FileConventions(root="mixamorig:Spine"))
     assert found.skeleton.names[0] == "mixamorig:Spine" and not guesses
     with pytest.raises(UnknownJointError):
-        in_stage_frame(meant, Reading(root="nobody"))
+        in_stage_frame(meant, FileConventions(root="nobody"))
 
 
 def test_what_lies_too_deep_is_set_on_the_floor() -> None:

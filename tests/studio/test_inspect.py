@@ -132,11 +132,11 @@ def test_masked_frames_are_named_drawn_and_kept_on_demand(tmp_path: Path) -> Non
 
 def test_a_show_keeps_how_its_recordings_were_read(tmp_path: Path) -> None:
     told = Catalogue().with_options(ReadingOptions(up={"*": "z"}, true_fps={"a_*": 60.0}))
-    assert told.reading.fps_of("a_1") == 60.0 and told.reading.reading_of("b").up == "z"
+    assert told.reading.fps_of("a_1") == 60.0 and told.reading.conventions_of("b").up == "z"
     (tmp_path / "report.json").write_text(json.dumps({KEY: reading_facts(told)}))
     kept = remembered_reading(tmp_path / "puppet.onnx").options
     assert kept.up == {"*": "z"} and kept.fps_of("a_2") == 60.0
-    assert ReadingOptions(up={"*": "y"}).over(kept).reading_of("c").up == "y"
+    assert ReadingOptions(up={"*": "y"}).over(kept).conventions_of("c").up == "y"
 
 
 def test_the_kinds_of_zero_poses() -> None:

@@ -69,7 +69,7 @@ def test_what_was_asked_for_goes_before_what_is_remembered(tmp_path: Path) -> No
 
     def unit(name: str, **asked: float) -> float | None:
         told = trained.options_for(tmp_path / name, ReadingOptions(metres_per_unit=asked))
-        return told.reading_of(Path(name).stem).metres_per_unit
+        return told.conventions_of(Path(name).stem).metres_per_unit
 
     assert unit("raw.bvh") == 0.0254 and unit("raw.bvh", raw=0.5) == 0.5
     assert unit("ours.bvh") is None and unit("ours.bvh", ours=0.5) == 0.5

@@ -98,7 +98,7 @@ def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
         recording = recording.without_first(TPOSE_FRAMES)
     if not len(recording):
         raise DatasetError(f"{file.name} has no pose but its T-pose. Remove the file.")
-    recording, guesses = brought_in(file, recording, catalogue.reading.reading_of(file.stem))
+    recording, guesses = brought_in(file, recording, catalogue.reading.conventions_of(file.stem))
     resampled = recording.resampled(FPS)
     sound = np.ones(len(resampled), dtype=bool)
     take = catalogue.take_of(file.stem)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from appliance.pose import quaternion
-from appliance.pose.joint_names import FINGERS, Place
+from appliance.pose.joint_names import FINGERS, JointRole
 from appliance.pose.quaternion import Array
 from appliance.pose.roles import places_of
 from appliance.studio.evaluation.dance_figures import energy
@@ -53,7 +53,7 @@ def spread(poses: Array) -> float:
     return float(np.sqrt((degrees**2).mean(axis=0)).mean())
 
 
-def _limb(place: Place | None) -> tuple[str, int] | None:
+def _limb(place: JointRole | None) -> tuple[str, int] | None:
     """('legs', 'arms' or 'trunk', side); None for an unknown name."""
     if place is None:
         return None

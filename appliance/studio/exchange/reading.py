@@ -35,4 +35,4 @@ def read_as_told(
             recording = (read_npz if ending == ".npz" else read_csv)(path, true_fps)
     except OSError as error:
         raise ExchangeError(path, f"The file cannot be read ({error.strerror or error}).") from error
-    return brought_in(path, recording, reading.reading_of(path.stem), _METRE)
+    return brought_in(path, recording, reading.conventions_of(path.stem), _METRE)
