@@ -17,7 +17,7 @@ LARGEST = 4000  # bytes of a packed checkpoint; one slot on the disk is a page o
 PLACE = Record("place", "place", LARGEST)
 FILE = PLACE.name
 
-_FORMAT = b"2\0"  # of another release: no place
+_FORMAT = b"2\0"  # another one is of another release, and no place
 _SHOW = struct.Struct("<qd2H3B")  # tick, rate, restarts, power cuts, ended, tries, puppets
 _STANDING = struct.Struct("<8d2H")  # position, excerpt, standing, strayed, iterations
 _MOST = 0xFFFF
