@@ -29,7 +29,7 @@ _CORRECT_S = 1.0  # from one step of the correction to the next
 _SURE = 0.5  # standard deviations that a drift must exceed: what is below stays
 
 # What is believed beforehand, degrees and seconds.
-_RATE = 1.5 / 60.0  # standard deviation of a rate that is not known yet
+_RATE = 2.2 / 60.0  # standard deviation of a rate that is not known yet
 _HIGHEST_RATE = 4.0 / 60.0
 _RATE_WALK = (0.7 / 60.0) ** 2 / 1800.0  # with the temperature: 0.7 degrees a minute in half an hour
 _OFF_HABIT = 15.0  # standard deviation between dancers; takes of one dancer: 7
@@ -39,7 +39,7 @@ _AFTER_GAP = 5.0  # of one that was carried over, or reset by a person
 _WINDOW_S = 2.0  # of dancing, taken as one witness; shorter ones are noisier, in longer ones the body turns
 _STEADY = 0.8  # resultant of a window whose arm points one way, of what its tilts promise
 _LEAST_KNOWN = 0.2  # mean length of the habit's directions in a window
-_DANCE = 20.0  # standard deviation of a window, a body that faces the front
+_DANCE = 16.0  # standard deviation of a window, a body that faces the front
 _USUAL = _DANCE**2, 0.6 * _DANCE**2, 0.7, 0.35  # statistics of the windows, until they are learned
 _LEARNED = 1.0 / 150.0  # of them from each window
 _LIKE = 0.4, 0.97  # least and most correlation
