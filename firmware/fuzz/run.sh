@@ -5,7 +5,7 @@ set -euo pipefail
 build=$1 seconds=$2 keep=${3:-}
 kept=$(dirname "${BASH_SOURCE[0]}")/corpus
 declare -A runs
-for target in fuzz_packets fuzz_cable; do
+for target in fuzz_packets fuzz_cable fuzz_imus; do
     mkdir -p "$build/corpus/$target"
     "$build/$target" -max_total_time="$seconds" -max_len=512 -timeout=10 -print_final_stats=1 \
         -artifact_prefix="$build/$target-" "$build/corpus/$target" "$kept/$target" >"$build/$target.log" 2>&1 &

@@ -56,8 +56,29 @@ def cable_inputs() -> list[bytes]:
     return [*packets, *lines, lines[0] + packets[0] + lines[3], b"x" * 140 + b"\n" + lines[0]]
 
 
+def imu_inputs() -> list[bytes]:
+    """A hub that starts and reports, and a raw chip that does, as fuzz_imus.cpp reads them."""
+
+    def cargo(channel: int, *payload: int) -> bytes:
+        return bytes([channel, len(payload), *payload])
+
+    record = (0x16, 0, 0, 1, 2, 3, 4, 0, 0, 0, 0)
+    start = (
+        cargo(1, 1)
+        + cargo(0)
+        + cargo(2, 0xF8, 1, 3, 12, *range(12))
+        + cargo(2, 0xF3, *record, 0x4B, 0x4B, 0, 0)
+    )
+    start += cargo(2, 0xF3, *record, 0x1F, 0x1F, 0, 0) + cargo(2, 0xFC, 0x08, 0, 0, 0, 0x88, 0x13, *[0] * 10)
+    rotation = (0x08, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0x40)
+    reports = cargo(3, 0xFB, 1, 0, 0, 0, *rotation, 0x04, 0, 3, 0, 10, 0, 20, 0, 30, 0)
+    word = bytes([0x08, 1, 0, 2, 0, 3, 0, 0x10, 0, 0, 0, 0, 0, 0x10])
+    return [b"\0" + start + reports * 12, b"\1" + bytes([0x70, 3]) + (bytes([2, 0]) + word) * 24]
+
+
 def main() -> None:
-    for target, seeds in {"fuzz_packets": packet_scripts(), "fuzz_cable": cable_inputs()}.items():
+    targets = {"fuzz_packets": packet_scripts(), "fuzz_cable": cable_inputs(), "fuzz_imus": imu_inputs()}
+    for target, seeds in targets.items():
         folder = CORPUS / target
         folder.mkdir(parents=True, exist_ok=True)
         for seed in seeds:
