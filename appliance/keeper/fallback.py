@@ -37,7 +37,7 @@ KEPT_IN_MEMORY = Fallback(
     "This box keeps its data in memory: sensors' keys, neutral poses, shows from sticks and the journal are "
     "gone at power-off. The audience sees nothing of it tonight. Give /data a separate partition: bunraku "
     "doctor.",
-    "What this box keeps is in memory, on {about}: sensors' keys, neutral poses, shows from sticks and the "
+    "This box keeps its data in memory, on {about}: sensors' keys, neutral poses, shows from sticks and the "
     "journal are gone at power-off. The audience sees nothing of it tonight. Give /data a partition of its "
     "own: bunraku doctor.",
 )
