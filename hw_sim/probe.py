@@ -91,10 +91,11 @@ def run(setting: Setting, course: Course, progress: Progress | None = None) -> R
         if screen is not None:
             picture = {**setting.box.get("projector", {}), "size": list(screen.size)}
             setting = replace(setting, box={**setting.box, "projector": picture})
-        waits = {} if course.phase_lock else {"limits": {**setting.box.get("limits", {}), "wait_ms": 0}}
+        if not course.phase_lock:
+            limits = {**setting.box.get("limits", {}), "wait_ms": 0}
+            setting = replace(setting, box={**setting.box, "limits": limits})
         box = write_box_file(
             *(setting, folder, (sensors, control, receiver.port)),
-            **waits,
             journal={"folder": "run.journal", "minutes": max(1.0, course.seconds / 60.0 + 0.5)},
             phase_lock=course.phase_lock,
         )

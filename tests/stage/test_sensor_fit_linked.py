@@ -31,6 +31,7 @@ KEY = SensorKey("left-wrist", 0x1A2B3C4D, bytes(range(16)))
 HANGING: Quaternion = (0.766, 0.0, 0.0, -0.643)
 STANDS_S, DANCES_S = 2.0, 6.5
 MAKERS = ("emulated", "firmware")
+NEAR_DEGREES = 2.0  # a reading is turned on by up to 10 ms of the arm's motion
 
 Begin = Callable[..., "Evening"]
 
@@ -129,7 +130,7 @@ def test_switched_on_stood_still_danced(begin: Begin, maker: str) -> None:
     assert sum("neutral pose taken" in words for words in evening.said) == 1
     evening.errors.clear()
     evening.run(10.0)
-    assert max(evening.errors) < 1.0
+    assert max(evening.errors) < NEAR_DEGREES
     assert evening.device.light == "on"
 
 
@@ -140,7 +141,7 @@ def test_after_a_double_tap_half_a_second_of_stillness_is_enough(begin: Begin) -
     evening.run(0.8)
     assert sum("neutral pose taken" in words for words in evening.said) == 1
     evening.run(3.0)
-    assert max(evening.errors[-50:]) < 1.0
+    assert max(evening.errors[-50:]) < NEAR_DEGREES
 
 
 @pytest.mark.parametrize("maker", MAKERS)
@@ -152,7 +153,7 @@ def test_a_restart_of_the_box_in_mid_dance_keeps_the_pose(begin: Begin, maker: s
     evening.run(1.5)
     evening.errors.clear()
     evening.run(5.0)
-    assert max(evening.errors) < 1.0
+    assert max(evening.errors) < NEAR_DEGREES
     assert evening.said == ["Sensor left-wrist: the neutral pose taken before is used on. Dance."]
     assert "slow" not in evening.lights
 
