@@ -38,7 +38,7 @@ KEPT_IN_MEMORY = Fallback(
     "gone at power-off. The audience sees nothing of it tonight. Give /data a separate partition: bunraku "
     "doctor.",
     "This box keeps its data in memory, on {about}: sensors' keys, neutral poses, shows from sticks and the "
-    "journal are gone at power-off. The audience sees nothing of it tonight. Give /data a separate partition: "
-    "bunraku doctor.",
+    "journal are gone at power-off. The audience sees nothing of it tonight. Give /data a separate "
+    "partition: bunraku doctor.",
 )
 OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT, CHOICE_NOT_KEPT, KEPT_IN_MEMORY)
