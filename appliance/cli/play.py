@@ -306,7 +306,7 @@ def _inputs(stage: Stage, control: socket.socket | None) -> str:
     if control is not None:
         commands = "on " + ":".join(map(str, control.getsockname()))
     else:
-        commands = "nowhere" if stage.box.control is None else "by a process of their own (bunraku control)"
+        commands = "nowhere" if stage.box.control is None else "by another process (bunraku control)"
     return f"Sensors are heard on {sensors}, commands {commands}."
 
 

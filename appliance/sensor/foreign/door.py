@@ -27,6 +27,7 @@ def open_door(folder: Path) -> tuple[UdpIntake, bytes]:
     found = _read(folder)
     secret = secrets.token_bytes(KEY_BYTES) if found is None else found[1]
     intake = UdpIntake(LOOPBACK, 0)
+    intake.name = "the door of phones and programs"  # its port is of no use to people
     try:
         write_whole(folder / FILE, f"{intake.address[1]} {secret.hex()}\n".encode(), private=True)
     except OSError:
