@@ -28,20 +28,20 @@ MOST_RATE = 5.0 / 60.0  # degrees a second that a correction moves: a sensor dri
 _CORRECT_S = 1.0  # from one step of the correction to the next
 _SURE = 0.5  # standard deviations that a drift must exceed: what is below stays
 
-# What is believed beforehand, degrees and seconds.
+# Assumed before anything is measured; degrees and seconds.
 _RATE = 2.2 / 60.0  # standard deviation of a rate that is not known yet
 _HIGHEST_RATE = 4.0 / 60.0
 _RATE_WALK = (0.7 / 60.0) ** 2 / 1800.0  # with the temperature: 0.7 degrees a minute in half an hour
-_OFF_HABIT = 15.0  # standard deviation between dancers; takes of one dancer: 7
-_AT_NEUTRAL = 1.0  # of a heading right after a neutral pose
-_AFTER_GAP = 5.0  # of one that was carried over, or reset by a person
+_OFF_HABIT = 35.0  # standard deviation between dancers: 20 were measured, strangers to the phrases are common
+_AT_NEUTRAL = 1.0  # standard deviation right after a neutral pose
+_AFTER_GAP = 5.0  # after a heading that was carried over, or reset by a person
 
-_WINDOW_S = 2.0  # of dancing, taken as one witness; shorter ones are noisier, in longer ones the body turns
+_WINDOW_S = 2.0  # one witness of a dance: shorter ones are noisier, in longer ones the body turns
 _STEADY = 0.8  # resultant of a window whose arm points one way, of what its tilts promise
 _LEAST_KNOWN = 0.2  # mean length of the habit's directions in a window
 _DANCE = 16.0  # standard deviation of a window, a body that faces the front
 _USUAL = _DANCE**2, 0.6 * _DANCE**2, 0.7, 0.35  # statistics of the windows, until they are learned
-_LEARNED = 1.0 / 150.0  # of them from each window
+_LEARNED = 1.0 / 150.0  # each window counts so much in these statistics
 _LIKE = 0.4, 0.97  # least and most correlation
 _LEAST_PEAK = 0.02
 _FACING = 0.5  # share of the time in which a dancer faces the front
@@ -50,7 +50,7 @@ _STANDS_LIKE = math.cos(math.radians(10.0))  # tilt against the neutral pose's
 _STANDING = 9.0  # standard deviation of where a standing dancer faces
 _LIES_S = 30.0
 _LIES_LIKE = math.cos(math.radians(0.3))  # no arm keeps its tilt so well
-_LYING_NOISE = 0.15  # of a heading that is read while it lies
+_LYING_NOISE = 0.15  # a lying sensor reads its heading with this noise
 _ANY = 1.0, 0.0, 0.0, 0.0
 
 
@@ -79,10 +79,8 @@ class HeadingDrift:
         self._stood = False
         self._window = [0.0] * 3  # sum of directions against the habit (real, imaginary), of their lengths
         self._samples = 0
-        self._surprise = 0.0  # of the window before
-        self._means = list(
-            _USUAL
-        )  # of squares and neighbours' products of surprises, of shares and curvatures
+        self._surprise = 0.0  # the one before
+        self._means = list(_USUAL)  # squares and neighbours' products of surprises, shares, curvatures
         self._lies_since, self._lies_as = -math.inf, _ANY
         self.restart()
 

@@ -16,8 +16,8 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
-CELLS = 64  # of tilt, evenly over the sphere: 29 degrees from one to the next
-_SHARPNESS = 12.0  # of a cell's bell (von Mises and Fisher): 17 degrees
+CELLS = 64  # tilts, evenly over the sphere: 29 degrees from one to the next
+_SHARPNESS = 12.0  # a cell's bell (von Mises and Fisher) is 17 degrees wide
 _FEW = 5.0  # poses; a cell that saw fewer is believed less
 _EVERY_S = 0.2
 
