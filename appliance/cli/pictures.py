@@ -28,8 +28,8 @@ from appliance.stage.stage_error import StageError
 
 @dataclass(frozen=True)
 class RecordedDance:
-    """The dance of each puppet, frame by frame, how firmly hands held each joint (N, P, J; None: none was held),
-    its title.
+    """The dance of each puppet, frame by frame, how firmly hands held each joint (N, P, J; None: no hand
+    did), its title.
 
     names: of the puppets, where there are several; start_s: second of what was danced at which it begins.
     """
