@@ -43,7 +43,7 @@ def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_bo
     """As separate units: `bunraku play --alone` and `bunraku control`."""
     with playing(show, tmp_path, "--alone") as box:
         control = [*CONTROL, box.box_file]
-        box.await_words("commands by a process of their own")
+        box.await_words("commands by another process")
         with Process(tmp_path / "control.txt", control) as first:
             with asking(box) as asker:
                 await_status(asker, state="dancing")
