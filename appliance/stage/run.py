@@ -105,7 +105,8 @@ class Stage:
         self.batteries = BatteryLives()
         self._resume(TickClock().now())
         late_look_s = box.limits.wait_ms / 1000.0
-        self.tick = Tick(self.parts, self.wearing, latest_start_s, late_look_s)
+        late_s = box.limits.late_ms / 1000.0
+        self.tick = Tick(self.parts, self.wearing, latest_start_s, late_look_s, late_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         primary, link = self.parts.primary, self.parts.link

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 
@@ -16,6 +17,8 @@ from appliance.sensor.link import SensorReading
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
 
+_SPARE_S = 0.001  # left at the end of a wait, beside the cost of the slowest tick
+_FADES = 0.999  # a slow tick is remembered for some 10 s
 DRAIN, MOTION, HANDS, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
 
 
@@ -35,13 +38,19 @@ class Tick:
         wearing: SensorFit,
         latest_start_s: float,
         late_look_s: float = 0.0,
+        late_s: float = math.inf,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
-        """late_look_s: how long a tick waits for a late reading of the primary sensor; 0: not at all."""
+        """late_look_s: how long a tick waits for a late reading of the primary sensor; 0: not at all.
+
+        late_s: a frame that leaves this long after its deadline is late.
+        """
         self.parts = parts
         self.wearing = wearing
         self.latest_start_s, self.late_look_s = latest_start_s, late_look_s
+        self.late_s = late_s
         self.waited_s = 0.0  # for a late reading, in this tick
+        self._slowest_s = 0.0  # cost of the slowest tick lately
         self.frames = tuple(one.frame for one in parts.puppets)
         self.late = False  # in this slot the last poses were sent again
         self.readings: Sequence[SensorReading] = ()
@@ -120,7 +129,9 @@ class Tick:
             self.sections_ms[section] = 1000.0 * (end - begin)
             begin = end
         self.sections_ms[HANDS] -= 1000.0 * self.waited_s
-        return 1000.0 * (begin - slot.started - self.waited_s)
+        cost_s = begin - slot.started - self.waited_s
+        self._slowest_s = max(cost_s, _FADES * self._slowest_s)
+        return 1000.0 * cost_s
 
     def _look_again(self, slot: Slot) -> None:
         """Wait for the primary sensor's reading where it is late: without it the hand would be a tick old.
@@ -137,7 +148,8 @@ class Tick:
         if slot.started - newest.arrival > HOLD_S:
             return
         before = self._monotonic()
-        until = min(slot.started + self.late_look_s, slot.deadline + self.latest_start_s)
+        late = slot.deadline + self.late_s - self._slowest_s - _SPARE_S
+        until = min(slot.started + self.late_look_s, late)
         self.readings = link.drain_late(newest.sensor, until, self._monotonic)
         self.waited_s = self._monotonic() - before
 

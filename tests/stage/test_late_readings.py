@@ -99,7 +99,7 @@ def test_no_tick_waits_until_its_frame_is_late(parts: StageParts, radio: Radio) 
     tick = made(parts, PATIENT_S)
     radio.socket.send(radio.wearable.reading())
     run(tick, 1)
-    tick.latest_start_s = 0.05
+    tick.late_s = 0.05
     now = time.monotonic()
     tick.run(Slot(2, now, now))
     assert 0.0 < tick.waited_s < PATIENT_S
