@@ -51,7 +51,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     "lights": ("bunraku lights --box box.yaml", "bunraku lights test --fixture wash"),
     "lights test": ("bunraku lights test --show my_show --box box.yaml --fixture wash --attribute dimmer",),
     "lights show": ("bunraku lights show --show my_show --out rig.png",),
-    "lights convert": ("bunraku lights convert fixture.json --out my_show/profiles/fixture.yaml",),
+    "lights convert": (
+        "bunraku lights convert fixture.json --out my_show/profiles/fixture.yaml",
+        "bunraku lights convert rig.mvr --out rig",
+    ),
     "sound": ("bunraku sound --box box.yaml", "bunraku sound out/tonight --file tonight.wav"),
     "emulate": (
         "bunraku emulate --sensor left-wrist --seconds-per-turn 5",

@@ -71,15 +71,27 @@ def show_rig(
 
 @lights.command()
 def convert(
-    fixture: Annotated[Path, typer.Argument(help="A fixture of the Open Fixture Library, as JSON.")],
+    fixture: Annotated[
+        Path, typer.Argument(help="A fixture: Open Fixture Library JSON, or .gdtf. Or a rig: .mvr.")
+    ],
     out: Annotated[
-        Path | None, typer.Option(help="The profile. Default: beside the file, ending with .yaml.")
+        Path | None,
+        typer.Option(
+            help="The profile; for a rig the folder. Default: beside the file, ending with .yaml; for a rig "
+            "without an ending."
+        ),
+    ] = None,
+    mode: Annotated[
+        str | None, typer.Option(help="Only this mode of a fixture. Default: all of them.")
     ] = None,
 ) -> None:
-    """Turn a fixture of the Open Fixture Library into a profile, for the folder `profiles` of a show."""
+    """Turn a fixture (Open Fixture Library, GDTF) into a profile, or a rig (MVR) into profiles and a list.
+
+    Profiles go into the folder `profiles` of a show. GDTF and MVR need `pip install bunraku[gdtf]`.
+    """
     from appliance.fixture_library.convert import convert_file
 
-    convert_file(fixture, out)
+    convert_file(fixture, out, mode)
 
 
 @contextlib.contextmanager

@@ -59,6 +59,8 @@ def meaning_of(key: str, channel: Json, fixture: Json) -> Meaning:
         special["limits"] = list(limits)
     if name in (PAN, TILT):
         special.update(_turning(name, leading, fixture))
+        if leading.get("slew"):  # from GDTF; the Open Fixture Library has no speeds in degrees
+            special["slew"] = float(leading["slew"])
     elif kind == "Intensity" and _is_falling(leading):
         special["invert"] = True
     default = _default(name, channel, capabilities, largest)

@@ -22,14 +22,25 @@ class LibraryError(ValueError):
     """A file that is no fixture of the library; the message says why and what to do."""
 
 
-def profile_values(fixture: Json) -> tuple[dict[str, Any], list[str]]:
-    """A profile as plain values, ready for YAML, and sentences about what was left out."""
+def missing_mode(wanted: str, names: Sequence[str]) -> LibraryError:
+    """The error for a mode that the fixture does not have; it lists the modes."""
+    has = f"It has: {', '.join(names[:20])}." if names else "It has none."
+    return LibraryError(f"There is no mode '{wanted}'. {has}")
+
+
+def profile_values(fixture: Json, wanted: str | None = None) -> tuple[dict[str, Any], list[str]]:
+    """A profile as plain values, of all modes or of the wanted one, and sentences about what was left out.
+
+    Raises LibraryError.
+    """
     if "redirectTo" in fixture:
         raise LibraryError(
             f"This file only says that the fixture is now called {fixture['redirectTo']}. Convert that one."
         )
     try:
-        values, notes = _Conversion(fixture).result()
+        values, notes = _Conversion(fixture if wanted is None else _of_mode(fixture, wanted)).result()
+    except LibraryError:
+        raise
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         raise LibraryError(
             f"This is not a fixture of the Open Fixture Library ({type(error).__name__}: {error}). "
@@ -53,9 +64,7 @@ class _Conversion:
         self._meanings = {key: meaning_of(key, channel, fixture) for key, channel in self._channels.items()}
 
     def result(self) -> tuple[dict[str, Any], list[str]]:
-        modes = {
-            str(mode.get("shortName") or mode["name"]): self._keys(mode) for mode in self._fixture["modes"]
-        }
+        modes = {_mode_name(mode): self._keys(mode) for mode in self._fixture["modes"]}
         names = self._names(list(modes.values()))
         listed, used = [], {}
         for mode, keys in modes.items():
@@ -132,6 +141,18 @@ class _Conversion:
     def _note(self, sentence: str) -> None:
         if sentence not in self._notes:
             self._notes.append(sentence)
+
+
+def _mode_name(mode: Json) -> str:
+    return str(mode.get("shortName") or mode["name"])
+
+
+def _of_mode(fixture: Json, wanted: str) -> Json:
+    """The fixture with this mode only."""
+    found = [mode for mode in fixture["modes"] if wanted in (_mode_name(mode), mode["name"])]
+    if not found:
+        raise missing_mode(wanted, [_mode_name(mode) for mode in fixture["modes"]])
+    return {**fixture, "modes": found[:1]}
 
 
 def _joined(groups: Sequence[Sequence[str]]) -> list[set[str]]:
