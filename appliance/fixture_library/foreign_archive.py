@@ -24,7 +24,7 @@ _FAULTS = (
 
 
 def archive_of(stream: BinaryIO) -> zipfile.ZipFile:
-    """The archive in a stream. Raises LibraryError for anything that is none, or that is out of bounds."""
+    """The archive in a stream. Raises LibraryError for any other file and for one out of bounds."""
     try:
         _require_small_directory(stream)
         archive = zipfile.ZipFile(stream)

@@ -19,7 +19,7 @@ from appliance.fixture_library.gdtf_attributes import (
 from appliance.fixture_library.gdtf_file import FAULTS, fixture_type, not_a_fixture
 from appliance.fixture_library.open_fixture_library import LibraryError
 
-_LONGEST_NAME = 64  # of a mode in a profile
+_LONGEST_NAME = 64  # a mode's name in a profile
 
 
 def profile_values(stream: BinaryIO, wanted: str | None = None) -> tuple[dict[str, Any], list[str]]:
@@ -116,7 +116,7 @@ class _Mode:
         size = len(channel.offset)
         functions = self._active(key, channel)
         starts = [scaled(function.dmx_from, size) for function in functions]
-        ends = [after - 1 for after in starts[1:]] + [256**size - 1]
+        ends = [after - 1 for after in [*starts, 256**size][1:]]
         capabilities: list[Json] = []
         for function, first, last in zip(functions, starts, ends, strict=True):
             attribute = str(function.attribute)
@@ -124,6 +124,7 @@ class _Mode:
                 self._note_turning(attribute, channel, function)
             if first <= last:
                 capabilities += capabilities_of(attribute, function, first, last, size)
+        capabilities = capabilities or [{"type": "NoFunction"}]
         found: Json = {"capabilities": capabilities, "defaultValue": scaled(channel.default, size)}
         if size > 1:
             found["fineChannelAliases"] = [f"{key} byte {place}" for place in range(2, size + 1)]

@@ -12,7 +12,7 @@ from typing import Any
 Json = dict[str, Any]
 
 NO_FEATURE = "NoFeature"
-_MOST_DEGREES, _FASTEST = 1440.0, 2000.0  # of a profile; degrees, and degrees a second
+_MOST_DEGREES, _FASTEST = 1440.0, 2000.0  # what a profile takes: degrees, degrees a second
 _KINDS = {
     "Dimmer": "Intensity",
     "Pan": "Pan",
@@ -138,7 +138,7 @@ def _shutter(name: str, function: Any, first: int, last: int, size: int) -> Sequ
     sets = sorted(function.channel_sets, key=lambda one: scaled(one.dmx_from, size))
     starts = [max(scaled(one.dmx_from, size), first) for one in sets]
     found = []
-    for one, start, after in zip(sets, starts, [*starts[1:], last + 1], strict=True):
+    for one, start, after in zip(sets, starts, [*starts, last + 1][1:], strict=True):
         said = str(one.name or "").casefold()
         ends = {one.physical_from.value, one.physical_to.value}
         effect = "Open" if "open" in said or ends == {1.0} else "Closed"

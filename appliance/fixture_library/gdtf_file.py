@@ -11,7 +11,7 @@ from appliance.fixture_library.foreign_archive import LARGEST_XML, archive_of, m
 from appliance.fixture_library.open_fixture_library import LibraryError, missing_mode
 
 MISSING = "GDTF and MVR need two more libraries: pip install 'bunraku[gdtf]'."
-FAULTS = (  # of the libraries, on files that are not as the standard says
+FAULTS = (  # raised by the libraries for files that break the standard
     *(KeyError, TypeError, AttributeError, IndexError, ValueError, AssertionError),
     *(RecursionError, OverflowError, ZeroDivisionError),
 )

@@ -163,7 +163,8 @@ def _below(parent: Any, outer: Placed, notes: list[str]) -> Iterator[tuple[Any, 
     try:
         where = placed(outer, parent.matrix.matrix)
     except (ValueError, TypeError) as error:
-        notes.append(f"'{parent.name}' is left out: {error}.")
+        if type(parent).__name__ == "Fixture" or parent.child_list is not None:
+            notes.append(f"'{parent.name or type(parent).__name__}' is left out: {error}.")
         return
     if type(parent).__name__ == "Fixture":
         yield parent, where

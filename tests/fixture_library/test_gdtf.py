@@ -58,6 +58,14 @@ def test_a_head_that_pans_the_other_way_is_inverted(tmp_path: Path, bunraku: Com
     assert profile.attribute("pan").invert and profile.attribute("tilt").invert
 
 
+def test_a_shutter_without_named_parts_is_taken_as_open(tmp_path: Path, bunraku: Command) -> None:
+    functions = function("Shutter1") + function("Shutter1Strobe", (1, 20), "100/1")
+    inside = channel("1", "Beam", functions, "Shutter1")
+    mode = f'<DMXMode Name="m" Geometry="Base"><DMXChannels>{inside}</DMXChannels></DMXMode>'
+    profile, _ = converted(fixture(mode), tmp_path, bunraku)
+    assert 0 < (profile.attribute("shutter").default or 0) * 255 < 100
+
+
 def test_a_range_that_is_not_even_about_zero_is_reported(tmp_path: Path, bunraku: Command) -> None:
     _, said = converted(moving_head(tilt=(-90, 130)), tmp_path, bunraku)
     assert "Tilt is 20 degrees in the middle of its range" in said
