@@ -5,8 +5,8 @@ objects (`-fcallgraph-info=su`).
 
 The stack is the deepest path of calls from the entry point, each function with its frame. A call through a
 pointer may reach every function without a direct caller, but not a method of the class that makes the call: a
-driver's bus is not the driver. Functions of the C library count as LIBRARY_STACK bytes; the ports' own code is
-outside, and so are parts removed by the linker.
+driver's bus is not the driver. Functions of the C library count as LIBRARY_STACK bytes; the code of the ports
+is outside, and so are parts removed by the linker.
 """
 
 from __future__ import annotations
