@@ -55,6 +55,7 @@ def test_the_box_is_known_by_what_runs_and_not_by_where_it_lies(
 ) -> None:
     file = tmp_path / program
     file.parent.mkdir(parents=True)
+    (file.parent / "__init__.py").touch()  # a package of this name, before any that is installed
     file.write_text(LISTENS)
     here = [word if word != program else str(file) for word in command]
     with subprocess.Popen(

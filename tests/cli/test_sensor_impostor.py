@@ -39,7 +39,7 @@ ESCAPES = "\x1b]0;mine\x07\x1b[2J\x9b31m"
 
 def test_an_impostor_cannot_control_the_terminal(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
-    line = ("name", "1", *(ESCAPES,) * 2, 50.0, 0.0, 0.0, 0.0, 9, 0, 0, *(ESCAPES,) * 4)
+    line = ("name", "1", *(ESCAPES,) * 2, 50.0, 0.0, 0.0, 0.0, 9, 0, 0, *(ESCAPES,) * 4, 0.0, -1.0)
     listed: list[Message] = [("/sensors/sensor", *line), ("/sensors/end", 1, 0.1, ESCAPES)]
     out, _ = bunraku("sensors", "--box", str(Impostor(tmp_path, listed).box_file))
     assert "mine" in out
@@ -54,10 +54,10 @@ def test_an_impostor_cannot_control_the_terminal(tmp_path: Path, bunraku: Comman
     [
         [("/sensors/end", 0, "x", 7)],
         [("/sensors/end", "0", 0.1, "")],
-        [("/sensors/sensor", *range(15)), ("/sensors/end", 1, 0.1, "")],
-        [("/sensors/sensor", *"abcdefghijklmno"), ("/sensors/end", 1, 0.1, "")],
+        [("/sensors/sensor", *range(17)), ("/sensors/end", 1, 0.1, "")],
+        [("/sensors/sensor", *"abcdefghijklmnopq"), ("/sensors/end", 1, 0.1, "")],
         [
-            ("/sensors/sensor", *"abcd", float("nan"), float("inf"), 0.0, 0.0, 1, 1, 1, *"lmno"),
+            ("/sensors/sensor", *"abcd", float("nan"), float("inf"), 0.0, 0.0, 1, 1, 1, *"lmno", 0.0, -1.0),
             ("/sensors/end", 1, 0.1, ""),
         ],
     ],

@@ -157,7 +157,7 @@ def test_one_phone_is_a_sensor_and_another_takes_its_place_only_when_asked(
     assert held(stage) == 1.0, "a used code took the joint away"
     second = Phone(other, invited(page, OTHER))
     second.begin()
-    wait_until(lambda: held(stage, OTHERS_JOINT) == held(stage) == 1.0)
+    wait_until(lambda: min(held(stage, OTHERS_JOINT), held(stage)) > 0.0)  # both at once
     second.tab.close()
     stranger.tab.fill("#phone-pin", page.pin)
     stranger.begin()
@@ -260,9 +260,15 @@ def test_ten_thousand_readings_at_once_are_counted_and_the_hand_stays(
     tab.goto(stage[1].origin)
     unlock(tab, stage[1])
     session = tab.evaluate(FLOOD, NAME)
-    wait_until(lambda: stage[1].get("/api/phones").value[0]["counts"].get("too_fast", 0) > 5000)
-    answer = stage[1].post("/api/phones/reading", {"session": session, "t": 20000, "turned": [0, 90, 0]})
-    assert answer.status == 200, "one flood ended the session"
+    answers: list[int] = []
+
+    def is_counted() -> bool:
+        reading = {"session": session, "t": 20000 + len(answers), "turned": [0, 90, 0]}
+        answers.append(stage[1].post("/api/phones/reading", reading).status)
+        return bool(stage[1].get("/api/phones").value[0]["counts"].get("too_fast", 0) > 5000)
+
+    wait_until(is_counted)
+    assert set(answers) == {200}, "one flood ended the session"
 
 
 def test_a_phone_needs_the_pin_or_its_code(stage: Stage) -> None:

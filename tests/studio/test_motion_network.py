@@ -54,7 +54,7 @@ def test_the_file_encodes_and_decodes_as_it_was_trained(tmp_path: Path, window: 
 
 
 def test_a_network_that_the_box_does_not_take_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(StudioError, match="mlp alone"):
+    with pytest.raises(StudioError, match="only networks of the kind mlp"):
         write_motion_network(untrained("lstm", 32), NAMES, tmp_path / "model.onnx")
 
 

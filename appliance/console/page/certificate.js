@@ -61,7 +61,7 @@ function facts(proof) {
 }
 
 function latency(context, proof, y) {
-  drawPlots(context, { x: MARGIN, y, width: WIDTH - 2 * MARGIN, height: 560 },
+  drawPlots(context, { x: MARGIN, y, width: WIDTH - 2 * MARGIN, height: 530 },
     { at: proof.at_s, ms: proof.transport_ms, settling: proof.settling_s, seconds: proof.seconds }, PAPER, 22);
   y += 570;
   context.textAlign = "left";
