@@ -61,9 +61,9 @@ function facts(proof) {
 }
 
 function latency(context, proof, y) {
-  drawPlots(context, { x: MARGIN, y, width: WIDTH - 2 * MARGIN, height: 530 },
+  drawPlots(context, { x: MARGIN, y, width: WIDTH - 2 * MARGIN, height: 500 },
     { at: proof.at_s, ms: proof.transport_ms, settling: proof.settling_s, seconds: proof.seconds }, PAPER, 22);
-  y += 570;
+  y += 540;
   context.textAlign = "left";
   const { transport_ms: way, response_ms: response } = proof.figures;
   const figures = Object.entries(way).map(([name, value]) => `${name} ${value === null ? "–" : number(value, 2)} ms`).join("   ");
