@@ -15,6 +15,7 @@ from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.stage_frame import in_stage_frame
 from appliance.pose.t_pose import t_pose
+from appliance.show_control.figure_pose import FigurePose
 from appliance.show_control.vmc_input import BONE, VmcInput
 from tests.outputs.test_vmc import MIRROR, matrix, sent
 from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of, skeleton_of
@@ -51,7 +52,8 @@ def posed_avatar(messages: dict[str, list[float]]) -> dict[str, NDArray[np.float
 
 def returned(skeleton: Skeleton, messages: dict[str, list[float]]) -> NDArray[np.float32]:
     """The pose (J, 4) that another box takes from these messages."""
-    heard, bones = VmcInput(skeleton), {name: m for name, m in messages.items() if "/" not in name}
+    heard = VmcInput(FigurePose(skeleton))
+    bones = {name: m for name, m in messages.items() if "/" not in name}
     for _ in range(2):  # of the first frame nobody knows where it ends
         for name, numbers in bones.items():
             found = heard.hear(BONE, [name, *numbers])
