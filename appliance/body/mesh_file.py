@@ -45,7 +45,7 @@ def mesh_of_show(skeleton: Skeleton, folder: Path | None) -> BodyMesh:
 
 
 def read_mesh(folder: Path, skeleton: Skeleton) -> BodyMesh | None:
-    """The surface in a show's folder; None if there is none, or none of this skeleton. Never raises."""
+    """The surface in a show's folder; None without one for this skeleton. Never raises."""
     try:
         require_inside(folder / MESH_FILE, folder)
         data = content(folder / MESH_FILE, LARGEST_BYTES)

@@ -18,7 +18,7 @@ MOST = 64
 LONGEST_MESSAGE = 64  # bytes; what a browser says here is whether it wants frames
 _SEND_BUFFER = 16384  # bytes in the kernel: frames that wait there are old when a slow browser gets them
 _QUIET_S = 10.0  # a browser that answers no ping for this long is gone
-_POLLED_S = 1.0  # frames are read for so long after a browser asked for one
+_POLLED_S = 1.0  # after a browser asked for a frame, frames are read for this time
 _FEW = 8  # browsers that get each frame; with more of them each gets every second one
 
 

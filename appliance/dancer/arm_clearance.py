@@ -10,8 +10,9 @@ from appliance.dancer import two_bones
 from appliance.dancer.forward_kinematics import Figure
 from appliance.dancer.slerp import FloatArray
 from appliance.dancer.trunk import Arm, Trunk
-from appliance.dancer.two_bones import Quaternion, Vector
+from appliance.pose import turns
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.turns import Quaternion, Vector
 
 # Measured on salsa_29 at 10/9, share of the ticks with an upper arm deep in the trunk: 3.5 % -> 0 with the
 # hand of salsa_24 on the left upper arm; 26 % -> 0.2 and 6.5 % with one that turns about z once in 5 s and
@@ -60,8 +61,8 @@ class ArmClearance:
         skull = two_bones.add(places[head], two_bones.rotate(turned, self._trunk.skull))
         trunk.append(_bone(places[head], skull))
         left, right = (places[arm.shoulder] for arm in self._trunk.arms)
-        up = two_bones.subtract(places[self._trunk.spine[0]], places[self._trunk.spine[-1]])
-        ahead = two_bones.cross(two_bones.subtract(left, right), up)
+        up = turns.minus(places[self._trunk.spine[0]], places[self._trunk.spine[-1]])
+        ahead = turns.cross(turns.minus(left, right), up)
         front = two_bones.scale(ahead, 1 / max(two_bones.norm(ahead), 1e-9))
         around = trunk, front
         are_turned = [self._clear(*one, pose, figure, places, around) for one in enumerate(self._trunk.arms)]
@@ -84,7 +85,7 @@ class ArmClearance:
         shoulder, elbow, wrist = places[arm.shoulder], places[arm.elbow], places[arm.wrist]
         turn = self._correction(2 * number, shoulder, elbow, UPPER_ARM, around)
         if turn is not None:
-            bone, below = two_bones.subtract(elbow, shoulder), two_bones.subtract(wrist, elbow)
+            bone, below = turns.minus(elbow, shoulder), turns.minus(wrist, elbow)
             elbow = two_bones.add(shoulder, two_bones.rotate(turn, bone))
             wrist = two_bones.add(elbow, two_bones.rotate(turn, below))
         bend = self._correction(2 * number + 1, elbow, wrist, FOREARM, around)
@@ -95,11 +96,11 @@ class ArmClearance:
             for joint in (arm.above, arm.shoulder, arm.elbow)
         )
         if turn is not None:
-            upper, lower = two_bones.multiply(turn, upper), two_bones.multiply(turn, lower)
-            pose[arm.shoulder] = two_bones.multiply(two_bones.inverse(above), upper)
+            upper, lower = turns.multiplied(turn, upper), turns.multiplied(turn, lower)
+            pose[arm.shoulder] = turns.multiplied(turns.inverse(above), upper)
         if bend is not None:
-            lower = two_bones.multiply(bend, lower)
-            pose[arm.elbow] = two_bones.multiply(two_bones.inverse(upper), lower)
+            lower = turns.multiplied(bend, lower)
+            pose[arm.elbow] = turns.multiplied(turns.inverse(upper), lower)
         return True
 
     def _correction(
@@ -109,7 +110,7 @@ class ArmClearance:
         wanted = self._way_out(bone, pivot, end, shares, around)
         if wanted is _NO_TURN and self._turns[bone] is _NO_TURN:
             return None
-        step = two_bones.scale(two_bones.subtract(wanted, self._turns[bone]), FOLLOW)
+        step = two_bones.scale(turns.minus(wanted, self._turns[bone]), FOLLOW)
         length = two_bones.norm(step)
         if length > MOST_RADIANS:
             step = two_bones.scale(step, MOST_RADIANS / length)
@@ -129,7 +130,7 @@ class ArmClearance:
         radius_m, before = cast(Trunk, self._trunk).radius_m, self._ways[bone]
         trunk, front = around
         turn: Quaternion = (1.0, 0.0, 0.0, 0.0)
-        along, self._ways[bone] = two_bones.subtract(end, pivot), None
+        along, self._ways[bone] = turns.minus(end, pivot), None
         for _ in range(_ROUNDS):  # the way out is straight, and the bone turns: once is not enough
             points = [two_bones.add(pivot, two_bones.scale(along, share)) for share in shares]
             distance, away, deepest = min((*_from_trunk(point, trunk), point) for point in points)
@@ -141,12 +142,12 @@ class ArmClearance:
             away = two_bones.add(away, two_bones.scale(front, FRONT * radius_m))
             if before is not None:
                 away = two_bones.add(away, two_bones.scale(before, MEMORY * radius_m))
-            across = two_bones.dot(away, along) / max(two_bones.dot(along, along), 1e-9)
-            away = two_bones.subtract(away, two_bones.scale(along, across))
+            across = turns.dot(away, along) / max(turns.dot(along, along), 1e-9)
+            away = turns.minus(away, two_bones.scale(along, across))
             before = self._ways[bone] = two_bones.scale(away, 1 / max(two_bones.norm(away), 1e-9))
-            lever = two_bones.subtract(deepest, pivot)
+            lever = turns.minus(deepest, pivot)
             more = two_bones.between(lever, two_bones.add(lever, two_bones.scale(before, missing)))
-            turn, along = two_bones.multiply(more, turn), two_bones.rotate(more, along)
+            turn, along = turns.multiplied(more, turn), two_bones.rotate(more, along)
         w, *axis = turn
         sine = math.sqrt(max(0.0, 1.0 - w * w))
         return two_bones.scale(two_bones.vector(axis), 2 * math.atan2(sine, w) / sine if sine > 1e-9 else 0.0)
@@ -169,5 +170,5 @@ def _from_trunk(point: Vector, trunk: list[_Bone]) -> tuple[float, Vector]:
 
 
 def _bone(start: Vector, end: Vector) -> _Bone:
-    along = two_bones.subtract(end, start)
-    return start, along, max(two_bones.dot(along, along), 1e-12)
+    along = turns.minus(end, start)
+    return start, along, max(turns.dot(along, along), 1e-12)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from appliance.dancer import two_bones
 from appliance.dancer.forward_kinematics import Figure, soles_of
 from appliance.dancer.slerp import FloatArray
+from appliance.pose import turns
 from appliance.pose.skeleton import Skeleton
 
 # Measured at ten coding and nine interaction iterations (salsa_29 with hands of salsa_24), mean slide of the
@@ -141,22 +142,22 @@ class FootLock:
             two_bones.vector(figure.positions[joint].tolist()) for joint in (leg.thigh, leg.shin, leg.foot)
         )
         target = ankle[0] + leg.x, ankle[1], ankle[2] + leg.z
-        ahead = two_bones.subtract(two_bones.vector(toe), ankle)
+        ahead = turns.minus(two_bones.vector(toe), ankle)
         bent, reached = two_bones.bend(hip, knee, ankle, target, ahead)
         leg.x, leg.z = reached[0] - ankle[0], reached[2] - ankle[2]
         above, thigh, shin, foot = (
             two_bones.quaternion(figure.world[joint].tolist())
             for joint in (leg.hip, leg.thigh, leg.shin, leg.foot)
         )
-        turn = two_bones.between(two_bones.subtract(knee, hip), two_bones.subtract(bent, hip))
-        thigh = two_bones.multiply(turn, thigh)
-        turn = two_bones.between(two_bones.subtract(ankle, knee), two_bones.subtract(reached, bent))
-        shin = two_bones.multiply(turn, shin)
-        pose[leg.thigh] = two_bones.multiply(two_bones.inverse(above), thigh)
-        pose[leg.shin] = two_bones.multiply(two_bones.inverse(thigh), shin)
-        pose[leg.foot] = two_bones.multiply(two_bones.inverse(shin), foot)
+        turn = two_bones.between(turns.minus(knee, hip), turns.minus(bent, hip))
+        thigh = turns.multiplied(turn, thigh)
+        turn = two_bones.between(turns.minus(ankle, knee), turns.minus(reached, bent))
+        shin = turns.multiplied(turn, shin)
+        pose[leg.thigh] = turns.multiplied(turns.inverse(above), thigh)
+        pose[leg.shin] = turns.multiplied(turns.inverse(thigh), shin)
+        pose[leg.foot] = turns.multiplied(turns.inverse(shin), foot)
         figure.world[leg.thigh], figure.world[leg.shin] = thigh, shin
         figure.positions[leg.shin] = bent
-        shift = two_bones.subtract(reached, ankle)
+        shift = turns.minus(reached, ankle)
         figure.positions[leg.below] += shift  # the foot keeps its orientation
         figure.soles[leg.rows.start : leg.rows.stop] += shift

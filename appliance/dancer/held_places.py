@@ -11,10 +11,11 @@ import numpy as np
 from appliance.dancer.puppeteers import Puppeteer
 from appliance.dancer.reach import Reach
 from appliance.dancer.slerp import FloatArray
-from appliance.dancer.two_bones import add, scale, subtract
+from appliance.dancer.two_bones import add, scale
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.turns import minus
 from appliance.show.hand import FARTHEST_M
 
 REACH = 0.95  # share of the stretched chain of bones: at its very end every way on turns the whole body
@@ -114,10 +115,10 @@ class HeldPlace(Puppeteer):
         if not elapsed:
             return
         limits = self._limits
-        way = subtract(self._bounded(self._aim), self._place)
+        way = minus(self._bounded(self._aim), self._place)
         far = math.hypot(*way)
         wanted = scale(way, min(1.0 / max(limits.follow_s, elapsed), limits.m_s / far)) if far > 0.0 else way
-        change = subtract(wanted, self._speed)
+        change = minus(wanted, self._speed)
         most = limits.m_s2 * elapsed
         length = math.hypot(*change)
         if length > most:
@@ -128,7 +129,7 @@ class HeldPlace(Puppeteer):
     def _bounded(self, place: Point) -> Point:
         """Above the floor, and within reach of the root."""
         x, y, z = place
-        way = subtract((x, max(0.0, y), z), self._root)
+        way = minus((x, max(0.0, y), z), self._root)
         far = math.hypot(*way)
         return add(self._root, scale(way, min(1.0, self.reach / far))) if far > 0.0 else self._root
 

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from appliance.dancer.two_bones import Vector, vector
+from appliance.dancer.two_bones import vector
 from appliance.pose import quaternion
 from appliance.pose.roles import UPPER_ARMS
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.turns import Vector
 
 TRUNK_RADIUS = 0.5  # fraction of the distance between the shoulders: 11 cm for the CMU dancers
 SKULL = 0.7  # fraction of that radius: from the head's joint upwards, where the tube ends in a ball

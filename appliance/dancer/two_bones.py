@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+from appliance.pose.turns import Quaternion, Vector, cross, dot, minus
 
 _STRETCH = 0.999  # fraction of the chain's length: a straight leg would have no direction to bend in
 _BEND = 0.02  # fraction of the upper bone's length: weight of the preferred direction for a straight leg
@@ -22,10 +21,10 @@ def bend(root: Vector, middle: Vector, end: Vector, target: Vector, towards: Vec
     (any length). A target out of reach is approached along the line from the present end as far as the
     longer of the chain and its present length allows.
     """
-    upper, lower = subtract(middle, root), subtract(end, middle)
+    upper, lower = minus(middle, root), minus(end, middle)
     long, short = norm(upper), norm(lower)
-    now = subtract(end, root)
-    wanted = _within_reach(now, subtract(target, end), max(_STRETCH * (long + short), norm(now)))
+    now = minus(end, root)
+    wanted = _within_reach(now, minus(target, end), max(_STRETCH * (long + short), norm(now)))
     reach = norm(wanted)
     if reach < 1e-6:
         return middle, end
@@ -34,7 +33,7 @@ def bend(root: Vector, middle: Vector, end: Vector, target: Vector, towards: Vec
     bent = rotate(between(now, wanted), upper)
     pole = add(bent, scale(towards, _BEND * long / max(norm(towards), 1e-9)))
     axis = scale(wanted, 1 / reach)
-    pole = subtract(pole, scale(axis, dot(pole, axis)))
+    pole = minus(pole, scale(axis, dot(pole, axis)))
     pole = scale(pole, high / max(norm(pole), 1e-9))
     knee = add(add(root, scale(axis, along)), pole)
     return knee, add(root, wanted)
@@ -78,41 +77,12 @@ def rotate(q: Quaternion, v: Vector) -> Vector:
     return add(add(v, scale(twice, w)), cross(axis, twice))
 
 
-def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """The product a*b: b's turn first."""
-    w, x, y, z = a
-    r, i, j, k = b
-    return (
-        w * r - x * i - y * j - z * k,
-        w * i + x * r + y * k - z * j,
-        w * j - x * k + y * r + z * i,
-        w * k + x * j - y * i + z * r,
-    )
-
-
-def inverse(q: Quaternion) -> Quaternion:
-    """Rotation angle of a unit quaternion."""
-    return q[0], -q[1], -q[2], -q[3]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 def norm(a: Vector) -> float:
     return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 def add(a: Vector, b: Vector) -> Vector:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def subtract(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def scale(a: Vector, by: float) -> Vector:

@@ -18,10 +18,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from appliance.pose.turns import Quaternion, dot
 from appliance.sensor.heading_habit import HeadingHabit, up_of
 from appliance.sensor.neutral import NeutralPose, turned
-
-Quaternion = tuple[float, float, float, float]
 
 SAMPLE_S = 0.2  # from one look at the newest reading to the next
 MOST_RATE = 5.0 / 60.0  # degrees a second that a correction moves: a sensor drifts by 3 a minute at most
@@ -145,7 +144,7 @@ class HeadingDrift:
     def _hear_lying(self, reading: Quaternion, now: float) -> None:
         """A sensor that lies: the change of its heading is drift."""
         up = _vertical(reading)
-        if self._lies_since == -math.inf or _dot(up, _vertical(self._lies_as)) < _LIES_LIKE:
+        if self._lies_since == -math.inf or dot(up, _vertical(self._lies_as)) < _LIES_LIKE:
             self._lies_since, self._lies_as = now, reading
             return
         lain_s = now - self._lies_since
@@ -161,7 +160,7 @@ class HeadingDrift:
         """A dancer that stands as in the neutral pose, once in each stillness."""
         if still_s < _STANDS_S:
             self._stood = False
-        elif not self._stood and _dot(_vertical(reading), _vertical(pose.orientation)) > _STANDS_LIKE:
+        elif not self._stood and dot(_vertical(reading), _vertical(pose.orientation)) > _STANDS_LIKE:
             self._stood = True
             self._predict(now)
             heading = math.degrees((turned(pose.orientation, reading) or 0.0) - pose.heading)
@@ -292,7 +291,3 @@ def _turn_of(joint: Sequence[float], neutral_inverse: Quaternion) -> tuple[float
     aw, ax, ay, az = joint
     bw, bx, by, bz = neutral_inverse
     return aw * bw - ax * bx - ay * by - az * bz, aw * by - ax * bz + ay * bw + az * bx
-
-
-def _dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

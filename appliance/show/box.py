@@ -136,7 +136,7 @@ class LimitsConfig(Section):
     )
     wait_ms: float = key(
         "How long a tick waits for a reading of the primary sensor that is late; 0: it takes the one before, "
-        "which is a tick old. No tick waits so long that its frame counts as late.",
+        "which is a tick old. The wait ends before the frame would count as late.",
         10.0,
         within=(0, 15),
     )

@@ -23,7 +23,7 @@ _SAY_EVERY_S = 60.0
 
 @dataclass(frozen=True)
 class ForeignPort:
-    """A port as the box file has it: where, who may send, and the sensors that it moves."""
+    """A port of the box file: its address, its permitted senders, and the sensors that it moves."""
 
     host: str
     port: int

@@ -34,7 +34,7 @@ from appliance.show_control.stage_observer import StageObserver
 
 _LONGEST_SLEEP_S = 0.25  # a restarted stage is found within this
 _AT_ONCE = 16  # datagrams; then answers, heartbeat and signals have their turn
-_LIVE_AT_ONCE = 64  # of a live dancer: a frame of most programs
+_LIVE_AT_ONCE = 64  # datagrams of a live dancer: most programs send a frame in fewer
 _LIVE_S = 0.003  # for these; a whole figure takes up to 1 ms
 _SAY_EVERY_S = 60.0
 _REST_S = 0.002  # after as many: a flood leaves the processor to others

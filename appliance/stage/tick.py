@@ -136,7 +136,7 @@ class Tick:
     def _look_again(self, slot: Slot) -> None:
         """Wait for the primary sensor's reading where it is late: without it the hand would be a tick old.
 
-        Only for a sensor that still holds its joint, and never so long that the frame would count as late.
+        Only for a sensor that still holds its joint. The wait ends before the frame would count as late.
         """
         link, newest = self.parts.link, self.parts.newest_primary
         if (
