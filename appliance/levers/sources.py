@@ -39,7 +39,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     GRANULAR: {
         "speed": Parameter("How often a second the dance changes, at most.", 0.4, 0.05, 5),
         "spread": Parameter("How far from the usual: 1 as the dancer is; 0 one pose.", 1.0, 0, 3),
-        "mix": Parameter("How much of the phrase `to`, 0 to 1; with `from` alone.", 0.5, 0, 1),
+        "mix": Parameter("How much of the phrase `to`, 0 to 1; only with `from`.", 0.5, 0, 1),
         "from_start_s": Parameter("Where the excerpt of `from` begins, in seconds.", 0, 0, 3600),
         "to_start_s": Parameter("Where the excerpt of `to` begins, in seconds.", 0, 0, 3600),
         "seconds": Parameter("How long both excerpts are; 0: the whole phrases.", 0, 0, 60),

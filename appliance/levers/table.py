@@ -42,7 +42,7 @@ PHRASE = Lever(
     "/phrase",
     PHRASE_FADE_S,
     cue="phrase",
-    in_cue="What the puppet starts from: `main`, a name under motion.phrases, `live`, `vary`, `granular`, "
+    in_cue="The puppet starts from this: `main`, a name under motion.phrases, `live`, `vary`, `granular`, "
     "`path` or `improvise`. A phrase begins at its start; one that plays already goes on.",
     follower="stage",
     names=("phrases", "phrase"),

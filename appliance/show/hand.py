@@ -74,12 +74,12 @@ class HandConfig(Section):
     from_start: bool = key("Whether it holds from the start; otherwise a cue or `/hold` starts it.", True)
     facing: Axis = key(
         "For sensors: the axis of the sensor (x, y, z; x is the arrow on its case, z comes out "
-        "of its lid) that points to the front while the dancer stands in the neutral pose.",
+        "of its lid) that points to the front in the neutral pose.",
         (1.0, 0.0, 0.0),
     )
     at_neutral: Orientation = key(
-        "For sensors: the joint's orientation, local to its parent, while the "
-        "dancer stands in the neutral pose; [1, 0, 0, 0] is the skeleton's rest pose.",
+        "For sensors: the joint's orientation, local to its parent, in the "
+        "neutral pose; [1, 0, 0, 0] is the skeleton's rest pose.",
         (1.0, 0.0, 0.0, 0.0),
     )
     neutral: Orientation = key(

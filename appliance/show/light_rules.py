@@ -60,7 +60,7 @@ class RuleConfig(Section):
     )
     range: Pair | None = key(
         "The readings that count as 0 and 1. Defaults: speed 0 to 2, height 0 to 2, across and "
-        "depth -2 to 2, turn -180 to 180, lean 0 to 90, qom 0 to 2, weight_effort 0 to 4, "
+        "depth -2 to 2, turn -180 to 180, lean 0 to 90; qom 0 to 2, weight_effort 0 to 4, "
         "time_effort 0 to 20, flow_effort 0 to 1000, space_effort 1 to 4.",
         None,
     )

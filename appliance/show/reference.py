@@ -19,7 +19,7 @@ _INTRODUCTION = """\
 
 <!-- Made by `python -m appliance.show.reference > docs/configuration.md`; edit the models instead. -->
 
-Two YAML files. `show.yaml` belongs to the artist and lies in the show bundle; `box.yaml` belongs to the
+Two YAML files. `show.yaml` belongs to the artist and is part of the show bundle; `box.yaml` belongs to the
 venue and is given with `--box`. Every key may be left out unless it is marked **needed**. An unknown key, a
 word in place of a number or a value out of bounds is refused with file, line, the nearest known key and what
 to do; all faults of a file are listed at once. `bunraku check SHOW --box FILE` tells without dancing.
