@@ -35,7 +35,7 @@ _PROGRAMS = (
     r"(?:process|socket|program|server|box|thread|sensor|stage|projector|page|reader|writer|disk|sender|receiver"
     r"|peer|desk|client|widget|host|unit|command line|companion)(?:e?s)?"
 )
-_SOLID = r"(?:floor|ground|tables?|stage|legs?|foot|feet|one leg|wall|shelf|T-pose|hemisphere)"
+_SOLID = r"(?:floor|ground|tables?|stage|legs?|foot|feet|one leg|wall|shelf|(?:T-|neutral )pose|hemisphere)"
 
 PATTERNS: dict[str, re.Pattern[str]] = {
     "what": re.compile(r"^(?:And |But )?What(?:ever)? (?!if\b)(?!\w+$)[^?]*$"),
@@ -51,7 +51,7 @@ PATTERNS: dict[str, re.Pattern[str]] = {
     "stands": re.compile(
         r"\b(?:stands?|stood|lies|lie) "
         r"(?:in|on|under|at|beside|above|below|there|here|before|behind|between)\b"
-        rf"(?! (?:for|line)\b)(?! (?:the |a |an |its |one |your )?{_SOLID}\b)"
+        rf"(?! (?:for|line)\b)(?! (?:the |a |an |its |one |your )?{_SOLID}\b)(?! \d)"
     ),
     "own": re.compile(r"\bof (?:its|their) own\b(?! accord)"),
     "want": re.compile(r"\bfor (?:the )?want of\b"),
@@ -117,7 +117,8 @@ def sentences(text: str) -> Iterator[str]:
     text = re.sub(r"``?[^`]+``?", "`x`", text)
     text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
     text = re.sub(r"\*\*|__", "", text)
-    for paragraph in re.split(r"\n\s*\n|\n\s*(?:[-*|]|\d+\.) ", text):
+    # a line with columns (a key, spaces, its meaning) is a row of a table
+    for paragraph in re.split(r"\n\s*\n|\n\s*(?:[-*|]|\d+\.) |\n(?=.*\S {2,}\S)", text):
         joined = " ".join(paragraph.split())
         for sentence in re.split(r"(?<=[.!?])[)'\"]* +(?=[A-Z`'(\"*\d])", joined):
             if len(sentence.split()) > 1:

@@ -86,7 +86,7 @@ def draw_lamp(path: Path, shown: dict[str, Trace]) -> Path:
     axes.set_axis_off()
     axes.set_xlim(0, WIDTH)
     axes.set_ylim(height, 0)
-    axes.text(48, 46, "What the lamp says", color=INK, fontsize=20, va="center")
+    axes.text(48, 46, "The lamp's signals", color=INK, fontsize=20, va="center")
     seconds = f"{SHOWN_S:g} seconds, from left to right"
     axes.text(STRIP_X + STRIP, 50, seconds, color=FAINT, fontsize=10, ha="right", va="center")
     y = float(TOP)

@@ -217,7 +217,7 @@ def refuse(error: Exception) -> NoReturn:
 
 
 def plug_ins(found: Iterable[EntryPoint]) -> list[typer.Typer]:
-    """The commands of every plug-in; one that does not load costs its own commands alone."""
+    """The commands of every plug-in. A plug-in that does not load loses only its own commands."""
     loaded = []
     for point in found:
         try:

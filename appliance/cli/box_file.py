@@ -105,7 +105,7 @@ def dance_again(chosen: Path, show: str) -> dict[str, Any]:
     """Let a pair that is kept dance from now on, by its id; for JSON. Raises StageError."""
     here = Choice.read(chosen)
     if here is None:
-        raise StageError("What this box chose at power-on cannot be read. Look: bunraku doctor.")
+        raise StageError("The show that this box chose at power-on cannot be read. Run bunraku doctor.")
     places = Places(here.data, chosen.parent)
     with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
         kept = read_choice(places.data)

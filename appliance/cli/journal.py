@@ -119,7 +119,7 @@ def export_journal(
 
 
 def _export_dance(source: Path, to: Path | None, wanted: dict[str, Path | None], puppet: str | None) -> None:
-    """What was danced, as recordings. Raises JournalError, StageError or ExchangeError."""
+    """Export the dance of a journal as recordings. Raises JournalError, StageError or ExchangeError."""
     from appliance.cli.pictures import load_dance
     from appliance.exchange.exchange_error import ExchangeError
     from appliance.exchange.formats import write_recording

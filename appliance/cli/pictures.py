@@ -96,7 +96,7 @@ def filmstrip(
 def load_dance(source: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> RecordedDance:
     """All of a BVH recording, upright and in metres, or of a journal. Raises BvhError or JournalError.
 
-    What had to be guessed about a recording is said on standard error.
+    Prints on standard error what it had to guess about a recording.
     """
     if _is_recording(source):
         recording, guesses = read_upright(source, reading)

@@ -127,7 +127,7 @@ def play_show(
             from appliance.cli.rehearsal import PICTURED_S
 
             picture = draw_dance(load_dance(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
-            speaker.say(f"What was just danced, held joints highlighted: {picture}")
+            speaker.say(f"The dance just now, held joints highlighted: {picture}")
         if rehearse is not None and journal is not None:
             from appliance.cli.rehearsal import rehearsal_picture
 
@@ -258,7 +258,7 @@ def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Comp
     return Companion(
         "The keeper",
         (*BUNRAKU, "keep", *named, *kept),
-        "What is danced meanwhile waits in memory.",
+        "Meanwhile the journal waits in memory.",
         watchdog_s=WATCHDOG_S["keeper"],
     )
 

@@ -51,7 +51,7 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
                 say(words)
             publish(places, outcome, options.late, uptime_s, say)
     except BlockingIOError:
-        say("Another preflight has not ended. What danced before goes on. Plug the stick in again.")
+        say("Another preflight has not ended. The show before goes on. Plug the stick in again.")
     except OSError as error:
         say(
             f"{places.run}: what was chosen cannot be written there ({error.strerror}). The audience "
@@ -74,9 +74,9 @@ def _found(options: Options, places: Places) -> Outcome:
             return Outcome.unpacked(run_with_timeout(STICK_S, lambda: chosen().packed()))
         return chosen()
     except TimedOutError as error:
-        words = f"The stick could not be read ({error}). What danced before goes on. Try another stick."
+        words = f"The stick could not be read ({error}). The show before goes on. Try another stick."
     except Exception as error:
-        words = f"What is new cannot be looked at ({error!r}). What danced before goes on. Copy it again."
+        words = f"The new show cannot be checked ({error!r}). The show before goes on. Copy it again."
     outcome = adopt(places, [], candidate_problems)
     return Outcome(outcome.choice._replace(refused=(words, *outcome.choice.refused)), False, (words,))
 

@@ -8,7 +8,7 @@ _REFUSALS = {
     "no packets of ours": ("length", "magic", "version", "kind"),
     "from sensors without a key": ("device",),
     "forged or damaged": ("tag",),
-    "of an earlier link": ("old_session", "old_hello"),
+    "from an earlier link": ("old_session", "old_hello"),
     "doubled or too late": ("duplicate", "reordered", "old"),
     "without an orientation": ("norm",),
     "damaged on the cable": ("frame_length", "frame_stuffing", "frame_crc"),

@@ -41,10 +41,10 @@ def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
     dance = whole.part(start_s, PICTURED_S)
     marked = ", what a hand holds in colour" if dance.holds is not None and dance.holds.any() else ""
     if trouble is None:
-        return [f"What was just danced, as the projector shows it{marked}: {out}"]
+        return [f"The dance just now, as the projector shows it{marked}: {out}"]
     return [
         f"The projection cannot be rendered here: {trouble}",
-        f"What was just danced{marked}: {draw_dance(dance, out)}",
+        f"The dance just now{marked}: {draw_dance(dance, out)}",
     ]
 
 

@@ -70,7 +70,7 @@ def _of_journal(line: bytes) -> dict[str, Any] | None:
     """An entry of journalctl's; None for one that is no text."""
     try:
         entry = json.loads(line)
-        unit = str(entry.get("UNIT") or entry["_SYSTEMD_UNIT"])  # of what systemd itself says about a unit
+        unit = str(entry.get("UNIT") or entry["_SYSTEMD_UNIT"])  # UNIT: systemd's messages about a unit
         at, words = int(entry["__REALTIME_TIMESTAMP"]) / 1e6, entry["MESSAGE"]
     except (ValueError, KeyError, TypeError):
         return None

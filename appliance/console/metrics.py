@@ -11,7 +11,7 @@ _OF_STATUS = {  # field: name, kind, meaning
     "late": ("late_ticks_total", "counter", "Ticks that left late since the stage started."),
     "skipped": ("skipped_ticks_total", "counter", "Ticks that were left out since the stage started."),
     "coding": ("coding_iterations", "gauge", "Coding iterations in force."),
-    "level": ("level", "gauge", "What picture and lights are multiplied with, 0 to 1."),
+    "level": ("level", "gauge", "Factor on the brightness of picture and lights, 0 to 1."),
     "panic": ("panic", "gauge", "1 while panic is in force."),
     "blackout": ("blackout", "gauge", "1 while a blackout is in force."),
     "refused": ("commands_refused_total", "counter", "Commands that were not carried out."),

@@ -69,7 +69,7 @@ class Prove:
         values = await said(request)
         kind, seconds = values.get("kind"), values.get("seconds", _USUAL_S)
         if kind not in KINDS:
-            raise web.HTTPBadRequest(text=f"What is proven is one of these: {', '.join(KINDS)}.")
+            raise web.HTTPBadRequest(text=f"The box can prove one of these: {', '.join(KINDS)}.")
         if type(seconds) is not int or not SHORTEST_S <= seconds <= LONGEST_S:
             raise web.HTTPBadRequest(text=f"Measure for {SHORTEST_S} to {LONGEST_S} seconds.")
         if self._running() is not None:

@@ -35,7 +35,7 @@ _NOT_FROM_HERE = frozenset((*_QUESTIONS, "/sensors/list", "/ping"))  # answered 
 
 
 class Server:
-    """Routes and what stands behind them. offers: what this box has for browsers and others may not."""
+    """The routes of the page and their handlers. offers: optional parts that this box has for browsers."""
 
     def __init__(
         self,

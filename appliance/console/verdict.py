@@ -29,7 +29,7 @@ def verdict(
     since: float,
     trouble: str,
 ) -> Verdict:
-    """Of what the box tells at this moment; `since`: Unix seconds since when no tick was late."""
+    """The verdict on the box at this moment; `since`: no tick was late after it, Unix seconds."""
     if frames != "fresh":
         return Verdict("fault", "stage_absent" if frames == "absent" else "stage_hung", {})
     if trouble or status is None:

@@ -11,9 +11,9 @@ tick, and after 1, 2, ... 7 more ticks, is
 
 Hann is the papers' (Granular Dance): half of a step 60 ms later. Prompt gives the present pose of the newest
 window the most, and the next ones less by the fourth power of a cosine: half of a step within 20 ms. Measured
-on salsa_29 with hands of salsa_24 on upper arms, head and forearm at 10/9: it keeps 5 % more of the energy
-around the hand (0.87 to 1.06 of the phrase's, against 0.82 to 1.01), at a roughness of 0.87 to 1.07 of the
-phrase's (0.73 to 0.95); the present pose alone would be 1.4 to 1.7 times as rough as the phrase.
+on salsa_29 with hands of salsa_24 on upper arms, head and forearm at 10/9: prompt keeps 0.87 to 1.06 of the
+phrase's energy around the hand (hann 0.82 to 1.01). Its roughness is 0.87 to 1.07 of the phrase's (hann 0.73
+to 0.95); the present pose without any blending would be 1.4 to 1.7 times as rough as the phrase.
 
 A larger hop adds up to hop - 1 ticks of waiting for the next window; prompt then fades each in over them.
 From hop 5 on some poses are seen by one window only, and at hop 8 all of them: no blending is left.

@@ -149,8 +149,8 @@ class Puppet:
 def weights_of_one_pass(weights: FloatArray, interaction_iterations: int) -> FloatArray:
     """By how much (M,) one pass overwrites, so that all of them together overwrite by the weights (M,).
 
-    With the weights themselves nine passes would take a joint three quarters of the way at a weight of 0.1,
-    and a hand that comes or goes would move the whole body in the first or last instant of its fade.
+    With the weights themselves nine passes would take a joint three quarters of the way at a weight of 0.1.
+    A hand that comes or goes would then move the whole body in the first or last instant of its fade.
     """
     passes = np.float32(max(1, interaction_iterations))
     shares: FloatArray = 1 - (1 - weights) ** (1 / passes)

@@ -21,8 +21,8 @@ class Reach(NamedTuple):
     """An ellipsoid around the mean place of a joint: middle (3,) and axes (3, 3), metres, figure's frame.
 
     Outside of it the network has learned nothing. Measured with a fixed place from which a salsa dancer goes
-    away, with a prototype of such a network at 10/9: bounded by the length of the bones alone, the wrist was
-    19 cm off what the network was told, and went up to 16 m/s; within 3 deviations 2 cm and 2.3 m/s.
+    away, with a prototype of such a network at 10/9: bounded only by the length of the bones, the wrist was
+    19 cm off its target and went up to 16 m/s; within 3 deviations 2 cm and 2.3 m/s.
     """
 
     middle: FloatArray

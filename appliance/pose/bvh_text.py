@@ -220,7 +220,7 @@ def _open_joint(lines: _Lines, joints: list[BvhJoint], opened: list[int], key: s
 def _open_block(lines: _Lines, words: list[str]) -> None:
     """The brace that opens a block: at the end of its line or by itself on the next one."""
     if not words[-1].endswith("{") and lines.next("an opening brace") != ["{"]:
-        lines.fail("an opening brace '{' should stand here.")
+        lines.fail("an opening brace '{' is missing here.")
 
 
 def _offset(lines: _Lines, words: list[str]) -> tuple[float, float, float]:
@@ -248,7 +248,7 @@ def _headed(lines: _Lines, heading: str) -> str:
     words = " ".join(lines.next(f"'{heading}'")).replace(":", ": ").split()
     expected = heading.upper().split()
     if [word.upper() for word in words[: len(expected)]] != expected:
-        lines.fail(f"'{heading}' should stand here.")
+        lines.fail(f"'{heading}' is missing here.")
     return " ".join(words[len(expected) :])
 
 

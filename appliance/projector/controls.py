@@ -62,7 +62,7 @@ class Controls:
         x, y = self.alignment.corners[corner]
         done, words = self.place(corner, (x + dx, y + dy))
         x, y = self.alignment.corners[corner]
-        here = f"The {_CORNER_NAMES[corner]} corner lies at ({x:.4f}, {y:.4f})."
+        here = f"The {_CORNER_NAMES[corner]} corner is at ({x:.4f}, {y:.4f})."
         return done, here if done else f"{words} {here}"
 
     def place(self, corner: int, point: Point) -> tuple[bool, str]:
@@ -79,7 +79,7 @@ class Controls:
             return False, refused
         self._set_alignment(replace(self.alignment, corners=corners))
         places = ", ".join(f"({x:.4f}, {y:.4f})" for x, y in corners)
-        return True, f"The picture's corners lie at {places}."
+        return True, f"The picture's corners are at {places}."
 
     def reset(self) -> str:
         """The picture fills the display again."""

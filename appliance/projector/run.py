@@ -131,7 +131,7 @@ class Run:
                 "Put this user into the group input for keys."
             )
         elif self._window.kind != "offscreen":
-            lines.append("Keys work on the picture: h tells which, q ends.")
+            lines.append("Keys work on the picture: h lists them, q ends.")
         return lines
 
     def project(self, stopped: Callable[[], bool], notifier: Notifier | None = None) -> Figures:

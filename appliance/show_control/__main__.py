@@ -20,7 +20,7 @@ def main() -> int:
     except BlockingIOError:
         speaker.say(
             f"Another show control is at work in {settings.folder}. It goes on, and this one does not start. "
-            "Stop it, or give each box a folder of its own: `runtime:` in the box file."
+            "Stop it, or give each box its own folder: `runtime:` in the box file."
         )
         return 1
     except OSError as error:

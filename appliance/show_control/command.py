@@ -51,7 +51,7 @@ def require_read(address: str, arguments: Sequence[object]) -> None:
     """Refuse a message that was not read whole. Raises ValueError with one clear sentence."""
     for one in arguments:
         if isinstance(one, Unread):
-            tag = f"of the OSC type {one.tag}" if one.tag.isalnum() else "that cannot be read"
+            tag = f"with OSC type {one.tag}" if one.tag.isalnum() else "that cannot be read"
             raise ValueError(
                 f"{address} came with an argument {tag}: nothing is changed. Send numbers as i or f, and "
                 "texts as s."

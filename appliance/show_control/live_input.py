@@ -85,7 +85,7 @@ class LiveInput:
                 f"in its order{layouts}; {len(values)} came."
             )
         if not all(map(math.isfinite, values)):
-            raise ValueError(f"{address}: a number is none.")
+            raise ValueError(f"{address}: a value is not a finite number.")
         if address == POSITIONS:
             x, y, z = values[:3]
             if max(abs(x), abs(y), abs(z)) > FARTHEST_M:
@@ -155,8 +155,8 @@ class LiveInput:
         if not self.came(now):
             return "No live dancer is heard: the phrase plays on until its program sends."
         if without := self._without():
-            return f"Of the live dancer {without}: the others stay with the phrase."
-        return f"Of the live dancer {self._came} come."
+            return f"Live dancer: {without}. The other joints stay with the phrase."
+        return f"Live dancer: {self._came} come."
 
     def _without(self) -> str:
         """How many bones come, and which do not; empty: all do."""

@@ -123,7 +123,7 @@ class ControlProcess:
             time.sleep(_REST_S)
 
     def _look_after(self) -> None:
-        """What is due without any datagram."""
+        """Does what is due even if no datagram comes."""
         self._dispatch.exchange(self._monotonic())
         now = self._monotonic()
         self._count(now)

@@ -1,4 +1,4 @@
-"""What show control sees of the stage in the shared frame."""
+"""The stage as show control sees it, in the shared frame."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class StageObserver:
         return self._reader.is_alive(now)
 
     def health(self) -> dict[str, Any]:
-        """What the stage last said about itself; empty before it did."""
+        """The stage's last report about itself; empty before the first."""
         return self._reader.health() or {}
 
     def applied(self) -> tuple[int, str]:
@@ -60,7 +60,7 @@ class StageObserver:
 
     @property
     def facts(self) -> Facts | None:
-        """Of the newest stage, also of one that has ended; None before the first."""
+        """Facts of the newest stage, even if it has ended; None before the first."""
         return self._reader.facts
 
     @property

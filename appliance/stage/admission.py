@@ -63,7 +63,7 @@ class Admission:
         return (
             f"{self.asked_coding} coding iterations{of} do not fit: they cost {self.p99_ms:.1f} ms "
             f"(p99, paced) of a budget of {self.budget_ms:.1f} ms. On stage the dancer runs with "
-            f"{self.coding}, {self.interaction} of them interactive, and follows the phrase more "
+            f"{self.coding}, {self.interaction} of them interactive: it follows the phrase more "
             f"closely.{idle} "
             f"Lower dancer.coding_iterations to {self.most_coding}, choose a faster network, "
             "or raise limits.tick_budget_ms."

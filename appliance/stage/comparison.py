@@ -22,7 +22,7 @@ class Difference:
     """
 
     tick: int
-    at_s: float  # of the run
+    at_s: float  # since the start of the run
     joint: str
     degrees: float
     metres: float

@@ -82,7 +82,7 @@ RECEIVER_GONE = Fallback(
 )
 NOT_REALTIME = Fallback(
     "not-realtime",
-    "The stage has no real-time rights: other programs can hold it up. bunraku doctor tells how.",
+    "The stage has no real-time rights: other programs can hold it up. Run bunraku doctor for the cure.",
 )
 NOT_SHARED = Fallback(
     "frames-not-shared",
@@ -123,7 +123,7 @@ SOURCE_LATE = Fallback(
 )
 POSE_REFUSED = Fallback(
     "pose-refused",
-    "Poses of a live dancer were refused: another number of joints, or rotations that are none. The figure "
+    "Poses of a live dancer were refused: another number of joints, or invalid rotations. The figure "
     "goes on from the last good one, and after half a second from the phrase. Check the skeleton in the "
     "program that sends it.",
 )

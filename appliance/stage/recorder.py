@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 FILE, KIND, FORMAT = "journal", "journal", 1  # in the runtime folder
 RINGS = 3
-FACTS, LOG, KEYFRAMES = range(RINGS)  # of the file
+FACTS, LOG, KEYFRAMES = range(RINGS)  # the rings in the file
 LOG_SLOTS = 4096  # 80 s: how long the disk may hang before the journal loses a tick
 KEYFRAME_TICKS = 500  # from one keyframe to the next
 KEYFRAME_SLOTS = 1 + LOG_SLOTS // KEYFRAME_TICKS
 KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 14, 1 << 9  # and for each joint
-EVENT_BYTES = 1024  # of an entry
+EVENT_BYTES = 1024  # in one entry
 LONGEST_EVENT = 8 * EVENT_BYTES  # the recipe of an improvisation with its prompt has half of that
 ENTRY = struct.Struct("<Q")  # kind of an entry of the log; then the tick's record, or the event as JSON
 

@@ -213,4 +213,4 @@ class _RecordedLink(SensorLink):
 
 
 def _nobody(words: str) -> None:
-    """A replay tells what was said then from the events."""
+    """A replay takes the messages of that night from the events."""

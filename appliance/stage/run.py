@@ -151,7 +151,7 @@ class Stage:
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self._now = slot.started
-            # the first tick after a stop alone: a machine that is slow all the time is looked at too
+            # only the first tick after a stop: a machine that is always slow is still reported
             self._comes_from_stop = slot.skipped >= _HUNG_SLOTS and not self._comes_from_stop
             self.tick.run(slot)
             self._note(slot)

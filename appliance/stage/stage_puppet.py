@@ -156,7 +156,7 @@ class StagePuppet:
                 frame.holds,
             )
             is_possible = _is_possible(figure)
-        except (ArithmeticError, ValueError):  # of numbers beyond what a float holds
+        except (ArithmeticError, ValueError):  # numbers beyond the range of a float
             is_possible = False
         if not is_possible:
             self.figures_refused += 1
@@ -184,7 +184,7 @@ class StagePuppet:
             if self.live is None or not self.live.is_chosen:
                 return f"The phrase '{name}' plays already, and goes on." if plays_already else ""
         self.live.choose(name == LIVE, *(fade_s or (self.crossfade_s,)))
-        return ""  # whether it is heard is news of its own
+        return ""  # whether it is heard is reported separately
 
     def play_made(self, recipe: str, fade_s: float) -> None:
         """Go over to what the generator made. Raises ValueError, and the phrase plays on."""

@@ -133,7 +133,7 @@ def table(soak: Soak) -> list[str]:
         else "The stage's own count did not come.",
         machine["complaint"]
         or f"cyclictest, same priority and period, woke late by {_percentiles(machine['latency_ms'])}.",
-        f"Of its {machine['slots']} wake-ups {machine['late']} came after {machine['late_after_ms']:g} ms, "
+        f"{machine['late']} of its {machine['slots']} wake-ups came after {machine['late_after_ms']:g} ms, "
         "or not in their slot: a tick of the usual cost begun then would have left late.",
         f"{figures['spoilt_in_seconds_in_which_cyclictest_woke_late']} of the box's late and missing ticks "
         "fell into a second in which cyclictest, too, woke late by 10 ms or more, or into the one beside it.",

@@ -158,7 +158,7 @@ def test_the_profiles_that_come_along_are_sound(name: str) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("channels: [pan, pan]", "'pan' stands on channels 1 and 2"),
+        ("channels: [pan, pan]", "'pan' is on channels 1 and 2"),
         ("channels: [tilt, pan fine]", "'pan fine' has no coarse channel 'pan'"),
         ("channels: [pan]\n    chanels: 1", "Did you mean 'channels'?"),
         ("channels: [pan]\nattributes:\n  - {name: pna}", "Did you mean 'pan'?"),

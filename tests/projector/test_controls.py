@@ -113,7 +113,7 @@ def test_commands_can_do_what_keys_can() -> None:
 
 def test_a_nudge_says_where_the_corner_is_now(controls: Controls, kept: list[Alignment]) -> None:
     done, words = controls.carry_out(Order("nudge", (2, -0.125, 0.25)))
-    assert (done, words) == (True, "The top right corner lies at (0.8750, 0.2500).")
+    assert (done, words) == (True, "The top right corner is at (0.8750, 0.2500).")
     assert controls.carry_out(Order("nudge", (2, 0.0625, 0.0)))[1].endswith("(0.9375, 0.2500).")
     assert kept[-1].corners[1] == (0.9375, 0.25)
     done, words = controls.carry_out(Order("nudge", (2, -1, 1)))

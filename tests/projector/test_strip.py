@@ -101,7 +101,7 @@ def test_a_rehearsal_ends_with_a_rendered_picture(tmp_path: Path) -> None:
     show = load_show(write_show(tmp_path / "show"))
     out = tmp_path / "dance.png"
     (said,) = rehearsal_picture(write_journal(tmp_path / "run.journal"), out, show)
-    assert said == f"What was just danced, as the projector shows it: {out}"
+    assert said == f"The dance just now, as the projector shows it: {out}"
     assert Image.open(out).size == (COLUMNS * WIDTH, ROWS * HEIGHT)
 
 

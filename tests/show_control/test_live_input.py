@@ -62,7 +62,7 @@ def test_poses_of_another_program_reach_the_stage(
         (POSE[:-1], f"{len(POSE) - 1} came"),
         ([*POSE, 1.0], f"{len(POSE) + 1} came"),
         (["one", *POSE[1:]], f"{len(POSE) - 1} came"),
-        ([math.nan, *POSE[1:]], "a number is none"),
+        ([math.nan, *POSE[1:]], "a value is not a finite number"),
         ([], "0 came"),
     ],
 )

@@ -185,7 +185,7 @@ def test_an_argument_that_cannot_be_read_is_marked_and_panic_is_panic_whatever_i
 @pytest.mark.parametrize("tag", "cbrmtX")
 def test_a_command_that_was_not_read_whole_is_refused_by_its_type(address: str, tag: str) -> None:
     [(address, arguments)] = messages_in(osc_string(address) + osc_string(f",{tag}") + bytes(8))
-    with pytest.raises(ValueError, match=f"^{address} came with an argument of the OSC type {tag}: nothing"):
+    with pytest.raises(ValueError, match=f"^{address} came with an argument with OSC type {tag}: nothing"):
         command(address, arguments)
 
 

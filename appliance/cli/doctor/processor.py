@@ -73,7 +73,7 @@ def wakeup_latency(seen: Sample) -> Iterator[Finding]:
     """How late a thread like the stage's wakes: no software can be more punctual than that."""
     what, late = "wake-ups", seen.late_ms
     worst = late[-1]
-    words = f"Of {len(late)} in a second the latest came {worst:.1f} ms after its time."
+    words = f"The latest of {len(late)} in a second came {worst:.1f} ms after its time."
     very_late = sum(one > VERY_LATE_MS for one in late)
     cure = (
         "Look at what else runs here (below), at power saving in the firmware, at a virtual "
@@ -121,7 +121,7 @@ def interrupts(seen: Sample) -> Iterator[Finding]:
         yield better(
             "virtual machine",
             f"Its host gives {100 * seen.stolen:.0f} % of a core to others. Frames come late meanwhile.",
-            "A show belongs on a machine of its own.",
+            "Run a show on a machine that does nothing else.",
         )
 
 

@@ -139,8 +139,8 @@ def system_partition(host: HostView) -> Iterator[Finding]:
     if root.kind == "overlay" and in_memory(root, mounted):
         yield ok(
             "system",
-            "Its partition is read-only, and what is written over it is in memory: a power cut cannot damage "
-            "it. What lasts is under 'data'.",
+            "Its partition is read-only, and changes to it stay in memory: a power cut cannot damage it. "
+            "Permanent files are under 'data'.",
         )
     elif (
         root.kind == "squashfs"
@@ -205,7 +205,7 @@ def choice(host: HostView) -> Iterator[Finding]:
         "show", f"{_name_of(chosen.first.show)} ({chosen.first.source}), box file {chosen.first.box.name}."
     )
     if chosen.refused:
-        words = "What is new was refused, and the show before dances:\n" + "\n".join(chosen.refused)
+        words = "The new show was refused, and the one before it dances:\n" + "\n".join(chosen.refused)
         yield better("show", words, "Mend it on the stick, and plug it in again.")
     for one in chosen.aside:
         yield better("show", one.words, "Mend it, and bring it again on a stick.")

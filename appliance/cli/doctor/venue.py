@@ -48,7 +48,7 @@ def ports(host: HostView) -> Iterator[Finding]:
                 "End that program, or give the box another port in its box file.",
             )
     if (words := out_of_reach(host.box.sensors)) is not None:
-        yield better("sensors by Wi-Fi", words, "For sensors on cables alone: leave it.")
+        yield better("sensors by Wi-Fi", words, "If all sensors are on cables, leave it as it is.")
 
 
 def _holders(host: HostView, port: int) -> list[tuple[str, bool]]:

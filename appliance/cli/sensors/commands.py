@@ -55,7 +55,7 @@ sensors = command_group("List the sensors as the running box sees them; find, re
 
 
 def provision(
-    name: Annotated[str, typer.Option(help="What shows call it, for instance left-wrist.")],
+    name: Annotated[str, typer.Option(help="Its name in shows, for instance left-wrist.")],
     port: Port = None,
     box: ThisBoxFile = None,
     keys: KeyFile = None,
@@ -104,7 +104,7 @@ def neutral(name: NameOrAll = None, box: ThisBoxFile = None, keys: KeyFile = Non
 
 @sensors.command()
 def heading(name: NameOrAll = None, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
-    """Reset the heading alone: the dancer must face the front."""
+    """Reset only the heading: the dancer must face the front."""
     _send("/sensors/heading", name, box, keys)
 
 

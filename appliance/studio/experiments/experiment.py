@@ -236,7 +236,7 @@ def _report(
 
 
 def _words(joints: Sequence[str], options: ExperimentOptions) -> list[str]:
-    trace = "of the liveliest excerpt, there and back" if options.trace is None else options.trace.name
+    trace = "recorded in the liveliest excerpt, both ways" if options.trace is None else options.trace.name
     return [
         "The experiments of 'Puppeteering an AI' (section 4). Five excerpts of 200 frames at 50 Hz are "
         f"danced with 1 to 10 coding iterations and no hand; then with {' and '.join(joints)} kept at the "
@@ -244,9 +244,9 @@ def _words(joints: Sequence[str], options: ExperimentOptions) -> list[str]:
         "seconds a turn, led by a sensor's trace, and held still. K/J are coding and interaction iterations.",
         "Windows of 8 poses, one a tick, blended by Hann weights as in the paper. The sensor's trace: "
         f"{trace}.",
-        "Beside each network four that know nothing dance the same: copy gives back each window and hears no "
-        "hand, paste gives it back with the held joint in it, mean pulls every joint to the dancer's mean "
-        "pose, untrained has random weights. A claim that one of them passes says nothing of what a network "
+        "Four null networks dance the same as each network: copy returns each window and ignores the hand, "
+        "paste returns it with the held joint in it, mean pulls every joint to the dancer's mean pose, "
+        "untrained has random weights. A claim that one of them passes says nothing of what a network "
         "has learned, except where the claim is that nothing changes: (a), (b). A margin is how many times "
         "over the weakest figure keeps its bound, in more than half of the excerpts: from 1 on it holds.",
     ]

@@ -175,7 +175,7 @@ def verdict(natural: Naturalness) -> str:
         f"{natural.seconds:.1f} s, liveliness {natural.liveliness:.2f}, breadth {likeness.breadth:.2f}, "
         f"coverage {likeness.coverage:.2f}, "
         f"strangeness {likeness.strangeness:.2f}, jerk x{pace.jerk_p99 / recorded.jerk_p99:.2f}, "
-        f"above 8 Hz {100 * pace.trembling:.2f} % (recorded {100 * recorded.trembling:.2f} %), "
+        f"above 8 Hz {100 * pace.trembling:.2f} % (recorded {100 * recorded.trembling:.2f} %); "
         f"longest still {pace.longest_still_s:.1f} s, slide {natural.slide_cm_s:.0f} cm/s "
         f"(recorded {natural.recorded_slide_cm_s:.0f}), path {wide:.1f} x {deep:.1f} m{joined}"
     )
