@@ -69,16 +69,34 @@ def serve(context: typer.Context, box: BoxFile = None, chosen: ChosenFile = None
 def pin(
     box: ThisBoxFile = None,
     new: Annotated[
-        bool, typer.Option("--new", help="Choose another one; every device needs it again.")
+        bool,
+        typer.Option(
+            "--new", help="Choose another one; every device needs it again, and every phone a new code."
+        ),
     ] = False,
 ) -> None:
     """Print the PIN that a device gives once before it may change anything; with HTTPS, the fingerprint."""
     from appliance.console.certificate import FILE, fingerprint
 
     devices = _devices(box)
-    print(devices.change_pin() if new else devices.pin)
+    if new:
+        devices.change_pin()
+        _void_phones(box)
+    print(devices.pin)
     with contextlib.suppress(OSError, ValueError):
         print(f"Certificate, SHA-256: {fingerprint(devices.path.with_name(FILE))}")
+
+
+def _void_phones(box: Path | None) -> None:
+    """Phones joined by the PIN or by a code that someone with the PIN gave: they join anew."""
+    from appliance.console.join_codes import FILE, JoinCodes
+    from appliance.release.installed_box import box_here
+    from appliance.show.box import load_box
+
+    with contextlib.suppress(OSError, StageError):  # no box runs here: its phones are gone with it
+        folder = runtime_of(load_box(box_here(box)))
+        if (folder / FILE).is_file():
+            JoinCodes(folder).void()
 
 
 @console.command("devices")

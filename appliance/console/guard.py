@@ -66,6 +66,10 @@ class Guard:
         """The device that sent it, if it is remembered."""
         return self._devices.known(request.cookies.get(COOKIE, "")[:128])
 
+    def remembers(self, device_id: str) -> bool:
+        """Whether a device with this id is still remembered."""
+        return any(one.id == device_id for one in self._devices.devices)
+
     def require_device(self, request: web.Request) -> Device:
         """Raise 401 for a device that has not given the PIN."""
         device = self.device(request)

@@ -51,6 +51,11 @@ class JoinCodes:
         if found != self._of or not self._path.exists():
             self._write(found)
 
+    def void(self) -> None:
+        """No code and no pass is valid any more; phones join anew."""
+        self._look()
+        self._write({name: _Admission(name) for name in self._of})
+
     def new_code(self, name: str, now: float) -> str:
         """A code for one phone, valid for VALID_S, in place of the sensor's last one. Raises KeyError."""
         self._look()

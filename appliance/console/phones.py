@@ -62,7 +62,7 @@ class _Place:
 
     def __init__(self, name: str, door: Door) -> None:
         self.sensor = ForeignSensor(name, "phone", door)
-        self.session, self.owner = "", ""
+        self.session, self.owner, self.token = "", "", ""
         self.front = UNTURNED
         self.counts: Counter[str] = Counter()
         self._heard = self._clock = self._second = -math.inf
@@ -77,9 +77,13 @@ class _Place:
         """Whether a phone is this sensor, and was heard lately."""
         return bool(self.session) and now - self._heard < AWAY_S
 
-    def give(self, owner: str, front: Vector, now: float) -> str:
-        """Let a phone be it from now on; its session. To the stage that is a sensor that was switched on."""
-        self.session, self.owner, self.front = secrets.token_hex(16), owner, facing_front(front)
+    def give(self, owner: str, token: str, front: Vector, now: float) -> str:
+        """Let a phone be it from now on; its session. To the stage that is a sensor that was switched on.
+
+        owner: a device's id, or "pass" with the pass as token.
+        """
+        self.session, self.owner, self.token = secrets.token_hex(16), owner, token
+        self.front = facing_front(front)
         self._heard, self._clock, self._taps = now, -math.inf, 0.0
         self.sensor.switch_on()
         return self.session
@@ -166,6 +170,8 @@ class Phones:
         while True:
             now = time.monotonic()
             for place in self._places.values():
+                if place.session and not self._is_allowed(place):
+                    place.session = ""  # the PIN was changed, or its device revoked
                 place.turn(now)
             await asyncio.sleep(_TURN_S)
 
@@ -217,8 +223,15 @@ class Phones:
         if owner == "code":
             token, owner = self._use_code(request, place.name, values.get("code"), now), "pass"
         self._know(request)
-        session = place.give(owner, FRONTS[where], now)
-        return web.json_response({"session": session, "pass": token if owner == "pass" else ""})
+        kept = token if owner == "pass" and isinstance(token, str) else ""
+        session = place.give(owner, kept, FRONTS[where], now)
+        return web.json_response({"session": session, "pass": kept})
+
+    def _is_allowed(self, place: _Place) -> bool:
+        """Whether the phone that is this sensor may still be it."""
+        if place.owner == "pass":
+            return self._codes.is_pass(place.name, place.token)
+        return self._guard.remembers(place.owner)
 
     def _use_code(self, request: web.Request, name: str, code: object, now: float) -> str:
         """The pass for a code. Raises 401 without one, 403 for a wrong one, 429 after too many of these."""

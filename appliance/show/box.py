@@ -88,6 +88,21 @@ class SensorsConfig(Section):
         refuse_repeats([one.name for one in foreign], "Two foreign sensors are called '{value}'.", cure)
         return foreign
 
+    @field_validator("foreign")
+    @classmethod
+    def _mocopi_by_itself(cls, foreign: list[ForeignSensorConfig]) -> list[ForeignSensorConfig]:
+        """mocopi's datagrams are not OSC: a port is read as one or the other."""
+        mocopi = {one.usual_port: one.name for one in foreign if one.from_ == "mocopi"}
+        for place, one in enumerate(foreign):
+            if one.program is not None and one.from_ != "mocopi" and one.usual_port in mocopi:
+                raise refusal(
+                    f"Port {one.usual_port} is for mocopi ({mocopi[one.usual_port]}), and {one.name} from "
+                    f"{one.from_} would not be heard there: a port takes mocopi's datagrams or OSC.",
+                    "Give one of them another `port`, also in the program that sends.",
+                    at=place,
+                )
+        return foreign
+
 
 def out_of_reach(sensors: SensorsConfig) -> str | None:
     """Why wearables on Wi-Fi do not reach the box, and what to do; None when they do.

@@ -95,14 +95,14 @@ class Page:
 
 
 @contextlib.contextmanager
-def page_alone(folder: Path, **console: Any) -> Iterator[tuple[Page, Process]]:
-    """`bunraku console` without any stage or show control."""
+def page_alone(
+    folder: Path, sensors: dict[str, Any] | None = None, **console: Any
+) -> Iterator[tuple[Page, Process]]:
+    """`bunraku console` without any stage or show control; sensors: this section of the box file."""
     (port,) = free_ports(1, socket.SOCK_STREAM)
     box_file = folder / "box.yaml"
-    settings = {"port": port, **console}
-    box_file.write_text(
-        yaml.safe_dump({"console": settings, "control": None, "runtime": "runtime", "state": "state"})
-    )
+    whole = {"console": {"port": port, **console}, "control": None, "runtime": "runtime", "state": "state"}
+    box_file.write_text(yaml.safe_dump(whole | ({"sensors": sensors} if sensors else {})))
     with Process(folder / "page.txt", [*BUNRAKU, "console", "--box", box_file]) as process:
         page = Page(port, box_file)
         wait_until(lambda: page.is_open() or process.process.poll() is not None, lambda: process.words)

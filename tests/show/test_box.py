@@ -86,6 +86,11 @@ def test_everything_can_be_said(tmp_path: Path) -> None:
             4,
             ["no sender is listed", "senders: [192.168.0.20]"],
         ),
+        (
+            "sensors:\n foreign:\n - {name: a, from: mocopi, bone: head, port: 9}\n - {name: b, from: gyrosc, port: 9}",
+            4,
+            ["Port 9 is for mocopi (a)", "b from gyrosc would not be heard", "another `port`"],
+        ),
         ("control: null\nsensors: {foreign: [{name: a, from: gyrosc}]}", 2, ["Show control hears gyrosc"]),
         ("sensors: {foreign: [{name: a, from: gyrosc, port: 9002}]}", 1, ["hears commands already"]),
         ("console: null\nsensors: {foreign: [{name: a, from: phone}]}", 2, ["serves no page"]),
