@@ -1,64 +1,29 @@
-"""Head, hands and feet of the figure: what an audience reads from ten metres."""
+"""Hands and feet of the figure: what an audience reads from ten metres."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
-from appliance.body.volumes import Cut, Slab
+from appliance.body.volumes import Ball, Cut, Slab, Step
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
 
 _UP = np.array([0.0, 1.0, 0.0])
 _LEVEL = np.array([1.0, 0.0, 1.0])
-# The head, in heights: places as (to the front, upwards) from its middle, radii, halves to the sides.
-_CRANIUM = ((-0.018, 0.010), (0.012, 0.004), (0.052, 0.049), (0.000, 0.000))
-_JAW = ((0.006, -0.014), (0.032, -0.064), (0.040, 0.018), (0.002, 0.005))
-_RIDGE = ((0.048, 0.014), (0.059, -0.020), (0.006, 0.008), (0.000, 0.000))
-_FACE_AT, _FACE_TURNED = 0.050, 0.42  # the two halves of the face: how far before the middle, how turned
-PALM = 0.3  # share of the fingers that belongs to the palm; with less they are claws
-CLOSED = 0.5  # share of the fingers' spread at rest that is taken away
-THUMB_AWAY = 0.3  # metres aside for each metre from its base: else it is lost beside the palm
-_REACH = 0.115  # from the head joint to the crown, where the skeleton does not say
+FINGER = (0.0052, 0.0040)  # radii at knuckle and tip, in heights
+THUMB = (0.0070, 0.0048)
+FAN = 0.10  # how far fingers spread, metres aside for each metre from the knuckle: else they stick together
+THUMB_AWAY = 0.22
+TIP = 0.004  # the skin goes on beyond the last bone, in heights
+WEB = 0.16  # share of the finger that the palm's skin covers
+_HAND = 0.105  # length of a hand whose fingers the skeleton lacks, in heights
+_FOOT = 0.125
 
 
-def head(anatomy: Anatomy) -> list[Slab | Cut]:
-    """A skull with a jaw and a face of two planes that meet in a ridge; empty without a head."""
-    joint = anatomy.head
-    if joint is None:
-        return []
-    height, side = anatomy.height, anatomy.across
-    up, reach = _head_axis(anatomy, joint)
-    front = np.cross(side, up)
-    front = front if float(front @ anatomy.forward) >= 0 else -front
-    middle = anatomy.positions[joint] + min(max(reach - 0.055 * height, 0.03 * height), 0.062 * height) * up
-
-    def at(forward: float, above: float) -> Array:
-        there: Array = middle + height * (forward * front + above * up)
-        return there
-
-    def part(shape: tuple[tuple[float, float], ...], softness: float) -> Slab:
-        low, high, radii, halves = shape
-        return Slab(
-            joint,
-            at(*low),
-            at(*high),
-            radii[0] * height,
-            radii[1] * height,
-            softness * height,
-            side,
-            halves[0] * height,
-            halves[1] * height,
-        )
-
-    planes: list[Slab | Cut] = []
-    for turned in (-_FACE_TURNED, _FACE_TURNED):
-        normal = front + turned * side + 0.10 * up
-        planes.append(Cut(at(_FACE_AT, 0.0), normal / np.linalg.norm(normal), 0.10 * height, 0.010 * height))
-    return [part(_CRANIUM, 0.0), part(_JAW, 0.022), *planes, part(_RIDGE, 0.008)]
-
-
-def hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
-    """A palm, a thumb that stands off, and two groups of fingers; without fingers a mitten.
+def hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
+    """A palm, a thumb and fingers; where the skeleton has none, those that a relaxed hand has.
 
     Returns what is modelled, and the bones that move it, finger by finger.
     """
@@ -66,98 +31,175 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
     thumb, *fingers = sorted(anatomy.children[joint], key=anatomy.length) or [joint]
     if len(fingers) < 2:
         return _plain_hand(anatomy, joint)
-    knuckles, thumb_at = anatomy.positions[fingers], anatomy.positions[thumb]
-    tips = np.array([_furthest(anatomy, finger, wrist) for finger in fingers])
+    knuckles = anatomy.positions[fingers]
     aside = np.linalg.svd(knuckles - knuckles.mean(axis=0))[2][0]
-    tips -= CLOSED * np.outer((tips - knuckles) @ aside, aside)
-    row = (1 - PALM) * knuckles + PALM * tips
-    if float((_furthest(anatomy, thumb, wrist) - row.mean(axis=0)) @ aside) < 0.0:
+    if float((_furthest(anatomy, thumb, wrist) - knuckles.mean(axis=0)) @ aside) < 0.0:
         aside = -aside
-    thick, half = 0.0115 * height, 0.5 * float(np.ptp(knuckles @ aside))
-    base = wrist + 0.35 * (thumb_at - wrist)
-    steps: list[Slab | Cut] = [
-        Slab(joint, wrist, row.mean(axis=0), 0.0160 * height, thick, 0.0, aside, 0.2 * half, half)
-    ]
-    by_place = np.argsort(row @ aside)
-    for group in (by_place[: len(fingers) // 2], by_place[len(fingers) // 2 :]):
-        start, end = row[group].mean(axis=0), tips[group].mean(axis=0)
-        end = end + 0.012 * height * (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
-        halves = [0.5 * float(np.ptp(places @ aside)) for places in (row[group], tips[group])]
-        steps.append(Slab(joint, start, end, thick, 0.009 * height, 0.0, aside, halves[0], 0.5 * halves[1]))
-    steps.append(Slab(joint, base, thumb_at, 0.014 * height, thick, 0.012 * height, aside))
-    for owner, *ends in anatomy.bones([thumb, *anatomy.below(thumb)]):
-        start, end = (place + THUMB_AWAY * float(np.linalg.norm(place - base)) * aside for place in ends)
-        steps.append(Slab(owner, start, end, thick, 0.0095 * height, 0.006 * height, aside))
-    bones = [(joint, wrist, knuckle) for knuckle in knuckles] + [(joint, base, thumb_at)]
-    bones += anatomy.bones(anatomy.below(joint))
+    steps: list[Step] = []
+    middle = float((knuckles @ aside).mean())
+    half = max(0.5 * float(np.ptp(knuckles @ aside)), 1e-6)
+    bones = [(joint, wrist, knuckle) for knuckle in knuckles]
+    chains: list[tuple[list[tuple[int, Array]], Array]] = []
+    for finger, knuckle in zip(fingers, knuckles, strict=True):
+        fan = FAN * (float(knuckle @ aside) - middle) / half
+        chain = _fanned(anatomy, finger, knuckle, fan * aside)
+        chains.append((chain, knuckle))
+    steps += _palm(joint, wrist, [knuckle for _, knuckle in chains], aside, height)
+    for chain, knuckle in chains:
+        steps += _finger(chain, FINGER, height, aside)
+        web = knuckle + WEB * (chain[-1][1] - knuckle)
+        steps.append(Slab(joint, knuckle, web, 0.0062 * height, 0.0050 * height, 0.006 * height, aside))
+    thumb_at = anatomy.positions[thumb]
+    base = wrist + 0.30 * (thumb_at - wrist)
+    chain = _fanned(anatomy, thumb, base, THUMB_AWAY * aside)
+    steps.append(Slab(joint, base, chain[0][1], 0.0125 * height, 0.0100 * height, 0.014 * height, aside))
+    steps += _finger(chain, THUMB, height, aside)
+    thick = FINGER[0] * height
+    bones += [(joint, base, thumb_at), *anatomy.bones(anatomy.below(joint))]
     return steps, [Slab(*bone, thick, thick, 0.0, aside) for bone in bones]
 
 
-def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
-    """A mitten where the skeleton has no fingers, along the bones that end there."""
+def _palm(joint: int, wrist: Array, knuckles: list[Array], aside: Array, height: float) -> list[Step]:
+    """Wrist and one bone of the hand for each finger, melted into a palm."""
+    steps: list[Step] = []
+    for knuckle in knuckles:
+        start = wrist + 0.35 * float((knuckle - wrist) @ aside) * aside
+        steps.append(Slab(joint, start, knuckle, 0.0115 * height, 0.0072 * height, 0.007 * height, aside))
+    return steps
+
+
+def _fanned(anatomy: Anatomy, finger: int, base: Array, fan: Array) -> list[tuple[int, Array]]:
+    """(joint, where it is) along a finger, then its tip; `fan` (3,): metres aside for each metre."""
+    points: list[tuple[int, Array]] = []
+    for owner, start, end in anatomy.bones([finger, *anatomy.below(finger)]):
+        if not points:
+            points.append((owner, start + fan * float(np.linalg.norm(start - base))))
+        points.append((owner, end + fan * float(np.linalg.norm(end - base))))
+    if not points:
+        points = [(finger, anatomy.positions[finger])] * 2
+    (_, last), (owner, tip) = points[-2:]
+    way = (tip - last) / max(float(np.linalg.norm(tip - last)), 1e-9)
+    points[-1] = (owner, tip + TIP * anatomy.height * way)
+    return points
+
+
+def _finger(
+    chain: list[tuple[int, Array]], radii: tuple[float, float], height: float, aside: Array
+) -> list[Step]:
+    """Its bones, each a little thinner."""
+    widths = height * np.linspace(*radii, len(chain))
+    return [
+        Slab(owner, start, end, float(first), float(last), 0.003 * height, aside)
+        for ((_, start), (owner, end)), (first, last) in zip(pairwise(chain), pairwise(widths), strict=True)
+    ]
+
+
+# Fingers of a relaxed hand, in lengths of the hand: knuckle (along, aside), tip (along, aside, inwards).
+_RELAXED = (
+    ((0.50, 0.20), (0.92, 0.27, 0.10)),
+    ((0.53, 0.07), (1.00, 0.09, 0.13)),
+    ((0.51, -0.06), (0.94, -0.10, 0.15)),
+    ((0.46, -0.18), (0.80, -0.27, 0.15)),
+)
+_RELAXED_THUMB = ((0.12, 0.10, 0.03), (0.34, 0.30, 0.10), (0.58, 0.42, 0.13))
+
+
+def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
+    """A relaxed hand where the skeleton has no fingers, along the bones that end there."""
     height, wrist = anatomy.height, anatomy.positions[joint]
     far = _furthest(anatomy, joint, wrist)
     if float(np.linalg.norm(far - wrist)) < 0.03 * height:
         bone = wrist - anatomy.positions[anatomy.skeleton.parents[joint]]
-        far = wrist + 0.09 * height * bone / max(float(np.linalg.norm(bone)), 1e-9)
-    direction = (far - wrist) / np.linalg.norm(far - wrist)
-    aside = anatomy.forward - direction * float(anatomy.forward @ direction)
+        far = wrist + _HAND * height * bone / max(float(np.linalg.norm(bone)), 1e-9)
+    long = max(float(np.linalg.norm(far - wrist)), 1e-9)
+    ahead = (far - wrist) / long
+    aside = anatomy.forward - ahead * float(anatomy.forward @ ahead)
+    if float(np.linalg.norm(aside)) < 1e-3:
+        aside = np.cross(ahead, anatomy.across)
     aside = aside / max(float(np.linalg.norm(aside)), 1e-9)
-    row = wrist + 0.45 * (far - wrist)
-    wide, thick = 0.016 * height, 0.0125 * height
-    bones = [Slab(*bone, thick, thick, 0.0, aside) for bone in anatomy.bones(anatomy.below(joint))]
-    return [
-        Slab(joint, wrist, row, 0.0165 * height, thick, 0.0, aside, 0.25 * wide, wide),
-        Slab(joint, row, far, thick, 0.0075 * height, 0.0, aside, wide, 0.6 * wide),
-    ], [Slab(joint, wrist, row if bones else far, thick, thick, 0.0, aside), *bones]
+    inwards = np.cross(ahead, aside)
+    inwards = inwards if float(inwards @ _UP) <= 0.0 else -inwards
+
+    def at(along: float, across: float, inside: float = 0.0) -> Array:
+        there: Array = wrist + long * (along * ahead + across * aside + inside * inwards)
+        return there
+
+    bones = [Slab(*bone, 0.01, 0.01, 0.0, aside) for bone in anatomy.bones(anatomy.below(joint))]
+    mover = [Slab(joint, wrist, far, 0.01, 0.01, 0.0, aside), *bones] if bones else []
+    if not anatomy.is_person:
+        wide, half = np.array([0.0165, 0.0125, 0.0075]) * height, 0.016 * height
+        row = wrist + 0.45 * (far - wrist)
+        return [
+            Slab(joint, wrist, row, wide[0], wide[1], 0.0, aside, 0.25 * half, half),
+            Slab(joint, row, far, wide[1], wide[2], 0.0, aside, half, 0.6 * half),
+        ], mover
+    knuckles = [at(*knuckle) for knuckle, _ in _RELAXED]
+    steps = _palm(joint, wrist, knuckles, aside, height)
+    for knuckle, (_, tip) in zip(knuckles, _RELAXED, strict=True):
+        bend = 0.5 * (knuckle + at(*tip)) - 0.02 * long * inwards
+        steps += _finger([(joint, knuckle), (joint, bend), (joint, at(*tip))], FINGER, height, aside)
+        web = knuckle + WEB * (at(*tip) - knuckle)
+        steps.append(Slab(joint, knuckle, web, 0.0062 * height, 0.0050 * height, 0.006 * height, aside))
+    root, middle, tip_at = (at(*place) for place in _RELAXED_THUMB)
+    steps.append(Slab(joint, root, middle, 0.0120 * height, 0.0085 * height, 0.014 * height, aside))
+    steps += _finger([(joint, middle), (joint, tip_at)], THUMB, height, aside)
+    return steps, mover
 
 
-def foot(anatomy: Anatomy, joint: int) -> list[Slab | Cut]:
-    """Heel, instep and toes over a flat sole."""
+def foot(anatomy: Anatomy, joint: int) -> list[Step]:
+    """Heel, arch, instep, ankle bones and five toes over a flat sole."""
     height, ankle = anatomy.height, anatomy.positions[joint]
     toes = _furthest(anatomy, joint, ankle)
     if float(np.linalg.norm((toes - ankle) * _LEVEL)) < 0.02 * height:
         toes = ankle + 0.08 * height * anatomy.forward - 0.026 * height * _UP
     ahead = (toes - ankle) * _LEVEL / np.linalg.norm((toes - ankle) * _LEVEL)
-    aside = np.cross(_UP, ahead)
-    sole = min(float(toes[1]), float(ankle[1]) - 0.020 * height) - 0.008 * height
+    outwards = np.cross(_UP, ahead)
+    if float((ankle - anatomy.positions[anatomy.trunk[0]]) @ outwards) < 0.0:
+        outwards = -outwards
+    sole = min(float(toes[1]), float(ankle[1]) - 0.026 * height) - 0.008 * height
+    mover = next(iter(bone[0] for bone in anatomy.bones(anatomy.children[joint])), joint)
+    long = float(np.linalg.norm((toes - ankle) * _LEVEL))
 
-    def at(place: Array, forward: float, above_sole: float) -> Array:
-        there: Array = place + forward * height * ahead
-        there[1] = sole + above_sole * height
+    def at(forward: float, out: float, above: float) -> Array:
+        """A place before the ankle, beside it, above the sole; in heights."""
+        there: Array = ankle + height * (forward * ahead + out * outwards)
+        there[1] = sole + above * height
         return there
 
-    def part(owner: int, a: Array, b: Array, radii: tuple[float, float], halves: tuple[float, float]) -> Slab:
-        (first, last), (one, other) = np.array([radii, halves]) * height
-        return Slab(owner, a, b, first, last, 0.008 * height, aside, one, other)
+    def part(a: Array, b: Array, radii: tuple[float, float], soft: float, owner: int = joint) -> Slab:
+        first, last = np.array(radii) * height
+        return Slab(owner, a, b, first, last, soft * height, outwards)
 
-    ball, tip = at(ankle + 0.72 * (toes - ankle), 0.0, 0.014), at(toes, 0.012, 0.010)
-    heel = at(ankle, -0.018, 0.020)
-    mover = next(iter(bone[0] for bone in anatomy.bones(anatomy.children[joint])), joint)
-    return [
-        part(joint, ankle, heel, (0.018, 0.020), (0.0, 0.0)),
-        part(joint, ankle + 0.004 * height * ahead, ball, (0.019, 0.014), (0.0, 0.013)),
-        part(joint, heel, 0.5 * (ankle + ball), (0.018, 0.017), (0.002, 0.006)),
-        part(mover, ball, tip, (0.014, 0.009), (0.013, 0.011)),
-        Cut(at(ankle, 0.0, 0.0), -_UP, 0.14 * height, 0.006 * height),
+    ball = 0.70 * long / height
+    shank = float(ankle[1]) - sole
+    high = shank / height
+    steps: list[Step] = [
+        part(ankle, at(-0.016, 0.0, 0.017), (0.0175, 0.0180), 0.010),  # heel
+        part(at(-0.014, 0.0, high), at(-0.022, 0.0, 0.022), (0.0090, 0.0140), 0.012),  # tendon
+        part(ankle, at(ball, -0.012, 0.0125), (0.0185, 0.0125), 0.014),  # instep
+        part(
+            at(-0.012, 0.004, 0.014), at(ball - 0.006, 0.015, 0.0105), (0.0150, 0.0105), 0.014
+        ),  # outer edge
+        part(at(ball - 0.004, -0.016, 0.0120), at(ball - 0.008, 0.017, 0.0100), (0.0120, 0.0100), 0.010),
     ]
+    for sign, above in ((-1.0, 0.006), (1.0, 0.002)):
+        steps.append(
+            Ball(joint, at(0.000, sign * 0.0165, high + above), height * np.array([0.010, 0.011, 0.008]),
+                 np.array([ahead, _UP, outwards]), 0.008 * height)
+        )  # fmt: skip
+    reach = (long / height) - ball + 0.016
+    for out, far, thick in (
+        (-0.0175, 1.00, 0.0085), (-0.0040, 0.98, 0.0064), (0.0050, 0.86, 0.0060),
+        (0.0130, 0.72, 0.0056), (0.0200, 0.54, 0.0054),
+    ):  # fmt: skip
+        start = at(ball - 0.004, 0.9 * out, 0.0100)
+        tip = at(ball + far * reach - thick, out, thick)
+        steps.append(part(start, tip, (1.15 * thick, thick), 0.005, mover))
+    steps.append(Cut(at(0.0, 0.0, 0.0), -_UP, 0.16 * height, 0.006 * height))
+    return steps
 
 
 def _furthest(anatomy: Anatomy, joint: int, place: Array) -> Array:
     """The end of a bone of a joint, or below it, that is furthest from a place; without bones the joint."""
     ends = [bone[2] for bone in anatomy.bones([joint, *anatomy.below(joint)])]
     return max(ends, key=lambda end: float(np.linalg.norm(end - place)), default=anatomy.positions[joint])
-
-
-def _head_axis(anatomy: Anatomy, joint: int) -> tuple[Array, float]:
-    """Unit vector from the head joint to the crown, and how far that is, metres."""
-    place = anatomy.positions[joint]
-    for _, _, end in anatomy.bones([joint]):
-        reach = float(np.linalg.norm(end - place))
-        if reach > 0.04 * anatomy.height and abs(float((end - place) @ anatomy.across)) < 0.2 * reach:
-            return (end - place) / reach, reach
-    parent = anatomy.skeleton.parents[joint]
-    neck = place - anatomy.positions[parent] if parent >= 0 else _UP
-    if float(neck @ _UP) > 0.5 * float(np.linalg.norm(neck)):
-        neck = _UP
-    return neck / max(float(np.linalg.norm(neck)), 1e-9), _REACH * anatomy.height

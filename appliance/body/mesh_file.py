@@ -1,8 +1,8 @@
 """The body's surface as a file of the show bundle: a projector reads it and need not model it at its start.
 
-`body.npz` has what a GPU is given: vertices in 16 bits, normals and weights in 8. Faces come in pairs, as
-`surface_of` makes them, so four corners describe two. The file has a hash of the skeleton and of the model's
-number; a file with another hash is not used.
+`body.npz` has what a GPU is given: vertices in 16 bits, normals and weights in 8. Most faces come in pairs,
+as `surface_of` makes them, so four corners describe two; in single ones the last corner is there twice. The
+file has a hash of the skeleton and of the model's number; a file with another hash is not used.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from appliance.pose.foreign_file import content, require_inside
 from appliance.pose.skeleton import Skeleton
 
 MESH_FILE = "body.npz"
-MODEL = 1  # another number where sculpture, surface or weights change: files of before are made again
+MODEL = 2  # another number where sculpture, surface or weights change: files of before are made again
 LARGEST_BYTES = 4_000_000
 _LARGEST_UNPACKED = 16_000_000
 _DIGITS = 6  # decimals in the key: a skeleton that was written as text has the same
@@ -92,7 +92,7 @@ def _packed(mesh: BodyMesh) -> Arrays:
     low = mesh.vertices.min(axis=0)
     step = np.float32((mesh.vertices.max(axis=0) - low).max() / 65535)
     places = np.round((mesh.vertices - low) / step).astype(np.uint16).T
-    quads = mesh.faces.reshape(-1, 6)[:, [0, 1, 2, 5]].astype(np.int32)
+    quads = _paired(mesh.faces)
     quads[:, 1:] -= quads[:, :1]
     quads[1:, 0] = np.diff(quads[:, 0])
     return {
@@ -107,6 +107,16 @@ def _packed(mesh: BodyMesh) -> Arrays:
         "bind_positions": mesh.bind_positions,
         "bind_world": mesh.bind_world,
     }
+
+
+def _paired(faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(Q, 4) corners of the pairs that faces begin with, then of single ones."""
+    even = faces[: len(faces) // 2 * 2].reshape(-1, 2, 3)
+    is_pair = (even[:, 0, [0, 2]] == even[:, 1, :2]).all(axis=1)
+    pairs = len(is_pair) if is_pair.all() else int(is_pair.argmin())
+    paired = np.concatenate([even[:pairs, 0], even[:pairs, 1, 2:]], axis=1)
+    single = faces[2 * pairs :][:, [0, 1, 2, 2]]
+    return np.concatenate([paired, single]).astype(np.int32)
 
 
 def _bytes(values: NDArray[np.int32]) -> NDArray[np.uint8]:
@@ -128,12 +138,14 @@ def _unpacked(arrays: Arrays, joint_count: int) -> BodyMesh | None:
     quads = _numbers(arrays["quads"]).T.copy()
     quads[:, 0] = np.cumsum(quads[:, 0])
     quads[:, 1:] += quads[:, :1]
+    faces = quads[:, _PAIR].reshape(-1, 3)
+    faces = faces[faces[:, 1] != faces[:, 2]]
     normals = arrays["normals"].T.astype(np.float32) / 127.5 - 1.0
     weights = arrays["weights"].T.astype(np.float32) / 255.0
     mesh = BodyMesh(
         vertices,
         np.ascontiguousarray(normals, np.float32),
-        np.ascontiguousarray(quads[:, _PAIR].reshape(-1, 3), np.int32),
+        np.ascontiguousarray(faces, np.int32),
         np.ascontiguousarray(arrays["joints"].T),
         np.ascontiguousarray(weights, np.float32),
         float(arrays["height"]),

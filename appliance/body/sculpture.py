@@ -1,36 +1,64 @@
-"""A figure modelled around a skeleton of any kind: chest, pelvis, tapered limbs, head, hands and feet."""
+"""A figure modelled around a skeleton of any kind: trunk, limbs with muscles, head, hands and feet."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from appliance.body.extremities import foot, hand, head
-from appliance.body.volumes import Group, Slab
+from appliance.body.extremities import foot, hand
+from appliance.body.head import head, neck
+from appliance.body.volumes import Ball, Group, Loft, Slab, Step
 from appliance.pose.anatomy import LONG_BONE, Anatomy
 from appliance.pose.quaternion import Array
 
-# Along the spine from the pelvis (0) to the neck (1): half the width as a share of the hips' and of the
+_UP = np.array([0.0, 1.0, 0.0])
+
+# Along the spine from below the pelvis to the neck (1): half the width as a share of the hips' and of the
 # shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.
-_SPINE = np.array([0.0, 0.18, 0.42, 0.64, 0.82, 1.0])
-_OF_HIPS = np.array([0.80, 0.80, 0.52, 0.10, 0.0, 0.0])
-_OF_SHOULDERS = np.array([0.0, 0.0, 0.35, 0.80, 0.85, 0.20])
-_FLESH = np.array([0.032, 0.032, 0.020, 0.023, 0.027, 0.018])
-_DEPTH = np.array([0.045, 0.048, 0.047, 0.057, 0.052, 0.034])
-_AHEAD = np.array([-0.004, -0.002, 0.004, 0.010, 0.009, 0.0])
+_SPINE = np.array([-0.14, 0.00, 0.12, 0.24, 0.36, 0.50, 0.66, 0.80, 0.91, 1.00])
+_OF_HIPS = np.array([0.20, 0.95, 0.92, 0.70, 0.40, 0.20, 0.00, 0.00, 0.00, 0.00])
+_OF_SHOULDERS = np.array([0.00, 0.00, 0.00, 0.10, 0.30, 0.50, 0.72, 0.78, 0.60, 0.25])
+_FLESH = np.array([0.030, 0.044, 0.040, 0.036, 0.032, 0.035, 0.036, 0.030, 0.018, 0.014])
+_DEPTH = np.array([0.036, 0.056, 0.056, 0.052, 0.050, 0.056, 0.062, 0.058, 0.042, 0.030])
+_AHEAD = np.array([0.000, -0.002, 0.000, 0.004, 0.008, 0.012, 0.014, 0.010, 0.000, -0.002])
+_BELOW = 0.05  # heights that the pelvis reaches below its joint
 
 
-def sculpture(anatomy: Anatomy) -> tuple[Group, list[Group]]:
-    """The trunk and the limbs that grow out of it, in the skeleton's rest pose."""
-    limbs = [_limb(anatomy, trunk, first) for trunk, first in anatomy.limbs()]
-    if anatomy.head is not None:
-        limbs.append(Group((*_neck(anatomy), *head(anatomy)), 0.022 * anatomy.height))
-    trunk = Group(tuple(_trunk(anatomy)), 0.0)
-    covered = {slab.owner for group in limbs for slab in group.movers}
-    covered |= {slab.owner for slab in trunk.slabs if slab.start is not slab.end}
-    return trunk, [*limbs, *_twigs(anatomy, covered)]
+@dataclass(frozen=True)
+class Sculpture:
+    """The trunk, the limbs that grow out of it, and boxes (lowest, highest corner) with details that only
+    small cells show."""
+
+    trunk: Group
+    limbs: tuple[Group, ...]
+    details: tuple[tuple[Array, Array], ...]
+
+
+def sculpture(anatomy: Anatomy) -> Sculpture:
+    """The body in the skeleton's rest pose."""
+    limbs, details = [], []
+    for trunk, first in anatomy.limbs():
+        limb, end = _limb(anatomy, trunk, first)
+        limbs.append(limb)
+        details.append(_box(end))
+    face = head(anatomy)
+    if face:
+        limbs.append(Group((*neck(anatomy), *face), 0.022 * anatomy.height))
+        details.append(_box(face))
+    body = Group((*_trunk(anatomy), *_back_and_chest(anatomy)), 0.0)
+    covered = {solid.owner for group in limbs for solid in group.movers}
+    covered |= {
+        mover.owner for mover in body.movers if not isinstance(mover, Slab) or mover.start is not mover.end
+    }
+    return Sculpture(body, (*limbs, *_twigs(anatomy, covered)), tuple(details))
+
+
+def _box(steps: Sequence[Step]) -> tuple[Array, Array]:
+    boxes = [step.box for step in steps if not step.removes]
+    return np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
 
 
 def cone(
@@ -40,43 +68,97 @@ def cone(
     return Slab(owner, start, end, *radii, softness * anatomy.height, anatomy.across)
 
 
-def _trunk(anatomy: Anatomy) -> list[Slab]:
-    """Slabs along the spine; a single ball where nothing branches."""
+def _trunk(anatomy: Anatomy) -> list[Step]:
+    """Sections along the spine; a single ball where nothing branches."""
     places, height = anatomy.positions, anatomy.height
     spine = _spine(anatomy)
     if len(spine) < 2:
         ball = min(anatomy.thickness(spine[0]), 0.045 * height)
         return [cone(anatomy, spine[0], places[spine[0]], places[spine[0]], (ball, ball), 0.0)]
     ends = [places[joint] for joint in spine]
-    lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise(ends)]
-    whole = sum(lengths) or 1.0
+    if anatomy.is_person:
+        below = ends[0] - ends[1]
+        ends.insert(0, ends[0] + _BELOW * height * below / max(float(np.linalg.norm(below)), 1e-9))
+        spine = [spine[0], *spine]
+    lengths = np.array([float(np.linalg.norm(b - a)) for a, b in pairwise(ends)])
+    begins = np.concatenate([[0.0], np.cumsum(lengths)])
+    if spine[0] == spine[1]:
+        begins -= lengths[0]
+    whole = max(float(begins[-1]), 1e-9)
     hips, shoulders = _half_width(anatomy, spine[0]), _half_width(anatomy, spine[-2])
-    slabs, before = [], 0.0
-    for owner, start, end, length in zip(spine, ends, ends[1:], lengths, strict=False):
-        pieces = max(1, round(length / (0.012 * height)))
-        for piece in range(pieces):
-            shares = np.array([piece, piece + 1]) / pieces
-            along = (before + shares * length) / whole
-            flesh, depth, ahead = (_at(along, table) * height for table in (_FLESH, _DEPTH, _AHEAD))
-            half = _at(along, _OF_HIPS) * hips + _at(along, _OF_SHOULDERS) * shoulders + flesh - depth
-            low, high = (
-                start + share * (end - start) + shift * anatomy.forward
-                for share, shift in zip(shares, ahead, strict=True)
-            )
-            slabs.append(
-                Slab(
-                    owner, low, high, float(depth[0]), float(depth[1]), 0.0, anatomy.across,
-                    max(float(half[0]), 0.0), max(float(half[1]), 0.0),
-                )
-            )  # fmt: skip
-        before += length
-    return slabs
+    pieces = max(8, round(float(lengths.sum()) / (0.012 * height)))
+    along = np.linspace(begins[0], begins[-1], pieces + 1)
+    axis = np.stack([np.interp(along, begins, [end[i] for end in ends]) for i in range(3)], axis=1)
+    shares = along / whole
+    wide = (
+        _at(shares, _OF_HIPS) * hips + _at(shares, _OF_SHOULDERS) * shoulders + _at(shares, _FLESH) * height
+    )
+    deep = _at(shares, _DEPTH) * height
+    axis = axis + _at(shares, _AHEAD)[:, None] * height * anatomy.forward
+    owners = [spine[min(int(np.searchsorted(begins, at, side="right")) - 1, len(spine) - 2)] for at in along]
+    movers = tuple(
+        Slab(owner, low, high, d, d, 0.0, anatomy.across, max(w - d, 0.0), max(w - d, 0.0))
+        for owner, low, high, w, d in zip(owners, axis, axis[1:], wide.tolist(), deep.tolist(), strict=False)
+    )
+    front = np.cross(np.cross(anatomy.across, anatomy.forward), anatomy.across)
+    return [Loft(axis, wide, deep, anatomy.across, front / np.linalg.norm(front), 0.0, movers)]
 
 
 def _at(along: Array, table: Array) -> Array:
-    """The table's smooth curve (a polynomial through all its values) at places along the spine, 0 to 1."""
-    curve: Array = np.polyval(np.polyfit(_SPINE, table, len(_SPINE) - 1), along)
+    """The table's smooth curve (cubic Hermite, Catmull and Rom's slopes) at places along the spine."""
+    slopes = np.gradient(table, _SPINE)
+    right = np.clip(np.searchsorted(_SPINE, along), 1, len(_SPINE) - 1)
+    left = right - 1
+    step = _SPINE[right] - _SPINE[left]
+    t = np.clip((along - _SPINE[left]) / step, 0.0, 1.0)
+    low, high = table[left], table[right]
+    curve: Array = (
+        low * (1 + 2 * t) * (1 - t) ** 2
+        + high * t * t * (3 - 2 * t)
+        + step * (slopes[left] * t * (1 - t) ** 2 - slopes[right] * t * t * (1 - t))
+    )
     return curve
+
+
+def _back_and_chest(anatomy: Anatomy) -> list[Step]:
+    """Of an upright figure: two columns of muscle along the spine, chest muscles, belly."""
+    if not anatomy.is_person:
+        return []
+    spine, height = _spine(anatomy), anatomy.height
+    pelvis, top = (anatomy.positions[joint] for joint in (spine[0], spine[-1]))
+    across, ahead = anatomy.across, anatomy.forward
+    bottom, breast = spine[0], spine[-2] if len(spine) > 1 else spine[0]
+    shoulders = max(_half_width(anatomy, breast), 0.05 * height)
+
+    def at(along: float, aside: float, before: float) -> Array:
+        there: Array = pelvis + along * (top - pelvis) + height * (aside * across + before * ahead)
+        return there
+
+    def owner(along: float) -> int:
+        heights = [float(anatomy.positions[joint] @ _UP) for joint in spine[:-1]]
+        here = float(at(along, 0.0, 0.0) @ _UP)
+        return max((j for j, y in zip(spine, heights, strict=False) if y <= here), default=bottom)
+
+    wide = shoulders / height
+    upwards = (top - pelvis) / np.linalg.norm(top - pelvis)
+    steps: list[Step] = []
+    for sign in (1.0, -1.0):
+        column = [(0.06, 0.020, -0.034), (0.36, 0.018, -0.024), (0.62, 0.022, -0.036), (0.88, 0.018, -0.030)]
+        for low, high in pairwise(column):
+            start, end = (at(along, sign * aside, before) for along, aside, before in (low, high))
+            steps.append(cone(anatomy, owner(low[0]), start, end, (0.0165 * height, 0.0165 * height), 0.026))
+        steps.append(
+            Slab(
+                breast, at(0.735, sign * 0.018, 0.052), at(0.80, sign * 0.78 * wide, 0.034),
+                0.0200 * height, 0.0160 * height, 0.018 * height, upwards,
+                0.020 * height, 0.010 * height,
+            )
+        )  # fmt: skip
+    steps.append(
+        Ball(owner(0.2), at(0.17, 0.0, 0.030), height * np.array([0.045, 0.060, 0.026]),
+             np.array([across, _UP, ahead]), 0.03 * height)
+    )  # fmt: skip
+    return steps
 
 
 def _spine(anatomy: Anatomy) -> list[int]:
@@ -101,25 +183,99 @@ def _half_width(anatomy: Anatomy, joint: int) -> float:
     return max(sides, default=0.03 * anatomy.height)
 
 
-def _limb(anatomy: Anatomy, trunk: int, first: int) -> Group:
-    """From the trunk to the finger tips or toes."""
+def _limb(anatomy: Anatomy, trunk: int, first: int) -> tuple[Group, list[Step]]:
+    """From the trunk to the finger tips or toes, and the hand or foot of it."""
     chain = anatomy.chain(first)
     begin, last = anatomy.limb_start(chain), _extremity(anatomy, chain)
     is_leg = _is_leg(anatomy, chain, last)
-    steps, bones = (foot(anatomy, chain[last]), []) if is_leg else hand(anatomy, chain[last])
-    for place in reversed(range(begin, last)):
-        steps += _bone(anatomy, chain[place], chain[place + 1], is_leg)
+    end, bones = (foot(anatomy, chain[last]), []) if is_leg else hand(anatomy, chain[last])
+    steps = list(end)
+    long = list(range(begin, last))
+    for place in reversed(long):
+        shape = _muscles_of(anatomy, chain, place, long, is_leg)
+        steps += shape
     steps += _root_of_limb(anatomy, trunk, chain[: begin + 1], is_leg)
-    return Group(tuple(steps), (0.050 if is_leg else 0.026) * anatomy.height, tuple(bones))
+    return Group(tuple(steps), (0.048 if is_leg else 0.020) * anatomy.height, tuple(bones)), end
 
 
-def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
+def _muscles_of(
+    anatomy: Anatomy, chain: Sequence[int], place: int, long: Sequence[int], is_leg: bool
+) -> list[Step]:
+    """The flesh around one long bone: of a thigh, a shank, an upper arm, a forearm; else a tapered muscle."""
+    bone = anatomy.positions[chain[place]], anatomy.positions[chain[place + 1]]
+    if len(long) == 2 and anatomy.is_person:
+        upper = place == long[0]
+        table = (_THIGH if upper else _SHANK) if is_leg else (_UPPER_ARM if upper else _FOREARM)
+        return _shaped(anatomy, chain[place], *bone, table, is_leg)
+    return _bone(anatomy, chain[place], chain[place + 1], is_leg)
+
+
+# Muscles: from (share of the bone, forwards, outwards, radius) to the same, and the softness; in heights.
+_Point = tuple[float, float, float, float]
+_Muscles = tuple[tuple[_Point, _Point, float], ...]
+_THIGH: _Muscles = (
+    ((0.16, 0.000, -0.003, 0.0440), (0.60, 0.000, 0.000, 0.0380), 0.0),
+    ((0.60, 0.000, 0.000, 0.0380), (0.97, -0.001, 0.000, 0.0300), 0.0),
+    ((0.20, 0.017, 0.006, 0.0330), (0.62, 0.012, 0.004, 0.0290), 0.020),  # the front
+    ((0.30, -0.014, 0.000, 0.0320), (0.85, -0.010, 0.000, 0.0240), 0.020),  # the back
+    ((0.06, -0.004, -0.014, 0.0350), (0.42, 0.000, -0.010, 0.0300), 0.020),  # the inside
+    ((0.76, 0.008, -0.010, 0.0200), (0.90, 0.008, -0.008, 0.0180), 0.012),  # above the knee
+    ((0.98, 0.0145, 0.000, 0.0155), (1.00, 0.0150, 0.000, 0.0155), 0.012),  # kneecap
+)
+_SHANK: _Muscles = (
+    ((0.00, -0.001, 0.000, 0.0290), (0.30, -0.004, 0.000, 0.0275), 0.0),
+    ((0.30, -0.004, 0.000, 0.0275), (1.00, 0.000, 0.000, 0.0175), 0.0),
+    ((0.06, 0.012, 0.000, 0.0130), (0.85, 0.007, 0.000, 0.0100), 0.012),  # shin
+    ((0.12, -0.014, -0.008, 0.0200), (0.36, -0.015, -0.007, 0.0220), 0.012),  # calf
+    ((0.10, -0.013, 0.009, 0.0190), (0.32, -0.014, 0.008, 0.0200), 0.012),
+    ((0.36, -0.015, -0.005, 0.0200), (0.66, -0.010, 0.000, 0.0120), 0.014),
+    ((0.60, -0.011, 0.000, 0.0110), (1.00, -0.011, 0.000, 0.0080), 0.012),  # tendon
+)
+_UPPER_ARM: _Muscles = (
+    ((0.00, 0.000, 0.000, 0.0265), (0.45, 0.000, 0.000, 0.0240), 0.0),
+    ((0.45, 0.000, 0.000, 0.0240), (1.00, 0.000, 0.000, 0.0205), 0.0),
+    ((0.02, 0.000, 0.005, 0.0275), (0.40, 0.000, 0.007, 0.0180), 0.016),  # shoulder muscle
+    ((0.32, 0.009, 0.000, 0.0170), (0.72, 0.008, 0.000, 0.0165), 0.014),  # biceps
+    ((0.24, -0.010, 0.000, 0.0180), (0.66, -0.008, 0.000, 0.0165), 0.014),  # triceps
+    ((0.97, -0.008, 0.000, 0.0145), (1.01, -0.008, 0.000, 0.0140), 0.008),  # elbow
+)
+_FOREARM: _Muscles = (
+    ((0.00, 0.000, 0.000, 0.0205), (0.26, 0.001, 0.000, 0.0225), 0.0),
+    ((0.26, 0.001, 0.000, 0.0225), (0.98, 0.000, 0.000, 0.0130), 0.0),
+    ((0.05, 0.007, 0.007, 0.0150), (0.34, 0.005, 0.004, 0.0150), 0.012),
+    ((0.08, 0.003, -0.008, 0.0140), (0.36, 0.003, -0.005, 0.0140), 0.012),
+    ((0.80, 0.006, 0.000, 0.0110), (1.00, 0.0075, 0.000, 0.0105), 0.010),  # flat at the wrist
+    ((0.80, -0.006, 0.000, 0.0110), (1.00, -0.0075, 0.000, 0.0105), 0.010),
+)
+
+
+def _shaped(
+    anatomy: Anatomy, owner: int, start: Array, end: Array, muscles: _Muscles, is_leg: bool
+) -> list[Step]:
+    """Muscles along a bone. Forwards: the figure's front; outwards: away from the body's middle, of an arm
+    that is held to the side upwards."""
+    height = anatomy.height
+    bone = end - start
+    front = anatomy.forward - bone * float(anatomy.forward @ bone) / max(float(bone @ bone), 1e-12)
+    if float(np.linalg.norm(front)) < 0.2:
+        return [cone(anatomy, owner, start, end, (muscles[0][0][3] * height, muscles[1][1][3] * height), 0.0)]
+    front = front / np.linalg.norm(front)
+    side = np.cross(front, bone / np.linalg.norm(bone))
+    away = start - anatomy.positions[anatomy.trunk[0]]
+    outside = anatomy.across * float(away @ anatomy.across) if is_leg else _UP + 0.2 * away
+    side = side if float(side @ outside) >= 0.0 else -side
+    steps: list[Step] = []
+    for low, high, softness in muscles:
+        a, b = (start + p[0] * bone + height * (p[1] * front + p[2] * side) for p in (low, high))
+        steps.append(cone(anatomy, owner, a, b, (low[3] * height, high[3] * height), softness))
+    return steps
+
+
+def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Step]:
     """A muscle from the joint to below its middle, and the taper to the next joint."""
     start, end = anatomy.positions[joint], anatomy.positions[child]
     first, last = anatomy.thickness(joint), anatomy.thickness(child)
     belly = start + 0.32 * (end - start)
-    if is_leg and anatomy.reach[child] < 0.5 * anatomy.reach[joint]:
-        belly = belly - 0.010 * anatomy.height * anatomy.forward  # the calf is behind the bone
     first = 0.9 * first if is_leg else first
     full = (first + 0.32 * (last - first)) * (1.18 if is_leg else 1.12)
     return [
@@ -128,8 +284,52 @@ def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
     ]
 
 
-def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bool) -> list[Slab]:
+def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bool) -> list[Step]:
     """The parts that join a limb to the trunk: shoulder girdle and chest muscle, or hip and seat."""
+    if not anatomy.is_person:
+        return _plain_root(anatomy, trunk, chain, is_leg)
+    places, height = anatomy.positions, anatomy.height
+    start, ahead = places[chain[-1]], anatomy.forward
+    away = float((start - places[trunk]) @ anatomy.across)
+    out = anatomy.across * (1.0 if away >= 0 else -1.0)
+    if is_leg:
+        axes, soft = np.array([out, _UP, ahead]), 0.028 * height
+        seat = start + height * (-0.028 * ahead - 0.012 * out - 0.022 * _UP)
+        hip = start + height * (0.003 * out - 0.030 * _UP)
+        return [
+            Ball(trunk, seat, height * np.array([0.044, 0.050, 0.040]), axes, soft),
+            Ball(chain[-1], hip, height * np.array([0.036, 0.056, 0.044]), axes, soft),
+        ]
+    owner = chain[-2] if len(chain) > 1 else trunk
+    thick = 0.0290 * height
+    inner = start - 0.85 * abs(away) * out
+    notch = inner + height * (0.040 * ahead + 0.002 * _UP)
+    top = start + height * (0.020 * _UP + 0.012 * ahead - 0.012 * out)
+    nape = start - abs(away) * out + height * (0.046 * _UP - 0.004 * ahead)
+    flank = start - 0.10 * height * _UP - 0.25 * abs(away) * out - 0.020 * height * ahead
+    breast = start - 0.55 * abs(away) * out + height * (0.034 * ahead - 0.036 * _UP)
+    blade = start - 0.45 * abs(away) * out - height * (0.026 * ahead + 0.012 * _UP)
+    tip = blade + height * (0.006 * out - 0.062 * _UP - 0.012 * ahead)
+    across = anatomy.across
+    return [
+        Slab(owner, inner, start, 0.026 * height, thick, 0.012 * height, across),
+        Slab(
+            trunk, nape, start - 0.2 * abs(away) * out, 0.012 * height, 0.016 * height, 0.03 * height, across
+        ),
+        Slab(owner, notch, top, 0.0090 * height, 0.0100 * height, 0.007 * height, across),  # collarbone
+        Slab(trunk, breast, start, 0.024 * height, 0.022 * height, 0.020 * height, across),  # chest muscle
+        Slab(
+            trunk, flank, start, 0.022 * height, 0.020 * height, 0.020 * height, across
+        ),  # broad back muscle
+        Slab(owner, blade, tip, 0.016 * height, 0.010 * height, 0.028 * height, across, 0.020 * height, 0.0),
+        Slab(
+            owner, blade + 0.012 * height * _UP, start, 0.013 * height, 0.014 * height, 0.018 * height, across
+        ),
+    ]
+
+
+def _plain_root(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bool) -> list[Step]:
+    """The same for bodies that are not upright or have no head."""
     places, height = anatomy.positions, anatomy.height
     start = places[chain[-1]]
     thick = anatomy.thickness(chain[-1])
@@ -141,33 +341,11 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
             cone(anatomy, trunk, seat, start, (0.92 * thick, 0.85 * thick), 0.02),
             cone(anatomy, trunk, inner, start, (0.8 * thick, 0.85 * thick), 0.02),
         ]
-    middle = inner + 0.45 * (places[trunk] - inner)
-    middle = middle - anatomy.across * float((middle - inner) @ anatomy.across)
     girdle = [
         cone(anatomy, a, places[a], places[b], (0.030 * height, 0.030 * height), 0.01)
         for a, b in pairwise([trunk, *chain])
     ]
-    return [
-        *girdle,
-        cone(anatomy, owner, inner, start, (0.030 * height, thick), 0.015),
-        cone(anatomy, trunk, middle, start, (0.034 * height, 0.8 * thick), 0.02),
-    ]
-
-
-def _neck(anatomy: Anatomy) -> list[Slab]:
-    """From the trunk to the head."""
-    height, places = anatomy.height, anatomy.positions
-    joints = anatomy.neck
-    above = [anatomy.skeleton.parents[joints[0]], *joints]
-    slabs = [
-        cone(anatomy, a, places[a], places[b], (0.027 * height, 0.027 * height), 0.01)
-        for a, b in pairwise(joints)
-    ]
-    base = above[0]
-    if base >= 0:
-        low = places[joints[0]] + 0.35 * (places[base] - places[joints[0]])
-        slabs.insert(0, cone(anatomy, base, low, places[joints[0]], (0.034 * height, 0.028 * height), 0.01))
-    return slabs
+    return [*girdle, cone(anatomy, owner, inner, start, (0.030 * height, thick), 0.015)]
 
 
 def _twigs(anatomy: Anatomy, covered: set[int]) -> list[Group]:

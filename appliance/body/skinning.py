@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.body.volumes import Slab
+from appliance.body.volumes import Ball, Slab
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 
@@ -49,20 +49,19 @@ def dual_quaternions(bind_positions: Array, bind_world: Array, positions: Array,
 
 
 MOVERS = 4  # joints that move a vertex
-FAR_STEPS, NEAR_STEPS = 40, 8  # how often weights flow to the neighbours: between limbs, between fingers
+FAR_STEPS, NEAR_STEPS = 44, 8  # how often weights flow to the neighbours: between limbs, between fingers
 
 
 def weights_of(
     vertices: NDArray[np.float32],
     faces: NDArray[np.int32],
-    volumes: Sequence[Slab],
+    volumes: Sequence[Slab | Ball],
     part_of: Callable[[int], int],
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Which joints move each vertex, (V, 4), and how much, (V, 4), strongest first.
 
     The owner of the nearest volume, softened only along the surface: a hanging hand does not move the thigh
     next to it. Softened far between the parts of the body, little within a part (hand and fingers).
-    faces: as `surface_of` gives them.
     """
     owners = sorted({volume.owner for volume in volumes})
     place = {owner: number for number, owner in enumerate(owners)}
@@ -79,7 +78,9 @@ def weights_of(
     within = _spread(np.eye(len(owners), dtype=np.float32)[nearest], around, NEAR_STEPS)
     weights = _divided(share, within, part)
     weights = np.pad(weights, ((0, 0), (0, max(0, MOVERS - len(owners)))))
-    strongest = np.argsort(-weights, axis=1, kind="stable")[:, :MOVERS]
+    few = np.argpartition(weights, -MOVERS, axis=1)[:, -MOVERS:]
+    order = np.argsort(-np.take_along_axis(weights, few, axis=1), axis=1, kind="stable")
+    strongest = np.take_along_axis(few, order, axis=1)
     kept = np.take_along_axis(weights, strongest, axis=1)
     joints = np.array([*owners, *owners[:1] * MOVERS])[strongest]
     return joints.astype(np.uint8), (kept / kept.sum(axis=1, keepdims=True)).astype(np.float32)
@@ -102,9 +103,9 @@ def _divided(
 
 
 def _neighbours(faces: NDArray[np.int32], count: int) -> NDArray[np.int64]:
-    """(most, V): each vertex's neighbours in the quads that the triangles are halves of, then itself."""
-    quads = faces.reshape(-1, 6)[:, [0, 1, 2, 5]]
-    edges = np.unique(np.concatenate([quads[:, [a, (a + 1) % 4]] for a in range(4)]), axis=0)
+    """(most, V): the vertices with which each shares an edge, then itself."""
+    edges = np.concatenate([faces[:, [a, (a + 1) % 3]] for a in range(3)])
+    edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
     first = np.searchsorted(edges[:, 0], np.arange(count + 1))
     around = np.tile(np.arange(count), (int(np.diff(first).max()), 1))
     around[np.arange(len(edges)) - first[edges[:, 0]], edges[:, 0]] = edges[:, 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 from appliance.pose.quaternion import Array
 
 _CORNERS = np.array(list(product((0, 1), repeat=3)))  # corner number = 4x + 2y + z
-_EDGES = np.array([(a, b) for a in range(8) for b in range(8) if a < b and (a ^ b) in (1, 2, 4)])
 
 
 _FILLED = -1e-5  # metres: a sample that is put inside lies just below the surface
@@ -31,35 +31,176 @@ class Grid:
         return along + np.float32(self.origin[number])
 
 
+@dataclass(frozen=True)
+class Finer:
+    """A box of a grid in cells half as large: from cell `low` (3,) on, with the samples of its field.
+
+    The outermost cells of the box only lend their samples: the surface in them is coarse.
+    """
+
+    low: NDArray[np.int64]
+    field: NDArray[np.float32]
+
+
+def finer_grid(grid: Grid, low: NDArray[np.int64], high: NDArray[np.int64]) -> Grid:
+    """The samples of `Finer`, for the cells from `low` to before `high` (3,)."""
+    shape = [int(n) for n in 2 * (high - low) + 1]
+    return Grid(grid.origin + grid.spacing * low, grid.spacing / 2, (shape[0], shape[1], shape[2]))
+
+
 def surface_of(
-    field: NDArray[np.float32], grid: Grid
+    field: NDArray[np.float32], grid: Grid, finer: Sequence[Finer] = ()
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
     """Vertices and normals (V, 3), triangles (F, 3), of the zero level of a field, negative inside.
 
     The field must be positive all around. The mesh is closed, and no edge has more than two triangles: where
-    the samples are ambiguous, the gap is filled.
+    the samples are ambiguous, the gap is filled. Where cells of two sizes meet, an edge of the smaller ones
+    gets one triangle instead of two, as in dual contouring (Ju et al. 2002). Pairs of triangles come first.
     """
-    field, codes = _without_ambiguity(field)
-    cells = np.argwhere((codes > 0) & (codes < 255))
-    number = np.full(codes.shape, -1, dtype=np.int32)
-    number[tuple(cells.T)] = np.arange(len(cells), dtype=np.int32)
-    places = _places(field, cells)
-    slopes = np.stack([np.gradient(field, axis=axis) for axis in range(3)], axis=-1)
-    normals = _interpolated(slopes, places)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    vertices = grid.origin + grid.spacing * places
-    faces = _faces(field < 0, number, vertices)
-    return vertices.astype(np.float32), (normals / np.maximum(length, 1e-9)).astype(np.float32), faces
+    small, refined = _small_field(field, finer)
+    field, small = _agreeing(field, small, refined, finer)
+    places, corners = [], []
+    for level, (values, cells) in enumerate(((field, ~refined), (small, _halved(refined)))):
+        for axis in range(3):
+            crossings, around = _crossed(values, cells, axis, all_cells=level == 0)
+            places.append(crossings / (1 + level))
+            corners.append(_leaves(around, refined, small.shape if level else ()))
+    crossing, around = np.concatenate(places), np.concatenate(corners)
+    leaves, quads = np.unique(around, return_inverse=True)
+    quads = quads.reshape(-1, 4)
+    count = np.bincount(quads.reshape(-1), minlength=len(leaves))
+    mean = np.stack(
+        [
+            np.bincount(quads.reshape(-1), np.repeat(crossing[:, axis], 4), len(leaves)) / count
+            for axis in range(3)
+        ],
+        axis=1,
+    )
+    vertices = grid.origin + grid.spacing * mean
+    is_small = leaves >= refined.size
+    normals = np.empty_like(vertices)
+    normals[~is_small] = _slopes(field, mean[~is_small])
+    normals[is_small] = _slopes(small, 2 * mean[is_small])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    faces = _triangles(quads, vertices)
+    return vertices.astype(np.float32), normals.astype(np.float32), faces
 
 
-def _without_ambiguity(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """The field, and each cell's inside corners as bits. Where two sheets would share a cell, its outside
-    sample nearest to the surface is put inside, until no such cell is left."""
+def _small_field(
+    field: NDArray[np.float32], finer: Sequence[Finer]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """The boxes' samples in one array, half as far apart, and which cells (of `field`) are halved."""
+    refined = np.zeros(tuple(n - 1 for n in field.shape), dtype=np.bool_)
+    if not finer:
+        return np.ones((1, 1, 1), np.float32), refined
+    small = np.ones(tuple(2 * n - 1 for n in field.shape), dtype=np.float32)
+    for box in finer:
+        small[_samples_of(box)] = box.field
+        sides = zip(box.low, box.field.shape, strict=True)
+        refined[tuple(slice(int(a) + 1, int(a) + n // 2 - 1) for a, n in sides)] = True
+    return small, refined
+
+
+def _samples_of(box: Finer) -> tuple[slice, ...]:
+    first = 2 * box.low
+    return tuple(slice(int(a), int(a) + n) for a, n in zip(first, box.field.shape, strict=True))
+
+
+def _agreeing(
+    field: NDArray[np.float32],
+    small: NDArray[np.float32],
+    refined: NDArray[np.bool_],
+    finer: Sequence[Finer],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Both fields without ambiguity, equal at the corners of halved cells."""
+    if not refined.any():
+        return _without_ambiguity(field), small
+    shared = np.zeros(field.shape, dtype=np.bool_)
+    for x, y, z in _CORNERS:
+        shared[x : x + refined.shape[0], y : y + refined.shape[1], z : z + refined.shape[2]] |= refined
     while True:
-        codes = _codes(field < 0)
-        doubtful = np.argwhere(_DOUBTFUL[codes])
+        for box in finer:
+            part = _samples_of(box)
+            small[part] = _without_ambiguity(small[part])
+        field = np.where(shared, small[::2, ::2, ::2], field)
+        field = _without_ambiguity(field)
+        differs = shared & ((field < 0) != (small[::2, ::2, ::2] < 0))
+        if not differs.any():
+            return field, small
+        small[::2, ::2, ::2][differs] = field[differs]
+
+
+def _halved(refined: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The same for cells of half the size."""
+    for axis in range(3):
+        refined = np.repeat(refined, 2, axis=axis)
+    return refined
+
+
+def _crossed(
+    field: NDArray[np.float32], cells: NDArray[np.bool_], axis: int, all_cells: bool
+) -> tuple[Array, NDArray[np.int64]]:
+    """Where edges along an axis cross the surface (E, 3), in samples, and the cells around each, (E, 4, 3),
+    counter-clockwise seen from outside. Of edges whose cells are all, or partly, among `cells`."""
+    inside = field < 0
+    low = np.moveaxis(inside, axis, 0)
+    edges = np.argwhere(np.moveaxis(low[:-1] != low[1:], 0, axis))
+    back, side = np.eye(3, dtype=np.int64)[(axis + 1) % 3], np.eye(3, dtype=np.int64)[(axis + 2) % 3]
+    around = np.stack([edges - back - side, edges - side, edges, edges - back], axis=1)
+    among = cells[tuple(np.moveaxis(around, -1, 0))]
+    kept = among.all(axis=1) if all_cells else among.any(axis=1)
+    edges, around = edges[kept], around[kept]
+    ahead = np.eye(3, dtype=np.int64)[axis]
+    first, second = field[tuple(edges.T)], field[tuple((edges + ahead).T)]
+    crossings = edges + (first / (first - second))[:, None] * ahead
+    return crossings, np.where((first < 0)[:, None, None], around, around[:, ::-1])
+
+
+def _leaves(
+    around: NDArray[np.int64], refined: NDArray[np.bool_], small_shape: tuple[int, ...]
+) -> NDArray[np.int64]:
+    """(E, 4): numbers of small cells, or of the whole cells that they are parts of; without the shape of the
+    small samples those of whole cells."""
+    if not small_shape:
+        return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(around, -1, 0)), refined.shape))
+    coarse = tuple(np.moveaxis(around // 2, -1, 0))
+    whole = np.ravel_multi_index(coarse, refined.shape)
+    shape = tuple(n - 1 for n in small_shape)
+    small = refined.size + np.ravel_multi_index(tuple(np.moveaxis(around, -1, 0)), shape)
+    leaves: NDArray[np.int64] = np.where(refined[coarse], small, whole)
+    return leaves
+
+
+def _slopes(field: NDArray[np.float32], places: Array) -> Array:
+    """(V, 3): how the field grows at places in samples, over a sample to both sides."""
+    steps = 0.7 * np.eye(3)
+    slopes: Array = np.stack(
+        [_interpolated(field, places + s) - _interpolated(field, places - s) for s in steps], axis=1
+    )
+    return slopes
+
+
+def _triangles(quads: NDArray[np.int64], vertices: Array) -> NDArray[np.int32]:
+    """(F, 3): two for each quad, split along its shorter diagonal, then one for each that has two corners in
+    one vertex."""
+    again = quads == np.roll(quads, 1, axis=1)
+    whole = ~again.any(axis=1)
+    quad = quads[whole]
+    first = np.linalg.norm(vertices[quad[:, 0]] - vertices[quad[:, 2]], axis=1)
+    other = np.linalg.norm(vertices[quad[:, 1]] - vertices[quad[:, 3]], axis=1)
+    split = np.where((first <= other)[:, None], quad[:, [0, 1, 2, 0, 2, 3]], quad[:, [1, 2, 3, 1, 3, 0]])
+    folded, at = quads[~whole], again[~whole].argmax(axis=1)
+    single = np.take_along_axis(folded, (at[:, None] + np.arange(3)) % 4, axis=1)
+    return np.concatenate([split.reshape(-1, 3), single]).astype(np.int32)
+
+
+def _without_ambiguity(field: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Where two sheets would share a cell, its outside sample nearest to the surface is put inside, until no
+    such cell is left."""
+    while True:
+        doubtful = np.argwhere(_DOUBTFUL[_codes(field < 0)])
         if not len(doubtful):
-            return field, codes
+            return field
         field = field.copy()
         corners = doubtful[:, None] + _CORNERS
         values = field[tuple(corners.transpose(2, 0, 1))]
@@ -102,43 +243,12 @@ def _hangs_together(corners: list[int]) -> bool:
 _DOUBTFUL = np.array([_is_doubtful(code) for code in range(256)])
 
 
-def _places(field: NDArray[np.float32], cells: NDArray[np.int64]) -> Array:
-    """Where each cell's vertex lies, in units of the grid: the middle of the crossings of its edges."""
-    values = field[tuple((cells[:, None] + _CORNERS).transpose(2, 0, 1))]  # (cells, 8)
-    first, second = values[:, _EDGES[:, 0]], values[:, _EDGES[:, 1]]
-    crosses = (first < 0) != (second < 0)
-    share = np.where(crosses, first / np.where(crosses, first - second, 1.0), 0.0)[..., None]
-    a, b = _CORNERS[_EDGES[:, 0]], _CORNERS[_EDGES[:, 1]]
-    points = np.where(crosses[..., None], a + share * (b - a), 0.0)
-    middle: Array = cells + points.sum(axis=1) / crosses.sum(axis=1)[:, None]
-    return middle
-
-
-def _interpolated(values: NDArray[np.float32], places: Array) -> Array:
-    """Trilinear values (V, C) of samples (X, Y, Z, C) at places (V, 3) in units of the grid."""
-    low = np.floor(places).astype(np.int64)
+def _interpolated(field: NDArray[np.float32], places: Array) -> Array:
+    """(V,): trilinear values of samples at places (V, 3) in units of the grid."""
+    low = np.clip(np.floor(places).astype(np.int64), 0, np.array(field.shape) - 2)
     beyond = places - low
-    total = np.zeros((len(places), values.shape[-1]))
+    total = np.zeros(len(places))
     for corner in _CORNERS:
         share = np.prod(np.where(corner, beyond, 1.0 - beyond), axis=1)
-        total += share[:, None] * values[tuple((low + corner).T)]
+        total += share * field[tuple((low + corner).T)]
     return total
-
-
-def _faces(inside: NDArray[np.bool_], number: NDArray[np.int32], vertices: Array) -> NDArray[np.int32]:
-    """Two triangles for each edge of the grid that leaves the inside, counter-clockwise from outside."""
-    quads = []
-    for axis in range(3):
-        second, third = (axis + 1) % 3, (axis + 2) % 3
-        low = np.moveaxis(inside, axis, 0)
-        edges = np.argwhere(np.moveaxis(low[:-1] != low[1:], 0, axis))
-        back, side = np.eye(3, dtype=np.int64)[second], np.eye(3, dtype=np.int64)[third]
-        around = [edges - back - side, edges - side, edges, edges - back]
-        quad = np.stack([number[tuple(cells.T)] for cells in around], axis=1)
-        leaves = inside[tuple(edges.T)]
-        quads.append(np.where(leaves[:, None], quad, quad[:, ::-1]))
-    quad = np.concatenate(quads)
-    first = np.linalg.norm(vertices[quad[:, 0]] - vertices[quad[:, 2]], axis=1)
-    other = np.linalg.norm(vertices[quad[:, 1]] - vertices[quad[:, 3]], axis=1)
-    split = np.where((first <= other)[:, None], quad[:, [0, 1, 2, 0, 2, 3]], quad[:, [1, 2, 3, 1, 3, 0]])
-    return split.reshape(-1, 3).astype(np.int32)

@@ -1,4 +1,4 @@
-"""Volumes that a body is modelled of: rounded slabs, smoothly joined, sampled as a signed distance."""
+"""Volumes that a body is modelled of: rounded slabs and ellipsoids, smoothly joined."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from appliance.pose.quaternion import Array
 
 FAR = 1.0  # metres: the field where no volume is near
 MARGIN = 4.5  # in samples: how far around a volume its distance is known
-SMOOTHINGS = 2  # how often the field is smoothed over its neighbours: 2 mm off a wrist, no ridges
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,7 @@ class Slab:
     across: Array
     start_half: float = 0.0
     end_half: float = 0.0
+    removes: bool = False
 
     @property
     def box(self) -> tuple[Array, Array]:
@@ -63,6 +63,39 @@ class Slab:
 
 
 @dataclass(frozen=True)
+class Ball:
+    """An ellipsoid about `middle` (3,): half axes `radii` (3,), metres, along the rows of `axes` (3, 3).
+
+    removes: it is taken away from what was made before it. `distance` is exact only near the surface.
+    """
+
+    owner: int
+    middle: Array
+    radii: Array
+    axes: Array
+    softness: float
+    removes: bool = False
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """The lowest and highest corner (3,) of a box around it."""
+        reach = np.sqrt(((self.radii[:, None] * self.axes) ** 2).sum(axis=0))
+        return self.middle - reach, self.middle + reach
+
+    def distance(self, x: Array, y: Array, z: Array) -> Array:
+        """Metres from its surface, negative inside, of points as a slab takes them (Quilez)."""
+        dx, dy, dz = (
+            (value - np.float32(at)).astype(np.float32)
+            for value, at in zip((x, y, z), self.middle, strict=True)
+        )
+        once = [_dot(dx, dy, dz, axis / radius) for axis, radius in zip(self.axes, self.radii, strict=True)]
+        first = np.sqrt(sum(part * part for part in once))
+        steep = np.sqrt(sum((part / np.float32(r)) ** 2 for part, r in zip(once, self.radii, strict=True)))
+        away: Array = first * (first - np.float32(1.0)) / np.maximum(steep, np.float32(1e-6))
+        return away
+
+
+@dataclass(frozen=True)
 class Cut:
     """Takes away what lies beyond a plane through `point` whose `normal` points outwards, only near `point`.
 
@@ -73,48 +106,123 @@ class Cut:
     normal: Array
     reach: float
     softness: float
+    removes: bool = True
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """The lowest and highest corner (3,) of where it cuts."""
+        return self.point - self.reach, self.point + self.reach
+
+    def distance(self, x: Array, y: Array, z: Array) -> Array:
+        """Metres from the plane, negative beyond it, of points with coordinates of any matching shapes."""
+        px, py, pz = (np.float32(value) for value in self.point)
+        return -_dot(x - px, y - py, z - pz, self.normal)
+
+
+@dataclass(frozen=True)
+class Loft:
+    """Elliptical sections along a polyline `axis` (N, 3), rounded at its ends; `wide` (N,), `deep` (N,): half
+    the width towards `across` and half the depth towards `front`, metres; movers: which joints move it.
+    """
+
+    axis: Array
+    wide: Array
+    deep: Array
+    across: Array
+    front: Array
+    softness: float
+    movers: tuple[Slab, ...]
+    removes: bool = False
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """The lowest and highest corner (3,) of a box around it."""
+        reach = np.maximum(self.wide, self.deep)[:, None]
+        return (self.axis - reach).min(axis=0), (self.axis + reach).max(axis=0)
+
+    def distance(self, x: Array, y: Array, z: Array) -> Array:
+        """Metres from its surface, negative inside, of points as a slab takes them."""
+        nearest = np.full(np.broadcast_shapes(x.shape, y.shape, z.shape), np.inf, np.float32)
+        off = [np.zeros_like(nearest) for _ in range(5)]
+        for number in range(len(self.axis) - 1):
+            start, bone = self.axis[number], self.axis[number + 1] - self.axis[number]
+            length2 = max(float(bone @ bone), 1e-12)
+            dx, dy, dz = (
+                (value - np.float32(at)).astype(np.float32)
+                for value, at in zip((x, y, z), start, strict=True)
+            )
+            part = np.clip(_dot(dx, dy, dz, bone) / np.float32(length2), 0.0, 1.0)
+            dx, dy, dz = (d - part * np.float32(b) for d, b in zip((dx, dy, dz), bone, strict=True))
+            squared = dx * dx + dy * dy + dz * dz
+            closer = squared < nearest
+            nearest = np.where(closer, squared, nearest)
+            wide, deep = (
+                np.float32(table[number]) + np.float32(table[number + 1] - table[number]) * part
+                for table in (self.wide, self.deep)
+            )
+            upwards = np.cross(self.across, self.front)
+            new = (*(_dot(dx, dy, dz, way) for way in (self.across, self.front, upwards)), wide, deep)
+            off = [np.where(closer, now, before) for now, before in zip(new, off, strict=True)]
+        aside, ahead, beyond, wide, deep = off
+        first = np.sqrt((aside / wide) ** 2 + (ahead / deep) ** 2 + (beyond / deep) ** 2)
+        steep = np.sqrt((aside / wide**2) ** 2 + (ahead / deep**2) ** 2 + (beyond / deep**2) ** 2)
+        away: Array = first * (first - np.float32(1.0)) / np.maximum(steep, np.float32(1e-6))
+        return away
+
+
+Step = Slab | Ball | Loft | Cut
 
 
 @dataclass(frozen=True)
 class Group:
-    """Slabs and cuts in the order in which they are made; `softness` of where the group joins the others.
+    """Volumes and cuts in the order in which they are made; `softness` of where the group joins the others.
 
-    bones: which joints move the group besides its slabs: the fingers of a mitten.
+    bones: which joints move the group besides its volumes: the fingers of a mitten.
     """
 
-    steps: tuple[Slab | Cut, ...]
+    steps: tuple[Step, ...]
     softness: float
     bones: tuple[Slab, ...] = ()
 
     @property
-    def slabs(self) -> list[Slab]:
-        return [step for step in self.steps if isinstance(step, Slab)]
+    def solids(self) -> list[Slab | Ball | Loft]:
+        return [step for step in self.steps if not isinstance(step, Cut) and not step.removes]
 
     @property
-    def movers(self) -> list[Slab]:
-        """Volumes that decide which joint moves what; bones replace the slabs of the first bone's joint."""
+    def movers(self) -> list[Slab | Ball]:
+        """Volumes that decide which joint moves what; bones replace the volumes of the first bone's joint."""
         by_bones = self.bones[0].owner if self.bones else None
-        return [*(slab for slab in self.slabs if slab.owner != by_bones), *self.bones]
+        found: list[Slab | Ball] = []
+        for solid in self.solids:
+            found += solid.movers if isinstance(solid, Loft) else [solid]
+        return [*(mover for mover in found if mover.owner != by_bones), *self.bones]
 
 
-def sampled(trunk: Group, limbs: Sequence[Group], spacing: float) -> tuple[NDArray[np.float32], Grid]:
-    """The field of a trunk and limbs that melt into it, but not into each other, on a grid around them.
+def grid_around(groups: Sequence[Group], spacing: float) -> Grid:
+    """A grid symmetrical about x = 0, so that a symmetrical body gives a symmetrical surface."""
+    boxes = [solid.box for group in groups for solid in group.solids]
+    low = np.min([box[0] for box in boxes], axis=0) - (MARGIN + 2) * spacing
+    high = np.max([box[1] for box in boxes], axis=0) + (MARGIN + 2) * spacing
+    low[0] = min(low[0], -high[0])
+    low[0] = -np.ceil(-low[0] / spacing) * spacing  # x = 0 is a plane of samples
+    high[0] = -low[0]
+    shape = tuple(int(n) for n in np.round((high - low) / spacing).astype(int) + 1)
+    return Grid(low, spacing, (shape[0], shape[1], shape[2]))
 
-    The grid is symmetrical about x = 0, so that a symmetrical body gives a symmetrical surface.
-    """
-    grid = _grid_around([slab for group in (trunk, *limbs) for slab in group.slabs], spacing)
-    field = np.full(grid.shape, FAR, dtype=np.float32)
-    body = _sample(trunk, grid, field.copy())
-    total = body.copy()
+
+def sampled(trunk: Group, limbs: Sequence[Group], grid: Grid) -> NDArray[np.float32]:
+    """The field of a trunk and of limbs that melt into it, but not into each other, on a grid."""
+    total = np.full(grid.shape, FAR, dtype=np.float32)
+    _make(trunk, grid, total)
+    body = total.copy()
     for limb in limbs:
-        alone = _sample(limb, grid, field.copy())
-        near = _window([slab.box for slab in limb.slabs], grid)
-        joined = smooth_minimum(body[near], alone[near], limb.softness)
-        total[near] = np.minimum(total[near], joined)
-    for _ in range(SMOOTHINGS):
-        for axis in range(3):
-            total = _smoothed(np.moveaxis(total, axis, 0), axis)
-    return total, grid
+        near = _window([solid.box for solid in limb.solids], grid, limb.softness)
+        part = body[near]
+        if part.size:
+            alone = np.full(part.shape, FAR, dtype=np.float32)
+            _make(limb, _part_of(grid, near), alone)
+            total[near] = np.minimum(total[near], smooth_minimum(part, alone, limb.softness))
+    return total
 
 
 def smooth_minimum(a: Array, b: Array, softness: float) -> Array:
@@ -134,48 +242,33 @@ def perpendicular(side: Array, direction: Array) -> Array:
     return unit
 
 
-def _sample(group: Group, grid: Grid, field: NDArray[np.float32]) -> NDArray[np.float32]:
+def _make(group: Group, grid: Grid, field: NDArray[np.float32]) -> None:
+    """Bring a group's steps into the field, in place."""
     for step in group.steps:
-        if isinstance(step, Slab):
-            near = _window([step.box], grid)
-            field[near] = smooth_minimum(field[near], step.distance(*_coordinates(grid, near)), step.softness)
-        else:
-            near = _window([(step.point - step.reach, step.point + step.reach)], grid)
-            x, y, z = _coordinates(grid, near)
-            beyond = _dot(
-                x - np.float32(step.point[0]),
-                y - np.float32(step.point[1]),
-                z - np.float32(step.point[2]),
-                step.normal,
-            )
-            field[near] = -smooth_minimum(-field[near], -beyond, step.softness)
-    return field
+        near = _window([step.box], grid, step.softness)
+        before = field[near]
+        if before.size:
+            new = step.distance(*_coordinates(grid, near))
+            if step.removes:
+                field[near] = -smooth_minimum(-before, new, step.softness)
+            else:
+                field[near] = smooth_minimum(before, new, step.softness)
 
 
-def _smoothed(field: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
-    """The mean 1 2 1 along the first axis, which is then put back to its place."""
-    mean = field.copy()
-    mean[1:-1] = 0.5 * field[1:-1] + 0.25 * (field[:-2] + field[2:])
-    return np.moveaxis(mean, 0, axis)
+def _part_of(grid: Grid, window: tuple[slice, slice, slice]) -> Grid:
+    first = np.array([part.start for part in window])
+    shape = [part.stop - part.start for part in window]
+    return Grid(grid.origin + grid.spacing * first, grid.spacing, (shape[0], shape[1], shape[2]))
 
 
-def _grid_around(slabs: Sequence[Slab], spacing: float) -> Grid:
-    boxes = [slab.box for slab in slabs]
-    low = np.min([box[0] for box in boxes], axis=0) - (MARGIN + 2) * spacing
-    high = np.max([box[1] for box in boxes], axis=0) + (MARGIN + 2) * spacing
-    low[0] = min(low[0], -high[0])
-    low[0] = -np.ceil(-low[0] / spacing) * spacing  # x = 0 is a plane of samples
-    high[0] = -low[0]
-    shape = tuple(int(n) for n in np.round((high - low) / spacing).astype(int) + 1)
-    return Grid(low, spacing, (shape[0], shape[1], shape[2]))
-
-
-def _window(boxes: Sequence[tuple[Array, Array]], grid: Grid) -> tuple[slice, slice, slice]:
-    low = np.min([box[0] for box in boxes], axis=0)
-    high = np.max([box[1] for box in boxes], axis=0)
-    first = np.floor((low - grid.origin) / grid.spacing - MARGIN).astype(int)
-    last = np.ceil((high - grid.origin) / grid.spacing + MARGIN).astype(int) + 1
-    x, y, z = (slice(max(0, int(a)), int(b)) for a, b in zip(first, last, strict=True))
+def _window(boxes: Sequence[tuple[Array, Array]], grid: Grid, softness: float) -> tuple[slice, slice, slice]:
+    """The samples in boxes and so near to them that a volume there is felt; empty beyond the grid."""
+    around = max(MARGIN * grid.spacing, softness)
+    low = np.min([box[0] for box in boxes], axis=0) - around
+    high = np.max([box[1] for box in boxes], axis=0) + around
+    first = np.clip(np.floor((low - grid.origin) / grid.spacing).astype(int), 0, grid.shape)
+    last = np.clip(np.ceil((high - grid.origin) / grid.spacing).astype(int) + 1, 0, grid.shape)
+    x, y, z = (slice(int(a), int(b)) for a, b in zip(first, last, strict=True))
     return x, y, z
 
 

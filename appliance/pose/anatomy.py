@@ -107,6 +107,14 @@ class Anatomy:
         return chain
 
     @cached_property
+    def is_person(self) -> bool:
+        """Whether it has a head on an upright trunk, with limbs at both ends of it."""
+        spine = self.positions[self.trunk[-1]] - self.positions[self.trunk[0]]
+        legs = sum(trunk == self.trunk[0] for trunk, _ in self.limbs())
+        upright = float(spine[1]) > 0.8 * float(np.linalg.norm(spine)) > 0.0
+        return upright and legs > 1 and bool(self.neck)
+
+    @cached_property
     def across(self) -> Array:
         """Unit vector to the dancer's left: along which pairs of limbs lie apart; (3,).
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from appliance.body.body_mesh import body_mesh
 from appliance.body.skinning import BodyMesh, dual_quaternions
-from appliance.body.surface import Grid, surface_of
+from appliance.body.surface import Finer, Grid, finer_grid, surface_of
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
@@ -235,3 +235,71 @@ def test_sheets_that_would_share_a_cell_are_joined_instead() -> None:
     once, counts = np.unique(edges, axis=0, return_counts=True)
     assert (counts == 1).all()
     assert np.array_equal(once, np.unique(edges[:, ::-1], axis=0))
+
+
+def ball_field(grid: Grid) -> NDArray[np.float32]:
+    """The distance from a ball of 0.7 m."""
+    x, y, z = np.meshgrid(*(grid.axis(number) for number in range(3)), indexing="ij")
+    field: NDArray[np.float32] = np.sqrt(x * x + y * y + z * z) - np.float32(0.7)
+    return field
+
+
+@pytest.mark.parametrize("low", [(5, 20, 12), (16, 16, 30), (20, 4, 4)])
+def test_a_surface_of_cells_of_two_sizes_is_closed(low: tuple[int, int, int]) -> None:
+    grid, first = Grid(np.full(3, -1.0), 0.05, (41, 41, 41)), np.array(low)
+    boxes = [
+        Finer(at, ball_field(finer_grid(grid, at, at + 10))) for at in (first, np.minimum(first + 6, 30))
+    ]
+    vertices, normals, faces = surface_of(ball_field(grid), grid, boxes)
+    once, counts = np.unique(edges_of(faces), axis=0, return_counts=True)
+    assert (counts == 1).all() and np.array_equal(once, np.unique(edges_of(faces)[:, ::-1], axis=0))
+    assert len(vertices) > len(surface_of(ball_field(grid), grid)[0])
+    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 0.7, atol=0.005)
+    np.testing.assert_allclose(normals, vertices / 0.7, atol=0.04)
+
+
+def pieces(mesh: BodyMesh, chosen: NDArray[np.bool_]) -> int:
+    """How many pieces the chosen vertices are, along the surface."""
+    label = np.arange(len(chosen))
+    edges = edges_of(mesh.faces)
+    edges = edges[chosen[edges].all(axis=1)]
+    for _ in range(len(chosen)):
+        before = label.copy()
+        np.minimum.at(label, edges[:, 0], label[edges[:, 1]])
+        if np.array_equal(label, before):
+            break
+    return len(np.unique(label[chosen]))
+
+
+@pytest.mark.parametrize(("name", "hand"), [("dancer", "lHand"), ("mixamo", "mixamorig:LeftHand")])
+def test_a_hand_has_five_fingers_also_where_the_skeleton_has_none(name: str, hand: str) -> None:
+    mesh, wrist = mesh_of(name), mesh_of(name).bind_positions[skeleton_of(name).index(hand)]
+    out = np.linalg.norm(mesh.vertices - wrist, axis=1)
+    near = (out < 0.13 * mesh.height) & (mesh.vertices[:, 0] > wrist[0])
+    assert max(pieces(mesh, near & (out > share * out[near].max())) for share in (0.5, 0.6, 0.7, 0.8)) >= 4
+    assert pieces(mesh, near & (out > 0.0)) == 1
+
+
+def test_a_head_has_a_crown_a_nose_and_a_chin() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    eyes = mesh.bind_positions[[skeleton.index(name) for name in ("leftEye", "rightEye")]].mean(axis=0)
+    face = mesh.vertices[np.isin(mesh.joints[:, 0], [skeleton.index("head")])] / mesh.height
+    eyes = eyes / mesh.height
+    assert 0.05 < face[:, 1].max() - eyes[1] < 0.08, "the crown is flat, or too high"
+    level = face[np.abs(face[:, 0]) < 0.006]
+    nose = level[level[:, 2].argmax()]
+    assert -0.04 < nose[1] - eyes[1] < -0.005
+    under = level[(level[:, 1] < nose[1] - 0.006) & (level[:, 1] > nose[1] - 0.012), 2].max()
+    assert nose[2] - under > 0.003, "no nose stands before the lip"
+    assert np.ptp(face[:, 0]) == pytest.approx(0.105, abs=0.015), "ears"
+
+
+def test_a_pelvis_is_not_wider_than_hips_and_thighs() -> None:
+    mesh = mesh_of("dancer")
+    at = mesh.vertices[np.abs(mesh.vertices[:, 0]) < 0.14 * mesh.height]
+
+    def width(height_m: float) -> float:
+        return float(np.ptp(at[np.abs(at[:, 1] - height_m) < 0.01, 0]))
+
+    waist, crest, hip, thigh = (width(y) for y in (0.20, 0.08, 0.0, -0.10))
+    assert waist < crest < 1.02 * hip and thigh > 0.85 * hip

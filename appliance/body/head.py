@@ -1,0 +1,121 @@
+"""The head of the figure: skull, brow, nose, jaw and ears, on a neck with its two muscles."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from appliance.body.volumes import Ball, Slab, Step
+from appliance.pose.anatomy import Anatomy
+from appliance.pose.quaternion import Array
+
+_UP = np.array([0.0, 1.0, 0.0])
+_REACH = 0.115  # from the head joint to the crown, where the skeleton does not say
+_NECK = 0.0285  # radius
+
+# Places as (to the front, upwards, to the side) from the middle of the head, radii and softness, in heights.
+Place = tuple[float, float, float]
+_BALLS: tuple[tuple[Place, Place, float], ...] = (
+    ((-0.006, 0.010, 0.0), (0.061, 0.050, 0.0485), 0.0),  # cranium
+    ((-0.036, -0.002, 0.0), (0.033, 0.036, 0.038), 0.020),  # back of the head
+    ((0.026, 0.012, 0.0), (0.029, 0.034, 0.039), 0.020),  # forehead
+    ((0.022, -0.026, 0.0), (0.029, 0.036, 0.034), 0.020),  # face
+    ((0.036, -0.059, 0.0), (0.0135, 0.0115, 0.013), 0.016),  # chin
+)
+_BALLS_BY_SIDE: tuple[tuple[Place, Place, float], ...] = (
+    ((0.033, -0.019, 0.026), (0.013, 0.011, 0.012), 0.014),  # cheekbone
+    ((-0.008, -0.016, 0.0460), (0.0085, 0.0160, 0.0060), 0.006),  # ear
+    ((0.020, -0.036, 0.020), (0.018, 0.018, 0.016), 0.024),  # cheek
+)
+_SLABS_BY_SIDE: tuple[tuple[Place, Place, tuple[float, float], float], ...] = (
+    ((-0.006, -0.034, 0.036), (0.030, -0.060, 0.010), (0.011, 0.010), 0.014),  # jaw
+    ((0.050, 0.0035, 0.006), (0.040, 0.0035, 0.033), (0.0075, 0.0070), 0.009),  # brow
+)
+_SOCKET: tuple[Place, Place, float] = ((0.0610, -0.0100, 0.0190), (0.0120, 0.0080, 0.0120), 0.014)
+_LID: tuple[Place, Place, float] = ((0.0415, -0.0095, 0.0180), (0.0095, 0.0080, 0.0095), 0.005)
+_RIDGE = ((0.0485, -0.004, 0.0), (0.0625, -0.0275, 0.0), (0.0050, 0.0065), 0.008)
+_WING = ((0.0525, -0.0295, 0.0070), (0.0065, 0.0052, 0.0050), 0.005)
+_LIPS = ((0.0470, -0.0430, -0.0095), (0.0470, -0.0430, 0.0095), (0.0052, 0.0052), 0.010)
+
+
+def head(anatomy: Anatomy) -> list[Step]:
+    """A skull with a face and ears; of an animal a muzzle; empty without a head."""
+    joint = anatomy.head
+    if joint is None:
+        return []
+    height = anatomy.height
+    up, reach = _head_axis(anatomy, joint)
+    place = anatomy.positions[joint]
+    if not anatomy.is_person:
+        ends = place, place + max(reach, 0.05 * height) * up
+        return [Slab(joint, *ends, 0.048 * height, 0.030 * height, 0.0, anatomy.across)]
+    front = np.cross(anatomy.across, up)
+    front = front / np.linalg.norm(front)
+    front = front if float(front @ anatomy.forward) >= 0 else -front
+    side = np.cross(up, front)
+    axes = np.array([front, up, side])
+    middle = place + min(max(reach - 0.055 * height, 0.03 * height), 0.058 * height) * up
+
+    def at(place: Place, mirrored: float = 1.0) -> Array:
+        there: Array = middle + height * (np.array(place) * [1.0, 1.0, mirrored]) @ axes
+        return there
+
+    def ball(shape: tuple[Place, Place, float], mirrored: float = 1.0, removes: bool = False) -> Ball:
+        place, radii, softness = shape
+        return Ball(joint, at(place, mirrored), height * np.array(radii), axes, softness * height, removes)
+
+    def slab(shape: tuple[Place, Place, tuple[float, float], float], mirrored: float = 1.0) -> Slab:
+        low, high, radii, softness = shape
+        first, last = np.array(radii) * height
+        return Slab(joint, at(low, mirrored), at(high, mirrored), first, last, softness * height, side)
+
+    both = (1.0, -1.0)
+    steps: list[Step] = [ball(shape) for shape in _BALLS]
+    steps += [slab(shape, sign) for shape in _SLABS_BY_SIDE for sign in both]
+    steps += [ball(shape, sign) for shape in _BALLS_BY_SIDE for sign in both]
+    steps += [ball(_SOCKET, sign, removes=True) for sign in both]
+    steps += [ball(_LID, sign) for sign in both]
+    steps += [slab(_RIDGE), *(ball(_WING, sign) for sign in both), slab(_LIPS)]
+    return steps
+
+
+def neck(anatomy: Anatomy) -> list[Step]:
+    """From the trunk into the skull, and the muscle from behind each ear to the collarbones."""
+    height, places, joints = anatomy.height, anatomy.positions, anatomy.neck
+    if not joints:
+        return []
+    radius, soft = _NECK * height, 0.012 * height
+    steps: list[Step] = []
+    base = anatomy.skeleton.parents[joints[0]]
+    if base >= 0:
+        low = places[joints[0]] + 0.35 * (places[base] - places[joints[0]])
+        steps.append(Slab(base, low, places[joints[0]], 1.35 * radius, 1.08 * radius, soft, anatomy.across))
+    for owner, top in pairwise(joints):
+        steps.append(Slab(owner, places[owner], places[top], 1.05 * radius, radius, soft, anatomy.across))
+    last, first = joints[-1], joints[0]
+    up, _ = _head_axis(anatomy, last)
+    into = places[last] + 0.035 * height * up - 0.006 * height * anatomy.forward
+    steps.append(Slab(last, places[last], into, radius, 0.9 * radius, soft, anatomy.across))
+    pit = places[first] + (0.040 * anatomy.forward - 0.014 * _UP) * height
+    for sign in (1.0, -1.0):
+        ear = places[last] + (0.022 * up + sign * 0.031 * anatomy.across - 0.010 * anatomy.forward) * height
+        breast = pit + sign * 0.010 * height * anatomy.across
+        steps.append(
+            Slab(first, breast, ear, 0.0075 * height, 0.0110 * height, 0.010 * height, anatomy.across)
+        )
+    return steps
+
+
+def _head_axis(anatomy: Anatomy, joint: int) -> tuple[Array, float]:
+    """Unit vector from the head joint to the crown, and how far that is, metres."""
+    place = anatomy.positions[joint]
+    for _, _, end in anatomy.bones([joint]):
+        reach = float(np.linalg.norm(end - place))
+        if reach > 0.04 * anatomy.height and abs(float((end - place) @ anatomy.across)) < 0.2 * reach:
+            return (end - place) / reach, reach
+    parent = anatomy.skeleton.parents[joint]
+    bone = place - anatomy.positions[parent] if parent >= 0 else _UP
+    if float(bone @ _UP) > 0.5 * float(np.linalg.norm(bone)):
+        bone = _UP
+    return bone / max(float(np.linalg.norm(bone)), 1e-9), _REACH * anatomy.height
