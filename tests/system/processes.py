@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import signal
 import subprocess
@@ -11,6 +12,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, Any, Self, TypeVar
+
+import pytest
 
 PATIENCE_S = 60.0  # for a busy machine; nothing waits that long without a fault
 POLL_S = 0.02
@@ -46,9 +49,22 @@ def run(command: Sequence[str | Path], **options: Any) -> subprocess.CompletedPr
     )
 
 
-def run_bunraku(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
-    """One command of bunraku, from start to end."""
-    return run([*BUNRAKU, *arguments], **options)
+def run_bunraku(*arguments: str | Path, stdin: str = "") -> subprocess.CompletedProcess[str]:
+    """One command of bunraku, from start to end, in this process: a new process costs half a second."""
+    from appliance.cli.app import main  # here: importing it sets the environment of numerical libraries
+
+    given, status = list(map(str, arguments)), 0
+    with (
+        contextlib.redirect_stdout(io.StringIO()) as out,
+        contextlib.redirect_stderr(io.StringIO()) as errors,
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        patch.setattr(sys, "stdin", io.StringIO(stdin))
+        try:
+            main(given)
+        except SystemExit as ended:
+            status = int(ended.code or 0)
+    return subprocess.CompletedProcess(given, status, out.getvalue(), errors.getvalue())
 
 
 def start(command: Sequence[str | Path], output: IO[bytes] | int) -> subprocess.Popen[bytes]:

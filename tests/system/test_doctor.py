@@ -15,7 +15,7 @@ from hw_sim.peers import free_ports
 from tests.bundles import write_show
 from tests.system.box import playing
 from tests.system.machine_of_files import STAGE_PID, Check, lay, only
-from tests.system.processes import run_bunraku
+from tests.system.processes import BUNRAKU, run, run_bunraku
 
 
 def test_every_finding_but_ok_has_a_cure(tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_the_verdict_on_files_of_the_kernel(
 def test_beside_a_dancing_box_it_finds_the_box_and_costs_it_no_frame(tmp_path: Path) -> None:
     with playing(write_show(tmp_path / "show"), tmp_path) as box:
         first = box.frames(70)[-1]  # after a second the stage has published its health
-        done = run_bunraku("doctor", "--box", box.box_file, "--json")
+        done = run([*BUNRAKU, "doctor", "--box", box.box_file, "--json"])
         found = {one["what"]: one for one in json.loads(done.stdout)}
         rate = re.match(r"(\d+\.\d) Hz; \d+ of \d+ ticks", found["stage"]["words"])
         assert rate and float(rate[1]) > 25.0, found["stage"]  # this machine may have been busy
@@ -108,7 +108,7 @@ def test_a_show_without_its_sensor_and_its_receiver_is_wrong(tmp_path: Path) -> 
     settings = {"outputs": {"osc": [{"port": nobody}], "dmx": [{"universe": 1, "wire": "udmx"}]}}
     with playing(write_show(tmp_path / "show"), tmp_path, settings=settings) as box:
         box.await_words(f"Receiver 127.0.0.1:{nobody}")
-        done = run_bunraku("doctor", "--box", box.box_file, "--json")
+        done = run([*BUNRAKU, "doctor", "--box", box.box_file, "--json"])
         found = {one["what"]: one for one in json.loads(done.stdout)}
     assert done.returncode == 1
     assert found["sensor left-wrist"]["verdict"] == "wrong"

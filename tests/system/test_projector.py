@@ -19,7 +19,7 @@ from appliance.show.bundle import default_show_path
 from tests.bundles import write_show
 from tests.show_control.doubles import Asker
 from tests.system.box import Box, playing
-from tests.system.processes import BUNRAKU, Process, run_bunraku, wait_until
+from tests.system.processes import BUNRAKU, Process, run, run_bunraku, wait_until
 
 SIZE = "128x72"
 
@@ -123,7 +123,7 @@ def test_without_a_display_it_says_so(tmp_path: Path) -> None:
         pytest.skip("this machine has a display of its own")
     without = {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
     environment = {name: value for name, value in os.environ.items() if name not in without}
-    done = run_bunraku("project", env=environment)
+    done = run([*BUNRAKU, "project"], env=environment)
     assert done.returncode == NO_DISPLAY
     assert re.fullmatch(r"bunraku: There is no display .* Plug the projector in .*\n", done.stderr)
 

@@ -22,7 +22,7 @@ from appliance.sensor.provisioning.wearable_console import WearableConsole
 from hw_sim.firmware_library import State
 from tests.system.bench import NETWORK, PASSWORD, Bench
 from tests.system.box import JOURNAL, Box, playing
-from tests.system.processes import BUNRAKU, PATIENCE_S, run_bunraku, wait_until
+from tests.system.processes import BUNRAKU, PATIENCE_S, run, run_bunraku, wait_until
 from tests.system.snoop import Snoop
 
 pytestmark = pytest.mark.realtime
@@ -42,7 +42,7 @@ def bunraku(*words: str, stdin: str = "", status: int = 0) -> str:
 
     def has_ended() -> bool:
         nonlocal command, output
-        done = run_bunraku(*command, input=stdin, timeout=120)
+        done = run_bunraku(*command, stdin=stdin)
         output += done.stdout + done.stderr
         assert "Traceback" not in done.stderr
         assert done.returncode == status or "not answer" in output, output
@@ -233,10 +233,17 @@ def read_until(master: int, words: bytes) -> bytes:
     return shown
 
 
-def test_no_secret_is_visible_to_other_users(show: Path, tmp_path: Path) -> None:
+def as_processes(*words: str, stdin: str) -> subprocess.CompletedProcess[str]:
+    return run([*BUNRAKU, *words], input=stdin, timeout=120)
+
+
+def test_no_secret_is_visible_to_other_users(
+    show: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     password_file = tmp_path / "password"
     password_file.write_text(PASSWORD + "\n")
     password_file.chmod(0o600)
+    monkeypatch.setattr(sys.modules[__name__], "run_bunraku", as_processes)  # others see those in /proc
     snoop, before, said = Snoop(tmp_path), os.umask(0), ""
     try:
         with playing(show, tmp_path, settings=JOURNAL) as box, Bench(box.sensors) as bench, snoop:
