@@ -58,8 +58,24 @@ def told(box: Path | None, chosen: Path | None) -> dict[str, Any]:
         "file": str(place),
         "text": place.read_text(encoding="utf-8-sig") if place.exists() else _EMPTY,
         "keys": [one._asdict() for one in venue_keys(config)],
+        **_receivers(config),
         "at_once": chosen is not None,
     }
+
+
+def _receivers(config: BoxConfig) -> dict[str, Any]:
+    """OSC receivers as the file has them; those built in where it lists none."""
+    written = _at(config.file.values, "outputs", "osc")
+    if isinstance(written, list):
+        return {"receivers": [one for one in written if isinstance(one, dict)], "receivers_written": True}
+    told = [{"host": one.host, "port": one.port} for one in config.outputs.osc]
+    return {"receivers": told, "receivers_written": False}
+
+
+def _at(values: Any, *steps: str) -> Any:
+    for step in steps:
+        values = values.get(step) if isinstance(values, dict) else None
+    return values
 
 
 def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, Any]:

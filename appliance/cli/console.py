@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from appliance.box.durable import write_whole
 from appliance.box.notify import WATCHDOG_S
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.cli.companions import Companion
@@ -32,6 +33,7 @@ from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
+    from appliance.show.report import ReportConfig
 
 _KEPT = "console.json"
 _PATIENCE_S = 2.0
@@ -184,6 +186,7 @@ def console_command(
     with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as opened:
         host, port = opened.getsockname()[:2]
         (folder / WHERE).write_text(f"{kept}\n{host}\n{port}\n{'https' * console.https}\n")
+    write_report_settings(folder, console.report)
     settings = Settings(
         folder=str(folder),
         descriptor=descriptor,
@@ -199,6 +202,17 @@ def console_command(
         phones=phone_names(box),
     )
     return sys.executable, "-m", "appliance.console", settings.packed()
+
+
+def write_report_settings(folder: Path, report: ReportConfig | None) -> None:
+    """For the page's process, which loads no pydantic; a command line is no place for secrets."""
+    from appliance.console.report import FILE
+
+    with contextlib.suppress(OSError):
+        if report is None:
+            (folder / FILE).unlink(missing_ok=True)
+        else:
+            write_whole(folder / FILE, report.model_dump_json().encode(), private=True)
 
 
 def page_companion(

@@ -71,6 +71,30 @@ def adopt_show(folder: str, box: str | None = None, chosen: str | None = None) -
     return box_file.adopt_show(_chosen(chosen), Path(folder))
 
 
+def help_file(
+    out: str,
+    journal: str | None,
+    log: list[str],
+    status: dict[str, Any],
+    box: str | None = None,
+    chosen: str | None = None,
+) -> Any:
+    """Write the help file."""
+    import socket
+
+    from appliance.cli import help_file, proof
+    from appliance.release.choice import box_of
+    from appliance.stage.stage_error import StageError
+
+    versions = {"host": socket.gethostname(), "machine": proof.machine(), "software": proof.software()}
+    folder = _path(journal)
+    try:
+        help_file.help_file(Path(out), box_of(_path(box), _path(chosen)), folder, log, status, versions)
+    except OSError as error:
+        raise StageError(f"{out}: the file cannot be written ({error.strerror}). Free memory.") from error
+    return {}
+
+
 def timelines(journal: str) -> Any:
     """All runs of a journal."""
     from appliance.recorder.reading import read_journal
@@ -109,7 +133,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     one.__name__: one
     for one in (
         *(about, pose_map, keep_cue, box_file, change_box_file, dance_again, adopt_show),
-        *(timelines, stretch),
+        *(timelines, stretch, help_file),
     )
 }
 

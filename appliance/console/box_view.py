@@ -70,6 +70,7 @@ class BoxView:
             "sensors": sensors,
             "fallbacks": fallbacks,
             "processes": [{"process": one.process, "late": one.late} for one in members],
+            "wall": dict(next((one.told for one in members if one.process == "projector" and one.lives), {})),
             "hands": [one._asdict() for one in hands_of(seen)] if known else [],
             "generation": self._stage.generation,
             **self._declared(),

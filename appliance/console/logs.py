@@ -35,10 +35,13 @@ class Logs:
 
     async def _lines(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
+        return web.json_response((await self.lines())[-_MOST:])
+
+    async def lines(self) -> list[dict[str, Any]]:
+        """The last lines, the newest last. Raises 404, 503."""
         lines = await _of_units() if self._is_installed else self._of_play()
         figures = [line for line in lines if _FIGURES.match(line["words"])]
-        told = [line for line in lines if line in figures[-1:] or not _FIGURES.match(line["words"])]
-        return web.json_response(told[-_MOST:])
+        return [line for line in lines if line in figures[-1:] or not _FIGURES.match(line["words"])]
 
     def _of_play(self) -> list[dict[str, Any]]:
         try:

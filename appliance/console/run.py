@@ -33,11 +33,14 @@ from appliance.console.fallback import OF_THE_PAGE, note_crowd
 from appliance.console.guard import Guard
 from appliance.console.hands import Hands
 from appliance.console.happened import Happened
+from appliance.console.help import Help
 from appliance.console.logs import Logs
+from appliance.console.night import Night
 from appliance.console.phones import Phones
 from appliance.console.pose_map import PoseMap
 from appliance.console.prove import Prove
 from appliance.console.rehearsed import FOLDER, ZIP, Rehearsed
+from appliance.console.report import send, settings_in, watch
 from appliance.console.rig import Rig
 from appliance.console.seen_stage import SeenStage
 from appliance.console.sensor_changes import SensorChanges
@@ -82,9 +85,12 @@ async def _serve(settings: Settings) -> int:
     logs = Logs(guard, folder, settings.is_installed)
     rehearsed = Path(settings.kept).parent / FOLDER
     venue = Venue(guard, folder, settings.box, settings.is_installed, rehearsed)
+    night = Night(stage, box, Path(settings.kept).parent)
+    helping = Help(guard, box, logs, folder, settings.journal, settings.box)
     hands, rig = Hands(guard, desk, folder), Rig(folder)
     phones = Phones(guard, door, settings.phones, folder, fallbacks)
     others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes(), *phones.routes()]
+    others += [*night.routes(), *helping.routes()]
     others += certificate.routes(Path(settings.kept).parent)
     named = ("--box", settings.box["box"]) if "box" in settings.box else ()
     others += SensorChanges(guard, stage, named).routes()
@@ -110,6 +116,8 @@ async def _serve(settings: Settings) -> int:
         asyncio.create_task(_send_frames(stage, watchers)),
         asyncio.create_task(hands.watch()),
         asyncio.create_task(phones.watch()),
+        asyncio.create_task(night.watch()),
+        *_reporting(folder, box),
         asyncio.create_task(stopped.wait()),
     ]
     ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -132,6 +140,11 @@ async def _serve(settings: Settings) -> int:
     seen.close()
     rig.close()
     return 0
+
+
+def _reporting(folder: Path, box: BoxView) -> list[asyncio.Task[None]]:
+    wanted = settings_in(folder)
+    return [] if wanted is None else [asyncio.create_task(watch(wanted, lambda: box.value, send))]
 
 
 def _https(settings: Settings) -> ssl.SSLContext:

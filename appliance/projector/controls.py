@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from appliance.box.orders import Order
 from appliance.projector.alignment import MOST_BRIGHT, Alignment
@@ -106,6 +107,11 @@ class Controls:
         """Show or hide the figures."""
         self.shows_info = info
         return "Figures are on the wall." if info else "No figures on the wall."
+
+    def told(self) -> dict[str, Any]:
+        """For the page: corners in shares of the display, brightness as a factor, grid and figures."""
+        corners, brightness = self.alignment.corners, self.alignment.brightness
+        return {"corners": corners, "brightness": brightness, "grid": self.has_grid, "info": self.shows_info}
 
     def carry_out(self, order: Order) -> tuple[bool, str]:
         """An order by OSC: whether it was done, and a sentence."""

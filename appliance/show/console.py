@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, model_validator
 
+from appliance.show.report import ReportConfig
 from appliance.show.section import Section, key, refusal
 
 
@@ -64,6 +65,10 @@ class ConsoleConfig(Section):
     rehearsal: bool = key(
         "Show the page Rehearsal (phrase, iterations, hands); false: a venue that plays the show as it is.",
         True,
+    )
+
+    report: ReportConfig | None = key(
+        "Reports to a technician far away, by a webhook or by mail; null: none.", None
     )
 
     @model_validator(mode="after")

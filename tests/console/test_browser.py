@@ -42,21 +42,21 @@ def test_panic_asks_for_the_pin_once_and_is_then_done(tab: Tab, venue: tuple[Box
     expect(tab.locator("#pin")).to_be_visible()
     tab.fill("#pin-input", f"{(int(page.pin) + 1) % 1_000_000:06}")
     press(tab, "#pin-send")
-    expect(tab.locator("#pin-said")).to_contain_text("This is not the PIN.")
+    expect(tab.locator("#pin-said")).to_contain_text("Wrong PIN.")
     assert not declared(box).panic
     tab.fill("#pin-input", page.pin)
     press(tab, "#pin-send")
-    expect(tab.locator("#verdict")).to_contain_text("PANIC is in force")
+    expect(tab.locator("#verdict")).to_contain_text("PANIC is on")
     expect(tab.locator("#panic")).to_have_attribute("aria-pressed", "true")
     assert declared(box).panic
-    press(tab, "#go")
+    press(tab, "#resume")
     expect(tab.locator("#panic")).to_have_attribute("aria-pressed", "false")
     assert not declared(box).panic
     tab.reload()
     await_box(tab)
     press(tab, "#panic")
     wait_until(lambda: declared(box).panic, "the device was forgotten")
-    press(tab, "#go")
+    press(tab, "#resume")
     wait_until(lambda: not declared(box).panic)
 
 
@@ -72,11 +72,22 @@ def test_an_evening_by_its_buttons(tab: Tab, venue: tuple[Box, Page]) -> None:
     wait_until(lambda: not declared(box).blackout)
     press(tab, "#stop")
     expect(tab.locator("#verdict")).to_contain_text("stopped")
-    press(tab, "#go")
+    press(tab, "#resume")
     wait_until(lambda: declared(box).going)
+    expect(tab.locator("#go-name")).to_have_text("calm")
+    press(tab, "#go")
+    wait_until(lambda: declared(box).cue == "calm")
+    expect(tab.locator("#now-name")).to_have_text("calm")
+    expect(tab.locator("#go-name")).to_have_text("storm")
+    press(tab, "#cues >> text=calm")
+    expect(tab.locator("#go-name")).to_have_text("calm")
+    assert declared(box).cue == "calm", "a tap in the list only chooses"
     press(tab, "#cues >> text=storm")
-    wait_until(lambda: declared(box).cue == "storm")
-    expect(tab.locator("#cues >> text=storm")).to_have_attribute("aria-pressed", "true")
+    tab.locator("#cues button").nth(1).blur()
+    # A second GO within half a second counts as the same press.
+    wait_until(lambda: tab.keyboard.press("Space") or declared(box).cue == "storm")
+    expect(tab.locator("#cues button").nth(1)).to_have_attribute("aria-current", "true")
+    expect(tab.locator("#go")).to_be_disabled()
     tab.locator("#master").focus()
     tab.keyboard.press("Home")
     wait_until(lambda: declared(box)[MASTER].value == 0.0)
@@ -114,7 +125,7 @@ def test_a_thumb_that_scrolls_over_panic_does_nothing(browser: Browser, venue: t
     assert not declared(box).panic
     tab.tap("#panic")
     wait_until(lambda: declared(box).panic, "a tap in the same place acts")
-    tab.tap("#go")
+    tab.tap("#resume")
     wait_until(lambda: not declared(box).panic)
     context.close()
 
@@ -124,8 +135,8 @@ def test_a_page_s_process_that_hangs_is_killed_and_comes_back(tab: Tab, venue: t
     box, _ = venue
     (process,) = children_running(box.process.pid, "appliance.console")
     os.kill(process, signal.SIGSTOP)
-    expect(tab.locator("#verdict")).to_contain_text("No word from the box")
-    expect(tab.locator("#verdict")).not_to_contain_text("No word from the box")
+    expect(tab.locator("#verdict")).to_contain_text("The box does not answer")
+    expect(tab.locator("#verdict")).not_to_contain_text("The box does not answer")
     heard = tab.evaluate("seen.heard")
     await_true(tab, f"seen.heard > {heard}")
 
@@ -144,7 +155,7 @@ def test_after_the_phone_slept_the_page_is_back(browser: Browser, venue: tuple[B
     sleep.send("Page.setWebLifecycleState", {"state": "active"})
     woken = time.time()
     await_true(tab, f"seen.heard > {woken}")
-    expect(tab.locator("#verdict")).not_to_contain_text("No word from the box")
+    expect(tab.locator("#verdict")).not_to_contain_text("The box does not answer")
     context.close()
 
 
@@ -224,12 +235,12 @@ def test_the_keyboard_reaches_panic(tab: Tab, venue: tuple[Box, Page]) -> None:
     tab.keyboard.press("Enter")
     wait_until(lambda: declared(box).panic)
     press(tab, '[data-page="tonight"]')
-    tab.locator("#go").press("Enter")
+    tab.locator("#resume").press("Enter")
     wait_until(lambda: not declared(box).panic)
 
 
 def test_pictures_of_each_page(browser: Browser, tmp_path: Path, venue: tuple[Box, Page]) -> None:
-    """`python -m tools.page_pictures` draws what docs/technician.md shows; here beside a box of the test."""
+    """`python -m tools.page_pictures` draws what docs/page.md shows; here beside a box of the test."""
     taken = take_pictures(browser, venue[1].origin, tmp_path, well_within_ms=1)  # its page was killed above
     assert [path.name for path in taken] == [f"page-{page}.png" for page in PAGES]
     assert all(5_000 < path.stat().st_size < 200_000 for path in taken)

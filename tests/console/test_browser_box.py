@@ -23,7 +23,7 @@ def test_the_box_tells_its_release_and_addresses(tab: Tab, venue: tuple[Box, Pag
     expect(tab.locator("#box-release")).to_contain_text(version("bunraku"))
     expect(tab.locator("#box-release")).to_contain_text(venue[0].box_file.name)
     expect(tab.locator("#box-network")).to_contain_text(socket.gethostname())
-    expect(tab.locator("#box-clock")).to_contain_text("Clock of the box: ")
+    expect(tab.locator("#box-clock")).to_contain_text("Box clock: ")
     expect(tab.locator("#box-shows-part")).to_be_hidden()
 
 
@@ -43,10 +43,10 @@ def test_the_box_tells_which_shows_it_has(tab: Tab) -> None:
     tab.route("**/api/box", lambda route: route.fulfill(json=told))
     press(tab, '[data-page="box"]')
     dances, instead = (tab.locator("#box-shows li").nth(place) for place in (0, 1))
-    expect(dances).to_contain_text("<b>stick</b>chosen at power-on · has not danced here yet")
-    expect(instead).to_contain_text("dances if the one above does not · has danced here")
+    expect(dances).to_contain_text("<b>stick</b>starts at power-on · has not run here yet")
+    expect(instead).to_contain_text("starts if the one above fails · has run here")
     expect(tab.locator("#box-refused li")).to_have_text(["show.yaml:3: no such key.", "It was too slow."])
-    expect(tab.locator("#box-releases li")).to_have_text(["1.9", "2.0dances"])
+    expect(tab.locator("#box-releases li")).to_have_text(["1.9", "2.0running"])
     expect(tab.locator("#box-rollback")).to_be_visible()
     expect(tab.locator("#box-network")).to_contain_text("192.0.2.7")
 
@@ -65,8 +65,9 @@ def test_a_venue_changes_its_ports_and_a_mistake_has_its_line(tab: Tab, venue: t
     wanted = str(int(port.input_value()) - 1)
     port.fill("70000")
     press(tab, "#file-check")
-    expect(tab.locator("#file-problems")).to_contain_text("Line")
     expect(tab.locator("#file-problems")).to_contain_text("'sensors.udp.port' is 70000, out of range")
+    expect(port).to_have_attribute("aria-invalid", "true")
+    expect(tab.locator("label:has([aria-invalid]) .wrong")).to_contain_text("Write 0 to 65535")
     assert path.read_text() == before
     port.fill(wanted)
     press(tab, "#file-check")

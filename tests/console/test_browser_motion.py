@@ -83,7 +83,7 @@ def test_variations_and_places_on_the_map(browser: Browser, studio: tuple[Box, P
     size = ground.evaluate("one => one.clientWidth")
     ground.tap(position={"x": 0.25 * size, "y": 0.25 * size})
     wait_until(lambda: value(box, "path points") == pytest.approx((0.25, 0.75), abs=0.01))
-    expect(tab.locator("#map-said")).to_have_text("At one place.")
+    expect(tab.locator("#map-said")).to_have_text("Staying at one place.")
     at = ground.bounding_box()
     assert at is not None
     touch = tab.context.new_cdp_session(tab)
@@ -94,7 +94,7 @@ def test_variations_and_places_on_the_map(browser: Browser, studio: tuple[Box, P
     line = wait_until(lambda: value(box, "path points") if len(value(box, "path points")) == 32 else ())
     assert line[::2] == pytest.approx([0.2 + 0.04 * place for place in range(16)], abs=0.01)
     assert line[1::2] == pytest.approx([0.5] * 16, abs=0.01)
-    expect(tab.locator("#map-said")).to_have_text("Along the line, there and back.")
+    expect(tab.locator("#map-said")).to_have_text("Along the line and back.")
     tab.locator("#map-own").press("Enter")
     wait_until(lambda: not value(box, "path points"), lambda: tab.inner_text("#said"))
     tab.context.close()

@@ -153,7 +153,7 @@ def test_one_phone_is_a_sensor_and_another_takes_its_place_only_when_asked(
     stranger.begin()
     expect(stranger.tab.locator("#phone-said")).to_contain_text(f"Another phone is {NAME} now.")
     press(stranger.tab, "#take-over")
-    expect(stranger.tab.locator("#phone-said")).to_contain_text("not valid any more")
+    expect(stranger.tab.locator("#phone-said")).to_contain_text("no longer valid")
     assert held(stage) == 1.0, "a used code took the joint away"
     second = Phone(other, invited(page, OTHER))
     second.begin()

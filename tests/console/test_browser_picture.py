@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -76,7 +77,7 @@ def test_the_rig_shines_on_the_page_and_is_walked_while_the_show_stands(
     press(tab, "#panic")
     lamps.await_safe()
     press(tab, '[data-page="tonight"]')
-    press(tab, "#go")
+    press(tab, "#resume")
     lamps.await_dance()
     press(tab, '[data-page="picture"]')
     expect(tab.locator("#rig-walk")).to_be_visible()
@@ -97,7 +98,8 @@ def test_a_corner_follows_the_finger_on_the_wall(
 ) -> None:
     box, page, _ = hall
     tab = unlocked_tab(context, page, "picture")
-    press(tab, "#grid-on")
+    press(tab, "#grid")
+    expect(tab.locator("#grid")).to_have_attribute("aria-pressed", "true")
     wall.await_picture(lambda picture: bool(picture[:3, :3].any()))
     pad, handle = (tab.locator(one).bounding_box() for one in ("#corners", "#corners button >> nth=0"))
     assert pad is not None and handle is not None
@@ -110,14 +112,28 @@ def test_a_corner_follows_the_finger_on_the_wall(
     first = tab.locator("#corners button").nth(0)
     # A projector that is busy refuses, and the page says so: a person presses again.
     wait_until(lambda: first.press("ArrowRight") or _corner(box)[0] > corner[0] + 0.001)
+    press(tab, "#corners-reset")
+    expect(tab.locator("#said")).to_contain_text("Hold the button")
+    assert _corner(box)[0] > 0.2, "a tap does not reset"
     wait_until(
-        lambda: press(tab, "#corners-reset") or _corner(box) == pytest.approx((0, 0), abs=0.001),
+        lambda: hold(tab, "#corners-reset") or _corner(box) == pytest.approx((0, 0), abs=0.001),
         lambda: f"{_corner(box)} {tab.inner_text('#said')}",
     )
+    press(tab, "#corners-undo")
+    wait_until(lambda: _corner(box) == pytest.approx(corner, abs=0.01), lambda: f"{_corner(box)}")
+    expect(tab.locator("#corners-shape")).to_have_attribute("points", re.compile(r"^0\.2\d+,0\.2\d+ 1,0 "))
+    wait_until(lambda: hold(tab, "#corners-reset") or _corner(box) == pytest.approx((0, 0), abs=0.001))
     wall.await_picture(lambda picture: bool(picture[:3, :3].any()))
-    press(tab, "#grid-off")
+    press(tab, "#grid")
     expect(tab.locator("#rig")).to_be_visible()
     assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def hold(tab: Tab, where: str) -> None:
+    """Long enough for a button that asks for it."""
+    tab.locator(where).dispatch_event("pointerdown")
+    tab.wait_for_timeout(1100)
+    tab.locator(where).dispatch_event("pointerup")
 
 
 def drag(tab: Tab, x: float, y: float, dx: float, dy: float) -> None:

@@ -67,7 +67,7 @@ def test_a_sensor_from_its_cable_to_its_end(browser: Browser, tmp_path: Path) ->
         state(tab, "spare", "linked")
         press(tab, sensor_card("spare") + " >> text=Replace")  # by the sensor that the show wears
         expect(tab.locator("#change-spare option")).to_have_text("left-wrist (worn in this show)")
-        expect(tab.locator("#change-anyway-words")).to_contain_text("left-wrist is a sensor of this show")
+        expect(tab.locator("#change-anyway-words")).to_contain_text("left-wrist is worn in this show")
         expect(tab.locator("#change-send")).to_be_disabled()
         press(tab, "#change-cancel")
         press(tab, sensor_card("left-wrist") + " >> text=Replace")

@@ -87,7 +87,8 @@ def test_everything_can_be_said(tmp_path: Path) -> None:
             ["no sender is listed", "senders: [192.168.0.20]"],
         ),
         (
-            "sensors:\n foreign:\n - {name: a, from: mocopi, bone: head, port: 9}\n - {name: b, from: gyrosc, port: 9}",
+            "sensors:\n foreign:\n - {name: a, from: mocopi, bone: head, port: 9}\n"
+            " - {name: b, from: gyrosc, port: 9}",
             4,
             ["Port 9 is for mocopi (a)", "b from gyrosc would not be heard", "another `port`"],
         ),

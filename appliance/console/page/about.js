@@ -1,7 +1,8 @@
 // Box: which show dances and which would instead, release, addresses, clock.
 import { byId } from "./elements.js";
-import { danceAgain, twice } from "./venue.js";
-import { locale, words } from "./words.js";
+import { twice } from "./hold.js";
+import { danceAgain } from "./venue.js";
+import { locale, translated, words } from "./words.js";
 
 export async function readAbout() {
   byId("box-said").textContent = words("box_reading");
@@ -10,7 +11,7 @@ export async function readAbout() {
     answer = await fetch("/api/box");
   } catch { /* said below */ }
   byId("box-all").hidden = !answer?.ok;
-  byId("box-said").textContent = answer?.ok ? "" : answer ? await answer.text() : words("no_page");
+  byId("box-said").textContent = answer?.ok ? "" : answer ? translated(await answer.text()) : words("no_page");
   if (answer?.ok) tell(await answer.json());
 }
 
@@ -19,7 +20,7 @@ function tell(box) {
   byId("box-shows").replaceChildren(...box.shows.map(shown));
   const refused = [...box.refused, ...box.aside];
   byId("box-refused-part").hidden = refused.length === 0;
-  byId("box-refused").replaceChildren(...refused.map((sentence) => item(sentence, "")));
+  byId("box-refused").replaceChildren(...refused.map((sentence) => item(translated(sentence), "")));
   byId("box-release").replaceChildren(
     pair(words("box_version"), box.version), pair(words("box_file"), box.box_file ?? words("box_no_file")));
   byId("box-releases").replaceChildren(...box.releases.map((name) => item(name, name === box.release ? words("box_current") : "")));
@@ -36,7 +37,7 @@ export function showClock(value) {
 
 // Each but the first can be danced again, where the box has kept it; what comes with the box is the last resort.
 function shown(show, place) {
-  const line = item(show.source, `${words(place ? "box_instead" : "box_dances")} · ${words(show.good ? "box_good" : "box_new")}`);
+  const line = item(translated(show.source), `${words(place ? "box_instead" : "box_dances")} · ${words(show.good ? "box_good" : "box_new")}`);
   if (place === 0 || !show.id) return line;
   const row = document.createElement("div"), button = document.createElement("button");
   row.className = "row";

@@ -105,7 +105,7 @@ export class Box extends EventTarget {
   }
 }
 
-// What the box answers to a request: {status, words, done, ...}; status 0: no answer at all.
+// The box's answer to a request: {status, words, done, ...}; status 0: no answer.
 export async function request(path, said, patienceMs = 6000) {
   const options = said === undefined ? {} : { method: "POST", body: JSON.stringify(said) };
   try {

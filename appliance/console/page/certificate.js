@@ -1,13 +1,13 @@
 // A proof as a document: one sheet of paper, to be printed or sent as a picture.
 import { drawPlots, PAPER } from "./plots.js";
-import { locale, number, words } from "./words.js";
+import { locale, number, translated, words } from "./words.js";
 
 const WIDTH = 1240, HEIGHT = 1754, MARGIN = 90; // A4 at 150 dots an inch
 
 export const verdictOf = (proof) => words(`prove_${proof.kind}_${proof.holds ? "holds" : "fails"}`);
 export const madeAt = (proof) => new Date(1000 * proof.made).toLocaleString(locale, { hourCycle: "h23" });
 
-// What is measured, in the reader's language where its table has it.
+// The name of a limit in the reader's language.
 export function limitWords(limit) {
   const key = `limit_${limit.words.toLowerCase().replace(/[^a-z0-9]+/g, "_")}`;
   const said = words(key);
@@ -84,8 +84,8 @@ function doctor(context, proof, y) {
   for (const finding of proof.findings) {
     const colour = finding.verdict === "wrong" ? PAPER.fault : finding.verdict === "ok" ? PAPER.well : PAPER.ink;
     text(context, words(`finding_${finding.verdict}`), MARGIN, y + 10, 20, colour, "700");
-    y = text(context, `${finding.what}: ${finding.words}`, MARGIN + 230, y + 10, 20, PAPER.ink, "400");
-    if (finding.cure) y = text(context, `→ ${finding.cure}`, MARGIN + 230, y, 20, PAPER.quiet, "400");
+    y = text(context, `${translated(finding.what)}: ${translated(finding.words)}`, MARGIN + 230, y + 10, 20, PAPER.ink, "400");
+    if (finding.cure) y = text(context, `→ ${translated(finding.cure)}`, MARGIN + 230, y, 20, PAPER.quiet, "400");
   }
   return y;
 }

@@ -152,7 +152,7 @@ export class Dance {
     this.tell(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.join(", ") }) : this.words("free"));
   }
 
-  // What the puppet starts from, as a figure on the floor beside it, to its right as the eye sees it.
+  // The phrase that the puppet starts from, as a figure next to it, to its right as the eye sees it.
   ghost({ source, positions }) {
     const { joints, parents, offsets } = this.show, world = [], places = [];
     joints.forEach((_, joint) => {

@@ -1,7 +1,8 @@
 // This device: the PIN, what is asked of the box with it, and the devices that it knows.
 import { request } from "./box.js";
 import { byId } from "./elements.js";
-import { language, locale } from "./words.js";
+import { twice } from "./hold.js";
+import { language, locale, translated } from "./words.js";
 
 let known = false, waiting = null, words = (key) => key, silence = 0;
 
@@ -9,7 +10,8 @@ export function initDevice(me, table) {
   words = table;
   tell(me.known);
   byId("give-pin").addEventListener("click", () => askPin(null));
-  byId("pin-cancel").addEventListener("click", () => byId("pin").close());
+  byId("pin-cancel").addEventListener("click", closePin);
+  byId("pin").addEventListener("keydown", (event) => { if (event.key === "Escape") closePin(); });
   byId("pin-form").addEventListener("submit", (event) => {
     event.preventDefault();
     givePin();
@@ -39,8 +41,13 @@ export async function ask(path, said, patience) {
 export async function command(address, ...given) {
   const answer = await ask("/api/command", { address, arguments: given });
   const done = answer.status === 200 && answer.value.done;
-  say(answer.status === 200 ? answer.value.words : answer.words || words("no_page"), !done);
+  say(translated(answer.status === 200 ? answer.value.words : answer.words) || words("no_page"), !done);
   return done;
+}
+
+// Never behind a question: while the PIN is asked for something else, PANIC takes its place.
+export function panic() {
+  return byId("pin").open ? askPin(() => command("/panic"), "pin_panic") : command("/panic");
 }
 
 // Do something that needs the PIN, which a device that is not known gives first.
@@ -57,12 +64,19 @@ export function say(sentence, refused = false) {
   silence = setTimeout(() => { said.textContent = ""; }, refused ? 8000 : 3000);
 }
 
-function askPin(then) {
+function askPin(then, why = "") {
   waiting = then;
-  byId("pin-said").textContent = "";
-  byId("pin-input").value = "";
-  if (!byId("pin").open) byId("pin").showModal();
+  byId("pin-said").textContent = why && words(why);
+  if (!byId("pin").open) {
+    byId("pin-input").value = "";
+    byId("pin").show(); // not modal: PANIC stays in reach
+  }
   byId("pin-input").focus();
+}
+
+function closePin() {
+  waiting = null;
+  byId("pin").close();
 }
 
 async function givePin() {
@@ -109,10 +123,10 @@ function listed(device) {
   const button = document.createElement("button");
   button.type = "button";
   button.textContent = words("revoke");
-  button.addEventListener("click", async () => {
+  twice(button, async () => {
     await request("/api/revoke", { id: device.id });
     tell(!device.own);
-  });
+  }, "sure_revoke");
   row.className = "row";
   row.append(button);
   item.append(since, row);

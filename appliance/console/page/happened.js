@@ -1,8 +1,8 @@
-// What happened: the journal as a timeline, and any stretch of it danced again.
+// The journal as a timeline; any stretch of it can be played again.
 import { Dance } from "./dance.js";
 import { withPin } from "./device.js";
 import { byId } from "./elements.js";
-import { clock, locale, number, words } from "./words.js";
+import { clock, locale, number, translated, words } from "./words.js";
 
 const HEAD_BYTES = 16, JOINT_BYTES = 32; // of a frame: dance.js
 const SLOWEST_MS = 20, MANY = 5; // what fills the timeline's height
@@ -135,6 +135,6 @@ async function ask(path) {
   try {
     answer = await fetch(path);
   } catch { /* said below */ }
-  say(answer?.ok ? "" : answer ? await answer.text() : words("no_page"));
+  say(answer?.ok ? "" : answer ? translated(await answer.text()) : words("no_page"));
   return answer?.ok ? answer : null;
 }

@@ -2,9 +2,11 @@
 import { readAbout, showClock } from "./about.js";
 import { Box } from "./box.js";
 import { showChoices } from "./choices.js";
+import { goOn, showCues } from "./cues.js";
 import { Dance } from "./dance.js";
-import { command, initDevice } from "./device.js";
+import { command, initDevice, panic } from "./device.js";
 import { byId, every } from "./elements.js";
+import { initHelp, readNight } from "./help.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
 import { initLogs } from "./logs.js";
 import { initPhones } from "./phones.js";
@@ -15,8 +17,9 @@ import { initRig, showRig } from "./rig.js";
 import { initSensorChanges, showSensorChanges } from "./sensor_changes.js";
 import { showSensors } from "./sensors.js";
 import { initVenue } from "./venue.js";
-import { clock, hasWords, language, loadWords, number, words } from "./words.js";
+import { clock, hasWords, loadWords, number, translated, words } from "./words.js";
 
+const wide = matchMedia("(min-width: 900px)");
 const STILL_PX = 14; // a thumb that scrolls moves farther between touch and release
 
 function show(page) {
@@ -31,11 +34,21 @@ function show(page) {
   scrollTo(0, 0);
   if (known === "happened") readHappened();
   else stopHappened();
-  if (known === "box") readAbout();
+  if (known === "box") {
+    readAbout();
+    readNight();
+  }
   if (known === "prove") showProve();
   else leaveProve();
   if (known !== "rehearsal") leaveRehearsal();
-  box.showFrames(["dance", "rehearsal"].includes(known) && byId("show-dance").checked, known === "dance" && byId("show-ghost").checked);
+  showFrames();
+}
+
+// On a laptop the dance is beside the cues; a phone spares its battery.
+function showFrames() {
+  const page = document.body.dataset.shown;
+  const isShown = page === "dance" || page === "rehearsal" || (page === "tonight" && wide.matches);
+  box.showFrames(isShown && byId("show-dance").checked, page === "dance" && byId("show-ghost").checked);
 }
 
 function verdict() {
@@ -57,16 +70,15 @@ function verdict() {
   setText(byId("verdict"), words(`verdict_${key}`, said));
 }
 
-// In the reader's language, and always by the name of the sensor, receiver, wire or disk that it is about. What the
-// box itself says is English, and says most.
+// In the reader's language, and always by the name of the sensor, receiver, wire or disk that it is about. The box
+// says it in English; other languages have a sentence for each fallback.
 function spoken({ name, about, words: said }) {
-  if (language === "en" && said) return said;
   if (about && hasWords(`named_${name}`)) return words(`named_${name}`, { about });
-  const sentence = hasWords(`fallback_${name}`) ? words(`fallback_${name}`) : said ?? "";
+  const sentence = hasWords(`fallback_${name}`) ? words(`fallback_${name}`) : translated(said ?? "");
   return about && !sentence.includes(about) ? `${about}: ${sentence}` : sentence;
 }
 
-// What happened; what the audience sees and what to do stand below, in full.
+// The first clause: the slot below has the whole sentence.
 const beginning = (sentence) => `${sentence.split(/[.:;] /)[0].replace(/\.$/, "")}.`;
 
 function setText(element, text) {
@@ -95,23 +107,30 @@ function tonight(value) {
     pair.append(term, meaning);
     return pair;
   }));
-  showChoices(byId("cues"), byId("cues-part"), value.cues, (name) => command("/cue", name));
+  showCues(value);
   showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
   showChoices(byId("overlays"), byId("overlays-part"), value.cards, (name) => command("/card", name));
   if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
   byId("panic").setAttribute("aria-pressed", String(Boolean(status?.panic)));
   byId("blackout").setAttribute("aria-pressed", String(Boolean(status?.blackout)));
+  byId("stop").setAttribute("aria-pressed", String(status?.state === "stopped"));
+  byId("resume").classList.toggle("wanted", ["stopped", "panic"].includes(status?.state ?? ""));
   const over = value.fallbacks.filter((one) => !one.active);
   byId("fallbacks-part").hidden = over.length === 0;
   byId("fallbacks").replaceChildren(...over.map(told));
-  byId("fallbacks-now").replaceChildren(...value.fallbacks.filter((one) => one.active).map(told));
+  const active = value.fallbacks.filter((one) => one.active);
+  byId("slot-none").hidden = active.length > 0;
+  byId("fallbacks-now").replaceChildren(...active.map(told));
 }
 
 function told(fallback) {
   const item = document.createElement("li"), small = document.createElement("small");
-  item.textContent = spoken(fallback);
+  const sentence = spoken(fallback), at = fallback.about ? sentence.indexOf(fallback.about) : -1;
+  const about = document.createElement("b");
+  about.textContent = at < 0 ? "" : fallback.about;
+  item.append(sentence.slice(0, Math.max(at, 0)), about, sentence.slice(at < 0 ? 0 : at + fallback.about.length));
   item.classList.toggle("active", fallback.active);
-  small.textContent = words(fallback.active ? "fallback_now" : "fallback_before", fallback);
+  small.textContent = words(fallback.active ? "told_now" : "told_before", fallback);
   item.append(small);
   return item;
 }
@@ -136,6 +155,8 @@ const me = await fetch("/api/me").then((answer) => answer.json()).catch(() => ({
 await loadWords(me.languages);
 const box = new Box();
 const dance = new Dance(byId("stage"), byId("held"), box, words);
+const beside = new Dance(byId("tonight-stage"), byId("tonight-held"), box, words);
+wide.addEventListener("change", showFrames);
 initDevice(me, words);
 document.addEventListener("known", () => box.reopen());  // as a device with the PIN, which gives way to nobody
 initPhones();
@@ -146,13 +167,20 @@ initRig();
 initSensorChanges();
 initLogs();
 initVenue();
+initHelp();
 initRehearsal(me, box);
 for (const button of every("nav button")) button.addEventListener("click", () => show(button.dataset.page));
 for (const id of ["show-dance", "show-ghost"]) byId(id).addEventListener("change", () => show("dance"));
 addEventListener("hashchange", () => show(location.hash.slice(1)));
-byId("go").addEventListener("click", () => command("/go"));
+press(byId("go"), goOn);
+byId("resume").addEventListener("click", () => command("/go"));
 byId("stop").addEventListener("click", () => command("/stop"));
-press(byId("panic"), () => command("/panic"));
+document.addEventListener("keydown", (event) => { // as in other programs for cues
+  if (event.key !== " " || event.target !== document.body || document.body.dataset.shown !== "tonight") return;
+  event.preventDefault();
+  if (!event.repeat) goOn();
+});
+press(byId("panic"), panic);
 press(byId("blackout"), () => command("/blackout", box.value?.status?.blackout ? 0 : 1));
 byId("master").addEventListener("input", () => master(null));
 byId("master").addEventListener("change", () => {
@@ -168,8 +196,10 @@ box.addEventListener("value", () => {
   showPicture(box.value);
   showRig(box.value);
   showClock(box.value);
+  setText(byId("clock"), [clock(box.value.time), box.value.status?.show, box.value.status?.cue].filter(Boolean).join(" · "));
   showRehearsal(box.value, dance.show);
   dance.follow(box.value);
+  beside.follow(box.value);
 });
 box.addEventListener("value", verdict);
 box.addEventListener("beat", verdict);

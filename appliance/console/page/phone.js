@@ -2,7 +2,7 @@
 import { request } from "./box.js";
 import { byId, every } from "./elements.js";
 import { PhoneLink } from "./phone_link.js";
-import { loadWords, words } from "./words.js";
+import { loadWords, translated, words } from "./words.js";
 
 const FIRST_EVENT_MS = 2000;
 const LOOK_MS = 250;
@@ -136,7 +136,7 @@ async function join(takeOver) {
     }
     byId("take-over").hidden = answer.status !== 409;
     const keys = { 0: "no_page", 401: "phone_code_missing", 403: "phone_code_wrong", 409: "phone_taken", 429: "pin_wait" };
-    say(keys[answer.status] ? words(keys[answer.status], { name }) : answer.words);
+    say(keys[answer.status] ? words(keys[answer.status], { name }) : translated(answer.words));
     return false;
   }
   if (answer.value.pass) kept.passes[name] = answer.value.pass;

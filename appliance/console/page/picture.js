@@ -1,45 +1,90 @@
 // Picture: brightness, grid, test card, and corners that move on the wall as far as a finger moves here.
-import { command } from "./device.js";
-import { byId, every, first } from "./elements.js";
+import { command, say } from "./device.js";
+import { byId, first } from "./elements.js";
+import { held } from "./hold.js";
 
-const CORNERS = [[0, 0], [1, 0], [1, 1], [0, 1]]; // in the projector's order
-const STEP_S = 0.12;
+const CORNERS = [[0, 0], [1, 0], [1, 1], [0, 1]]; // in the projector's order, and where they are without any change
+const STEP_S = 0.12, NUDGE = 0.002;
+const OWN_MS = 2500; // the projector tells once a second: until then this page's own change is the newest
+const before = []; // corners before each change made here, for undo
+let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]);
 
 export function initPicture() {
-  for (const [id, address, on] of /** @type {[string, string, number][]} */ ([
-    ["grid-on", "/projector/grid", 1], ["grid-off", "/projector/grid", 0],
-    ["info-on", "/projector/info", 1], ["info-off", "/projector/info", 0],
-  ])) byId(id).addEventListener("click", () => command(address, on));
-  byId("corners-reset").addEventListener("click", () => command("/projector/corners/reset"));
+  for (const [id, address] of [["grid", "/projector/grid"], ["info", "/projector/info"]]) {
+    byId(id).addEventListener("click", () => switchOn(id, address, byId(id).getAttribute("aria-pressed") !== "true"));
+  }
+  held(byId("corners-reset"), () => change("/projector/corners/reset", [], CORNERS), (sentence) => say(sentence));
+  byId("corners-undo").addEventListener("click", undo);
   const brightness = byId("brightness");
-  const tell = () => { byId("brightness-said").textContent = `${brightness.value} %`; };
-  brightness.addEventListener("input", tell);
-  brightness.addEventListener("change", () => command("/projector/brightness", Number(brightness.value) / 100));
-  tell();
-  CORNERS.forEach(([x, y], place) => byId("corners").append(handle(x, y, place + 1)));
+  brightness.addEventListener("input", tellBrightness);
+  brightness.addEventListener("change", () => {
+    command("/projector/brightness", Number(brightness.value) / 100);
+    ownUntil = performance.now() + OWN_MS;
+    brightness.blur();
+  });
+  CORNERS.forEach((_, place) => byId("corners").append(handle(place)));
+  put(shown);
 }
 
+// States as the projector tells them, unless this page changed them a moment ago.
 export function showPicture(value) {
   const runs = (name) => value.processes.some((one) => one.process === name && !one.late);
   const projects = runs("projector");
   first('[data-page="picture"]').hidden = !projects && !runs("lights") && value.looks.length === 0;
-  for (const id of ["brightness", "grid-on", "info-on", "corners-reset"]) byId(id).parentElement.hidden = !projects;
-  byId("corners").hidden = !projects;
-  for (const element of every('#picture > h2, #picture > .quiet')) element.hidden = !projects;
+  byId("wall-part").hidden = !projects;
+  wall = value.wall;
+  if (!wall?.corners || performance.now() < ownUntil) return;
+  if (document.activeElement !== byId("brightness")) byId("brightness").value = Math.round(100 * wall.brightness);
+  tellBrightness();
+  for (const id of ["grid", "info"]) byId(id).setAttribute("aria-pressed", String(wall[id]));
+  put(wall.corners);
 }
 
-function handle(x, y, number) {
+function tellBrightness() { byId("brightness-said").textContent = `${byId("brightness").value} %`; }
+
+async function switchOn(id, address, on) {
+  if (!await command(address, on ? 1 : 0)) return;
+  ownUntil = performance.now() + OWN_MS;
+  byId(id).setAttribute("aria-pressed", String(on));
+}
+
+async function change(address, given, corners) {
+  before.push(shown.map((one) => [...one]));
+  if (await command(address, ...given)) {
+    ownUntil = performance.now() + OWN_MS;
+    put(corners);
+  } else before.pop();
+  byId("corners-undo").disabled = before.length === 0;
+}
+
+async function undo() {
+  const corners = before.at(-1);
+  if (!corners || !await command("/projector/corners", ...corners.flat())) return;
+  before.pop();
+  ownUntil = performance.now() + OWN_MS;
+  byId("corners-undo").disabled = before.length === 0;
+  put(corners);
+}
+
+// The whole pad is what the projector can light; the handles stay inside of it.
+function put(corners) {
+  shown = corners.map((one) => [...one]);
+  byId("corners-shape").setAttribute("points", corners.map((one) => one.join(",")).join(" "));
+  corners.forEach(([x, y], place) => {
+    const button = byId("corners").querySelectorAll("button")[place];
+    if (!button) return;
+    button.style.left = `clamp(4px, ${100 * x}% - 32px, 100% - 68px)`;
+    button.style.top = `clamp(4px, ${100 * y}% - 32px, 100% - 68px)`;
+  });
+}
+
+function handle(place) {
   const button = document.createElement("button");
   button.type = "button";
-  button.textContent = number;
-  const put = (dx, dy) => {
-    button.style.left = `calc(${100 * (0.12 + 0.76 * x + dx)}% - 32px)`;
-    button.style.top = `calc(${100 * (0.18 + 0.64 * y + dy)}% - 32px)`;
-  };
-  put(0, 0);
-  // at: where the finger is, sent: how far the wall has followed, both in shares of the picture. What the
-  // projector was too busy to do is asked for again, at the end of a drag three times.
-  let from = null, sent = [0, 0], at = [0, 0], timer = 0, isSending = false, misses = 0;
+  button.textContent = place + 1;
+  // at: where the finger is, sent: how far the wall has followed, both in shares of the picture. A step that the
+  // projector was too busy for is sent again, at the end of a drag three times.
+  let from = null, start = [0, 0], sent = [0, 0], at = [0, 0], timer = 0, isSending = false, misses = 0;
   const rest = () => {
     clearInterval(timer);
     sent = at = [0, 0];
@@ -52,14 +97,18 @@ function handle(x, y, number) {
       return;
     }
     isSending = true;
-    const done = await command("/projector/nudge", number, dx, dy);
+    const done = await command("/projector/nudge", place + 1, dx, dy);
     isSending = false;
+    ownUntil = performance.now() + OWN_MS;
     if (done) sent = [sent[0] + dx, sent[1] + dy];
     else if (!from && ++misses === 3) rest();
   };
   button.addEventListener("pointerdown", (event) => {
     button.setPointerCapture(event.pointerId);
+    if (!wall?.grid && byId("grid").getAttribute("aria-pressed") !== "true") switchOn("grid", "/projector/grid", true);
     from = [event.clientX, event.clientY];
+    start = [...shown[place]];
+    ownUntil = Infinity;
     [sent, at, misses] = [[sent[0] - at[0], sent[1] - at[1]], [0, 0], 0];
     clearInterval(timer);
     timer = setInterval(send, 1000 * STEP_S);
@@ -67,23 +116,30 @@ function handle(x, y, number) {
   button.addEventListener("pointermove", (event) => {
     if (!from) return;
     const pad = byId("corners").getBoundingClientRect();
+    if (!at[0] && !at[1]) remember();
     at = [(event.clientX - from[0]) / pad.width, (event.clientY - from[1]) / pad.height];
-    put(...at);
+    put(shown.map((one, other) => other === place ? [start[0] + at[0], start[1] + at[1]] : one));
   });
   const end = () => {
     if (!from) return;
     from = null;
-    put(0, 0);
+    ownUntil = performance.now() + OWN_MS;
     send();
   };
   button.addEventListener("pointerup", end);
   button.addEventListener("pointercancel", end);
-  button.addEventListener("keydown", (event) => {
+  button.addEventListener("keydown", async (event) => {
     const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
     const way = ways[event.key];
     if (!way) return;
     event.preventDefault();
-    command("/projector/nudge", number, 0.002 * way[0], 0.002 * way[1]);
+    if (!event.repeat) remember();
+    await command("/projector/nudge", place + 1, NUDGE * way[0], NUDGE * way[1]);
   });
   return button;
+}
+
+function remember() {
+  before.push(shown.map((one) => [...one]));
+  byId("corners-undo").disabled = false;
 }

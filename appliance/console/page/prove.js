@@ -1,16 +1,18 @@
 // Prove it: a measurement begins here, grows while it is looked at, and stays as a document.
 import { request } from "./box.js";
 import { drawCertificate, limitWords, madeAt, mostOf, valueOf, verdictOf } from "./certificate.js";
-import { ask, say } from "./device.js";
+import { ask, command, say } from "./device.js";
 import { byId } from "./elements.js";
+import { twice } from "./hold.js";
 import { DARK, drawPlots } from "./plots.js";
-import { words } from "./words.js";
+import { translated, words } from "./words.js";
 
 const LOOK_MS = 500;
-let isShown = false, timer = 0, next = 0, measured = null, proof = null;
+const FADED_MS = 20_000; // for a show that stops
+let goes = false, isShown = false, timer = 0, next = 0, measured = null, proof = null;
 
 export function initProve() {
-  byId("prove-begin").addEventListener("click", () => begin("latency"));
+  twice(byId("prove-begin"), measure, "sure_stop", () => goes);
   byId("prove-doctor").addEventListener("click", () => begin("doctor"));
   byId("prove-end").addEventListener("click", () => ask("/api/prove/end", {}));
   byId("prove-print").addEventListener("click", () => print());
@@ -22,6 +24,8 @@ export async function showProve() {
   const answer = await request("/api/prove");
   if (answer.status !== 200) return tell(answer.words || words("no_page"));
   list(answer.value.proofs);
+  goes = answer.value.show_goes;
+  byId("prove-begin").textContent = words(goes ? "prove_stop_begin" : "prove_begin");
   running(answer.value.runs);
   tell(answer.value.runs === null && answer.value.show_goes ? words("prove_show_goes") : "");
   if (answer.value.runs !== null) follow(answer.value.runs);
@@ -33,11 +37,22 @@ export function leaveProve() {
   clearTimeout(timer);
 }
 
+// The measurement begins when the show has faded out.
+async function measure() {
+  if (goes && !await command("/stop")) return;
+  for (let waited = 0; goes && waited < FADED_MS; waited += LOOK_MS) {
+    await new Promise((over) => setTimeout(over, LOOK_MS));
+    goes = (await request("/api/prove")).value?.show_goes ?? true;
+  }
+  byId("prove-begin").textContent = words("prove_begin");
+  await begin("latency");
+}
+
 async function begin(kind) {
   const seconds = Number(byId("prove-seconds").value);
   const answer = await ask("/api/prove", kind === "latency" ? { kind, seconds } : { kind });
   if (answer.status !== 200) {
-    tell(answer.words || words("no_page"));
+    tell(translated(answer.words) || words("no_page"));
     return;
   }
   byId("prove-document").hidden = true;
@@ -99,7 +114,7 @@ async function over() {
   const { kept, trouble } = measured;
   running(null);
   await showProve();
-  if (trouble || !kept) tell(trouble || words("prove_broken"));
+  if (trouble || !kept) tell(translated(trouble) || words("prove_broken"));
   else await open(kept);
 }
 
@@ -143,7 +158,8 @@ function limitItem(limit) {
 }
 
 function findingItem(finding) {
-  return line(`${words(`finding_${finding.verdict}`)} · ${finding.what}: ${finding.words}`, finding.cure, finding.verdict);
+  const said = `${words(`finding_${finding.verdict}`)} · ${translated(finding.what)}: ${translated(finding.words)}`;
+  return line(said, translated(finding.cure), finding.verdict);
 }
 
 function line(said, below, kind) {

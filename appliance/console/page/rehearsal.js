@@ -6,7 +6,7 @@ import { byId, first } from "./elements.js";
 import { Figure } from "./figure.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
-import { twice } from "./venue.js";
+import { twice } from "./hold.js";
 import { hasWords, number, words } from "./words.js";
 
 const PHRASE_FADE_S = 1, LIVELINESS_FADE_S = 1, KEEPING_MS = 120_000;

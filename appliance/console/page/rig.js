@@ -76,7 +76,7 @@ function draw() {
   });
 }
 
-// What a view shows, in metres: all lamps, and the middle of the stage.
+// The extent of a view in metres: all lamps and the middle of the stage.
 function framed(title, axis, sense) {
   const places = beams.map(([, place]) => [place[0], sense * place[axis]]);
   const [xs, ys] = [0, 1].map((side) => places.map((place) => place[side]));

@@ -1,7 +1,7 @@
-// Sensors renamed, replaced, revoked, and a new one paired by cable: what the box says, as it says it.
+// Sensors renamed, replaced, revoked, and a new one paired by cable; each step as the box reports it.
 import { say, withPin } from "./device.js";
 import { byId } from "./elements.js";
-import { words } from "./words.js";
+import { translated, words } from "./words.js";
 
 let sensors = [], act = null, name = "";
 
@@ -52,9 +52,9 @@ function open(what, sensor) {
   byId("change").show(); // not modal: PANIC stays in reach
 }
 
-// Spares first; a sensor that the show wears says so.
+// Spares first, those that send before the others; a sensor that the show wears says so.
 function spares(sensor) {
-  const others = sensors.filter((one) => one.name !== sensor).sort((one, other) => one.is_worn - other.is_worn);
+  const others = sensors.filter((one) => one.name !== sensor).sort((one, other) => one.is_worn - other.is_worn || other.heard - one.heard);
   return others.map((one) => new Option(one.is_worn ? words("worn_spare", { name: one.name }) : one.name, one.name));
 }
 
@@ -96,7 +96,7 @@ async function run(said, tell) {
   try {
     const answer = await fetch("/api/sensors", { method: "POST", body: JSON.stringify(said) });
     if (!answer.ok) {
-      tell(await answer.text());
+      tell(translated(await answer.text()));
       return false;
     }
     const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -105,7 +105,7 @@ async function run(said, tell) {
       const lines = (rest + part.value).split("\n");
       rest = lines.pop();
       for (const line of lines.map((one) => JSON.parse(one))) {
-        if ("words" in line) tell(line.words);
+        if ("words" in line) tell(translated(line.words));
         else isDone = line.done;
       }
     }

@@ -1,7 +1,7 @@
 // One card for each sensor. A card stays the same element, so that a press on it is never lost.
 import { command } from "./device.js";
 import { changeButtons } from "./sensor_changes.js";
-import { hasWords, number } from "./words.js";
+import { hasWords, number, translated } from "./words.js";
 
 const cards = new Map();
 
@@ -40,22 +40,27 @@ function made(name, words) {
   const changes = document.createElement("div");
   changes.className = "row changes";
   changes.append(...changeButtons(name));
-  root.append(title, state, facts, complaint, row, changes);
+  const last = document.createElement("p");
+  last.className = "quiet last";
+  last.textContent = words("last");
+  root.append(title, state, complaint, last, facts, row, changes);
   return { root, state, facts, complaint };
 }
 
 function fill(card, sensor, words) {
   card.root.dataset.state = sensor.state;
+  card.root.dataset.worn = String(sensor.is_worn);
+  card.facts.classList.toggle("old", !sensor.heard);
   const ago = !sensor.heard && sensor.age_s >= 0 ? ` ${words("heard_before", { time: duration(sensor.age_s) })}` : "";
   card.state.textContent = words(`sensor_${sensor.state}`) + ago;
-  card.complaint.textContent = sensor.complaint;
+  card.complaint.textContent = translated(sensor.complaint);
   const grades = ["system", "gyro", "accel", "mag"].map((_, place) => (sensor.calibration >> (6 - 2 * place)) & 3);
   const left = sensor.heard && sensor.battery_left_s >= 0 ? words("battery_left", { time: duration(sensor.battery_left_s) }) : "";
-  const battery = sensor.battery === null ? words("unknown_value") : `${sensor.battery} %${sensor.heard ? left : ` (${words("last")})`}`;
+  const battery = sensor.battery === null ? words("unknown_value") : `${sensor.battery} %${left}`;
   const facts = [
-    ["rate", `${number(sensor.rate_hz, 1)} Hz`],
-    ["loss", `${number(100 * sensor.loss, 1)} %`],
-    ["round_trip", sensor.round_trip_s >= 0 ? `${number(1000 * sensor.round_trip_s, 1)} ms` : "–"],
+    ["rate", sensor.heard ? `${number(sensor.rate_hz, 1)} Hz` : "–"],
+    ["loss", sensor.heard ? `${number(100 * sensor.loss, 1)} %` : "–"],
+    ["round_trip", sensor.heard && sensor.round_trip_s >= 0 ? `${number(1000 * sensor.round_trip_s, 1)} ms` : "–"],
     ["battery", battery],
     ["signal", sensor.flags >> 4 ? `${4 * (sensor.flags >> 4) - 90} dBm` : words("unknown_value")], // docs/wire.md
     ["calibration", words("of_three", { gyro: grades[1], accel: grades[2] })],

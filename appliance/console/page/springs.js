@@ -7,7 +7,7 @@ import { number, words } from "./words.js";
 
 const FADE_S = 1;
 const KICK_M_S = [1.5, 0.5, 1.5];
-// Stiffness is a factor from 0.1 to 10: its slider has powers of ten, so that the setting's own stands in the middle.
+// Stiffness is a factor from 0.1 to 10: its slider has powers of ten, so that the setting's own is in the middle.
 const DIALS = {
   stiffness: { address: "/springs/stiffness", least: -1, most: 1, digits: 2, given: (at) => 10 ** at, at: Math.log10 },
   storm: { address: "/springs/storm", least: 0, most: 1, digits: 2 },

@@ -1,91 +1,141 @@
-// What a venue changes of its box: keys of the box file, the file as a whole, and which show dances.
+// Changes that a venue makes to its box: keys of the box file, the file as a whole, and which show dances.
 import { ask } from "./device.js";
 import { byId } from "./elements.js";
-import { words } from "./words.js";
+import { twice } from "./hold.js";
+import { translated, words } from "./words.js";
 
-const SURE_MS = 6000, CHECKED_WITHIN_MS = 100_000;
-let file = null, asked = "";
+const CHECKED_WITHIN_MS = 100_000;
+const RECEIVERS = ["outputs", "osc"];
+const NEW_RECEIVER = { host: "192.168.0.20", port: 9004 };
+let file = null, asked = "", receivers = [];
 
 export function initVenue() {
   byId("file-read").addEventListener("click", readFile);
   byId("file-check").addEventListener("click", () => save(false));
+  byId("file-add").addEventListener("click", addReceiver);
   twice(byId("file-now"), () => save(true), "sure_now");
-}
-
-// A button that stops the show asks once more, in its own place.
-export function twice(button, act, key) {
-  let timer = 0, own = "";
-  const calm = () => {
-    clearTimeout(timer);
-    timer = 0;
-    button.textContent = own;
-  };
-  button.addEventListener("click", () => {
-    if (timer) {
-      calm();
-      act();
-      return;
-    }
-    own = button.textContent;
-    button.textContent = words(key);
-    timer = setTimeout(calm, SURE_MS);
-  });
 }
 
 export async function danceAgain(id) {
   byId("box-said").textContent = words("file_checking");
   const answer = await ask("/api/box/show", { id }, CHECKED_WITHIN_MS);
-  byId("box-said").textContent = answer.status === 200 ? answer.value.words : answer.words || words("no_page");
+  byId("box-said").textContent = translated(answer.status === 200 ? answer.value.words : answer.words) || words("no_page");
 }
 
 async function readFile() {
   tell(words("box_reading"), []);
   const answer = await ask("/api/box/file", undefined, CHECKED_WITHIN_MS);
   byId("file-part").hidden = answer.status !== 200;
-  if (answer.status !== 200) return tell(answer.words || words("no_page"), []);
+  if (answer.status !== 200) return tell(translated(answer.words) || words("no_page"), []);
   file = answer.value;
+  receivers = file.receivers.map((written) => ({ written, removed: false, added: false }));
   byId("file-name").textContent = file.file;
-  byId("file-keys").replaceChildren(...file.keys.map(field));
   byId("file-text").value = file.text;
   byId("file-now").hidden = !file.at_once;
   byId("file-check").textContent = words(file.at_once ? "file_later" : "file_write");
+  const isReceiver = ({ location }) => location[0] === RECEIVERS[0] && location[1] === RECEIVERS[1];
+  byId("file-keys").replaceChildren(...file.keys.filter((key) => !isReceiver(key)).map(field));
+  showReceivers();
   return tell("", []);
 }
 
-const nameOf = (location) => location.map((step) => typeof step === "number" ? `${step + 1}` : step).join(" ");
+// A label in the reader's language; below it the key, for those who edit the file.
+function labelOf(location) {
+  const [group, list, place, key] = location;
+  if (group === "outputs") return `${words(`list_${list}`, { n: place + 1 })}: ${words(`key_${key}`)}`;
+  return words(`key_${location.join("_")}`);
+}
+
+const dotted = (location) => location.reduce((said, step) => typeof step === "number" ? `${said}[${step}]` : said ? `${said}.${step}` : step, "");
 
 function field(key) {
   const label = document.createElement("label"), name = document.createElement("span"), small = document.createElement("small");
   const input = document.createElement("input");
-  name.textContent = nameOf(key.location);
+  name.textContent = labelOf(key.location);
   input.type = key.kind === "switch" ? "checkbox" : "text";
-  if (key.kind === "number") input.inputMode = "decimal";
+  if (key.kind === "number") input.inputMode = "numeric";
   if (key.kind === "switch") input.checked = key.value;
   else input.value = key.kind === "list" ? key.value.join(", ") : key.value ?? "";
-  input.autocomplete = "off";
-  input.spellcheck = false;
-  input.setAttribute("autocapitalize", "off");
-  input.name = key.location.join(".");
-  small.textContent = key.within ? `${key.words} (${key.within})` : key.words;
-  small.lang = "en";
+  plain(input, key.location);
+  const within = key.within ? ` (${translated(key.within)})` : "";
+  small.textContent = `${translated(key.words)}${within} · ${dotted(key.location)}`;
   label.className = "venue-key";
   label.append(name, input, small);
   return label;
 }
 
-// Only what was changed: what the file leaves out stays out.
+function plain(input, location) {
+  input.autocomplete = "off";
+  input.spellcheck = false;
+  input.setAttribute("autocapitalize", "off");
+  input.name = location.join(".");
+  input.dataset.key = dotted(location);
+}
+
+function showReceivers() {
+  byId("file-receivers").replaceChildren(...receivers.map((one, place) => {
+    const row = document.createElement("fieldset"), legend = document.createElement("legend"), button = document.createElement("button");
+    legend.textContent = words("list_osc", { n: place + 1 });
+    const inputs = ["host", "port"].map((key) => {
+      const label = document.createElement("label"), name = document.createElement("span"), input = document.createElement("input");
+      name.textContent = words(`key_${key}`);
+      plain(input, [...RECEIVERS, place, key]);
+      input.value = one.typed?.[key] ?? one.written[key] ?? "";
+      input.disabled = one.removed;
+      input.addEventListener("input", () => { one.typed = { ...one.typed, [key]: input.value.trim() }; });
+      label.className = "venue-key";
+      label.append(name, input);
+      return label;
+    });
+    button.type = "button";
+    button.textContent = words(one.removed ? "undo" : "file_remove");
+    button.addEventListener("click", () => {
+      if (one.added) receivers.splice(place, 1);
+      else one.removed = !one.removed;
+      showReceivers();
+    });
+    const small = document.createElement("small");
+    small.textContent = one.removed ? words("file_removed") : [one.written.dialect, one.written.program].filter(Boolean).join(" · ");
+    row.classList.toggle("removed", one.removed);
+    row.append(legend, ...inputs, button, small);
+    return row;
+  }));
+}
+
+function addReceiver() {
+  receivers.push({ written: { ...NEW_RECEIVER }, removed: false, added: true });
+  showReceivers();
+  /** @type {HTMLInputElement} */ (byId("file-receivers").lastElementChild.querySelector("input")).select();
+}
+
+// Only what was changed: what the file leaves out stays out. A list of receivers is written as a whole where one was
+// added or removed; comments inside of it go then.
 function changed() {
-  return file.keys.flatMap((key, place) => {
-    const value = typed(key, byId("file-keys").children[place].querySelector("input"));
+  const inputs = [...byId("file-keys").querySelectorAll("input")];
+  const keys = inputs.map((input) => file.keys.find((key) => key.location.join(".") === input.name));
+  const found = keys.flatMap((key, place) => {
+    const value = typed(key, inputs[place]);
     return JSON.stringify(value) === JSON.stringify(key.value) ? [] : [[key.location, value]];
   });
+  const entry = ({ written, typed: said = {} }) => ({ ...written, ...Object.fromEntries(Object.entries(said).map(([key, value]) => [key, plainNumber(value)])) });
+  if (receivers.some((one) => one.added || one.removed)) {
+    return [...found, [RECEIVERS, receivers.filter((one) => !one.removed).map(entry)]];
+  }
+  const edited = receivers.flatMap((one, place) => Object.entries(one.typed ?? {}).flatMap(([key, value]) => {
+    const wanted = plainNumber(value);
+    return wanted === one.written[key] ? [] : [[[...RECEIVERS, place, key], wanted]];
+  }));
+  const whole = edited.length && !file.receivers_written ? [[RECEIVERS, receivers.map(entry)]] : edited;
+  return [...found, ...whole];
 }
+
+const plainNumber = (said) => said !== "" && Number.isFinite(Number(said)) ? Number(said) : said;
 
 function typed(key, input) {
   if (key.kind === "switch") return input.checked;
   const said = input.value.trim();
   if (key.kind === "list") return said ? said.split(",").map((one) => one.trim()) : [];
-  if (key.kind === "number" && said !== "" && Number.isFinite(Number(said))) return Number(said);
+  if (key.kind === "number") return plainNumber(said);
   return said === "" && key.value === null ? null : said;
 }
 
@@ -98,22 +148,43 @@ async function save(now) {
   asked = "";
   const answer = await ask("/api/box/file", { ...wanted, sure }, CHECKED_WITHIN_MS);
   for (const button of buttons) button.disabled = false;
-  if (answer.status !== 200) return tell(answer.words || words("no_page"), []);
+  if (answer.status !== 200) return tell(translated(answer.words) || words("no_page"), []);
   const { problems, asks, words: said } = answer.value;
-  if (problems.length) return tell(words("file_refused"), problems);
+  if (problems.length) return tell(words("file_refused"), problems, wanted.values);
   if (asks) {
     asked = JSON.stringify(wanted);
     return tell(words("file_sure"), asks.map((one) => ({ words: one })));
   }
   if (!now) await readFile();
-  return tell(said, []);
+  return tell(translated(said), []);
 }
 
-function tell(sentence, problems) {
+// A problem names its key, or repeats the value that was typed: that field is marked, and says what is wrong.
+function tell(sentence, problems, values = []) {
   byId("file-said").textContent = sentence;
+  for (const input of document.querySelectorAll("#file-part input")) input.removeAttribute("aria-invalid");
+  for (const note of document.querySelectorAll("#file-part .wrong")) note.remove();
   byId("file-problems").replaceChildren(...problems.map((one) => {
-    const item = document.createElement("li");
-    item.textContent = one.line ? `${words("file_line", one)} ${one.words}` : one.words;
+    const item = document.createElement("li"), said = translated(one.words), input = fieldOf(one.words, values);
+    item.textContent = one.line && !input ? `${words("file_line", one)} ${said}` : said;
+    if (input) mark(input, said);
     return item;
   }));
+  document.querySelector("#file-part [aria-invalid]")?.scrollIntoView({ block: "center" });
+}
+
+function fieldOf(said, values) {
+  const inputs = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("#file-part input")]);
+  const quoted = /'([^']*)'/.exec(said)?.[1];
+  const named = inputs.find((input) => input.dataset.key && input.dataset.key === quoted);
+  if (named || !quoted) return named;
+  return inputs.find((input) => input.value.split(",").some((one) => one.trim() === quoted) && values.length > 0);
+}
+
+function mark(input, said) {
+  const note = document.createElement("small");
+  note.className = "wrong";
+  note.textContent = said;
+  input.setAttribute("aria-invalid", "true");
+  input.after(note);
 }

@@ -1,6 +1,6 @@
-// The table of words: /words/LANGUAGE.json; a word that a language lacks is English.
+// The table of words: /words/LANGUAGE.json. A missing word is shown in English.
 import { every } from "./elements.js";
-let english = {}, own = {};
+let english = {}, own = {}, patterns = [];
 export let language = "en", locale = "en"; // dates and numbers are written as this device does
 
 export async function loadWords(languages) {
@@ -9,6 +9,7 @@ export async function loadWords(languages) {
   locale = navigator.languages.find((one) => one.split("-")[0] === language) ?? language;
   english = await table("en");
   own = language === "en" ? english : await table(language);
+  patterns = language === "en" ? [] : compiled(await table(`sentences/${language}`));
   document.documentElement.lang = language;
   for (const element of every("[data-words]")) element.textContent = words(element.dataset.words);
   for (const element of every("[data-label]")) element.setAttribute("aria-label", words(element.dataset.label));
@@ -20,6 +21,34 @@ export function words(key, values = {}) {
 }
 
 export const hasWords = (key) => key in own;
+
+// A sentence of the box in the reader's language. The box speaks English; /words/sentences/LANGUAGE.json has its
+// sentences with the parts that change in braces, as in the source. Without a translation it stays English.
+export function translated(said) {
+  if (!said || patterns.length === 0) return said;
+  const whole = matched(said);
+  if (whole !== null) return whole;
+  return said.split(/(?<=[.?!:;]) (?=\S)/).map((one) => matched(one) ?? one).join(" ");
+}
+
+function matched(said) {
+  for (const [pattern, names, sentence] of patterns) {
+    const found = pattern.exec(said);
+    if (found) return sentence.replace(/\{(\w+)\}/g, (_, name) => {
+      const part = found[names.indexOf(name) + 1] ?? "";
+      return part === said ? part : translated(part);
+    });
+  }
+  return null;
+}
+
+function compiled(table) {
+  return Object.entries(table).map(([english, sentence]) => {
+    const names = [...english.matchAll(/\{(\w+)\}/g)].map((one) => one[1]);
+    const escaped = english.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{\w+\}/g, "([^]+?)");
+    return [new RegExp(`^${escaped}$`), names, sentence, escaped.length];
+  }).sort((one, other) => other[3] - one[3]); // the one that says most first
+}
 
 export const clock = (seconds) =>
   new Date(1000 * seconds).toLocaleTimeString(locale, { hour: "2-digit", minute: "2-digit", hourCycle: "h23" });

@@ -1,0 +1,136 @@
+"""A picture a minute of the night, for a technician far away: the figure and the state of the box, as SVG."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import struct
+import time
+from array import array
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from aiohttp import web
+
+from appliance.box.durable import write_whole
+from appliance.console.box_view import BoxView
+from appliance.console.stage_view import StageView
+from appliance.outputs.frame_layout import BROWSER_HEAD, GHOST
+
+FOLDER = "night"  # beside PIN and devices
+EVERY_S = 60.0
+KEPT_S = 14 * 3600.0  # a night; 840 pictures of 3 kB
+_WIDTH, _HEIGHT, _FLOOR, _SCALE = 640, 420, 390.0, 170.0  # pixels; pixels a metre
+_LINES = 5
+
+
+class Night:
+    """Draws, keeps and serves the pictures. kept: where the box keeps what it learns."""
+
+    def __init__(self, stage: StageView, box: BoxView, kept: Path) -> None:
+        self._stage, self._box, self._folder = stage, box, kept / FOLDER
+
+    def routes(self) -> list[web.RouteDef]:
+        """For the server."""
+        return [
+            web.get("/api/night", self._list),
+            web.get("/api/night/{at}.svg", self._serve),
+            web.get("/api/now.svg", self._now),
+        ]
+
+    async def watch(self) -> None:
+        """Keep one now and every minute; a disk that does not take it costs a picture."""
+        while True:
+            await asyncio.sleep(EVERY_S)
+            with contextlib.suppress(OSError):
+                self.keep(time.time())
+
+    def keep(self, now: float) -> None:
+        """One picture, and none older than a night. now: Unix seconds. Raises OSError."""
+        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_whole(self._folder / f"{now:.0f}.svg", self.picture(now).encode())
+        for at in self.times():
+            if not now - KEPT_S <= at <= now + EVERY_S:  # or of a clock that was wrong
+                (self._folder / f"{at}.svg").unlink(missing_ok=True)
+
+    def times(self) -> list[int]:
+        """When pictures were kept: Unix seconds, the newest last."""
+        with contextlib.suppress(OSError):
+            return sorted(int(path.stem) for path in self._folder.glob("*.svg") if path.stem.isdecimal())
+        return []
+
+    def picture(self, now: float) -> str:
+        """The figure from the audience, and in words what the page tells."""
+        figure = _figure(self._stage.with_ghost, self._stage.facts.get("parents", ()))
+        words = [
+            f'<text x="12" y="{24 + 19 * place}">{escape(line)}</text>'
+            for place, line in enumerate(_said(self._box.value, now))
+        ]
+        return (
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}">'
+            f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="#0d0f11"/>'
+            f'<path d="M0 {_FLOOR}H{_WIDTH}" stroke="#3d434b"/>'
+            f'<g stroke="#eee2ce" stroke-width="9" stroke-linecap="round">{figure}</g>'
+            f'<g fill="#f3ece0" font-family="sans-serif" font-size="14">{"".join(words)}</g></svg>'
+        )
+
+    async def _list(self, request: web.Request) -> web.Response:
+        return web.json_response(self.times())
+
+    async def _serve(self, request: web.Request) -> web.Response:
+        at = request.match_info["at"]
+        if not at.isdecimal() or len(at) > 12:
+            raise web.HTTPNotFound(text="There is no such picture.")
+        try:
+            return _svg((self._folder / f"{at}.svg").read_bytes())
+        except OSError:
+            raise web.HTTPNotFound(text="There is no such picture.") from None
+
+    async def _now(self, request: web.Request) -> web.Response:
+        return _svg(self.picture(time.time()).encode())
+
+
+def _svg(body: bytes) -> web.Response:
+    return web.Response(body=body, content_type="image/svg+xml", charset="utf-8")
+
+
+def _said(value: dict[str, Any], now: float) -> list[str]:
+    status = value.get("status") or {}
+    worn = [one for one in value.get("sensors", ()) if one["is_worn"]]
+    heard = sum(one["heard"] for one in worn)
+    lines = [
+        time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now)),
+        f"{status.get('show', '')}  {status.get('state', value.get('frames', ''))}  {status.get('cue', '')}",
+        f"Sensors {heard}/{len(worn)}  {status.get('rate_hz', 0.0):.1f} Hz  late {status.get('late', 0)}",
+    ]
+    active = [one for one in value.get("fallbacks", ()) if one["active"]]
+    return lines + [f"{one['name']} {one['about']}" for one in active[:_LINES]]
+
+
+def _figure(frame: bytes, parents: Any) -> str:
+    """Lines for the bones of each puppet, x to the right and y up; "" before the first frame."""
+    try:
+        _, flags, joints = BROWSER_HEAD.unpack_from(frame)
+        numbers = array("f", frame[BROWSER_HEAD.size :])
+    except (struct.error, ValueError):
+        return ""
+    if joints != len(parents) or not joints:
+        return ""
+    stride = 8 * joints
+    puppets = (len(numbers) - (4 * joints if flags & GHOST else 0)) // stride
+    places = [
+        [tuple(numbers[stride * puppet + 4 * joints + 3 * joint :][:3]) for joint in range(joints)]
+        for puppet in range(puppets)
+    ]
+    middle = sum(one[0][0] for one in places) / max(puppets, 1)
+    return "".join(
+        f'<path d="M{_at(one[joint], middle)}L{_at(one[parent], middle)}"/>'
+        for one in places
+        for joint, parent in enumerate(parents)
+        if parent >= 0
+    )
+
+
+def _at(place: tuple[float, ...], middle: float) -> str:
+    return f"{_WIDTH / 2 + _SCALE * (place[0] - middle):.1f} {_FLOOR - _SCALE * place[1]:.1f}"

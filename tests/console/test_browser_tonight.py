@@ -1,0 +1,214 @@
+"""Tonight in a browser: nothing moves or is covered when something goes wrong; taps for a task."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from playwright.sync_api import BrowserContext, expect
+from playwright.sync_api import Page as Tab
+
+from tests.console.browser import ON_BOTH, await_box, await_true, declared, press, unlock
+from tests.console.page import Page
+from tests.console.test_browser_picture import drag
+from tests.stage.test_fallbacks import EVERY
+from tests.system.box import Box
+from tests.system.processes import wait_until
+
+pytestmark = pytest.mark.realtime
+
+CONTROLS = ("go", "stop", "resume", "master", "slot", "cues-part", "blackout", "panic", "verdict", "now")
+
+# From now on the page hears what the box says with these fallbacks in place of its own.
+HEARD_WITH = """async () => {
+  const { Box } = await import("/box.js"), hear = Box.prototype.hear;
+  window.fallbacks = [];
+  window.heard = 0;
+  Box.prototype.hear = function (value) {
+    value.fallbacks = window.fallbacks;
+    const active = window.fallbacks.find((one) => one.active);
+    value.verdict = active
+      ? { level: "warning", key: "fallbacks", values: { heard: 1, worn: 2, words: active.words } }
+      : { level: "well", key: "well", values: { heard: 2, worn: 2, rate: 50, since: value.since } };
+    hear.call(this, value);
+    window.heard++;
+  };
+}"""
+PLACES = """(ids) => ids.map((id) => {
+  const { x, y, width, height } = document.getElementById(id).getBoundingClientRect();
+  return [id, x, y, width, height];
+})"""
+
+
+def say(tab: Tab, fallbacks: list[dict[str, Any]]) -> None:
+    """Wait until the page shows these."""
+    tab.evaluate("(said) => { window.fallbacks = said; window.heard = 0; }", fallbacks)
+    await_true(tab, "window.heard > 0")
+
+
+def fell(name: str, about: str = "") -> dict[str, Any]:
+    row = EVERY[name]
+    words = row.named.format(about=about) if about and row.named else row.words
+    return {"name": name, "times": 3, "active": True, "words": words, "about": about, "process": "stage"}
+
+
+@ON_BOTH
+@pytest.mark.parametrize("language", ["en", "de", "fr"])
+def test_nothing_moves_when_fallbacks_come_and_go(tab: Tab, language: str) -> None:
+    """Whatever the sentence is, and however many are in force, each control stays in its place."""
+    tab.evaluate("(language) => localStorage.setItem('language', language)", language)
+    tab.reload()
+    await_box(tab)
+    tab.evaluate(HEARD_WITH)
+    say(tab, [])
+    before = tab.evaluate(PLACES, CONTROLS)
+    assert all(width > 0 and height > 0 for _, _, _, width, height in before), before
+    longest = max(EVERY, key=lambda name: len(EVERY[name].words))
+    several = [fell("sensor-silent", "left-wrist, right-wrist"), fell("receiver-gone", "10.0.0.9:9004 (vmc)")]
+    for said in (
+        [fell(longest)],
+        several,
+        [fell(name) for name in EVERY],
+        [{**fell(longest), "active": False}],
+        [],
+    ):
+        say(tab, said)
+        assert tab.evaluate(PLACES, CONTROLS) == before
+    say(tab, several)
+    for about in ("left-wrist", "10.0.0.9:9004"):
+        expect(tab.locator("#fallbacks-now")).to_contain_text(about)
+
+
+@ON_BOTH
+def test_an_answer_of_the_box_covers_nothing_that_is_touched(tab: Tab, venue: tuple[Box, Page]) -> None:
+    unlock(tab, venue[1])
+    press(tab, '[data-page="tonight"]')
+    before = tab.evaluate(PLACES, CONTROLS)
+    press(tab, "#resume")
+    expect(tab.locator("#said")).not_to_be_empty()
+    assert tab.evaluate(PLACES, CONTROLS) == before
+    covered = """() => {
+      const said = document.getElementById('said').getBoundingClientRect();
+      return [...document.querySelectorAll('footer button, nav button, dialog[open] button')]
+        .filter((one) => {
+          const box = one.getBoundingClientRect();
+          return box.x < said.right && said.x < box.right && box.y < said.bottom && said.y < box.bottom;
+        }).map((one) => one.id);
+    }"""
+    assert tab.evaluate(covered) == []
+    tab.evaluate("scrollTo(0, document.body.scrollHeight)")
+    last = tab.locator("#tonight").bounding_box()
+    footer = tab.locator("footer").bounding_box()
+    assert last is not None and footer is not None
+    assert last["y"] + last["height"] <= footer["y"] + 1, (
+        "the end of the page can be scrolled above the buttons"
+    )
+
+
+@ON_BOTH
+def test_panic_is_in_reach_while_the_pin_is_asked_for(tab: Tab, venue: tuple[Box, Page]) -> None:
+    box, page = venue
+    press(tab, "#stop")
+    expect(tab.locator("#pin")).to_be_visible()
+    press(tab, "#panic")
+    expect(tab.locator("#pin-said")).to_contain_text("PANIC follows")
+    tab.fill("#pin-input", page.pin)
+    press(tab, "#pin-send")
+    wait_until(lambda: declared(box).panic, "PANIC was lost behind the question")
+    assert declared(box).going, "the first wish gave way to it"
+    press(tab, "#stop")
+    wait_until(lambda: not declared(box).going)
+    press(tab, "#resume")
+    wait_until(lambda: declared(box).going and not declared(box).panic)
+
+
+class Taps:
+    """Presses as a person would, and counts them."""
+
+    def __init__(self, tab: Tab) -> None:
+        self.tab, self.count = tab, 0
+
+    def press(self, where: str) -> None:
+        press(self.tab, where)
+        self.count += 1
+
+
+MOST_TAPS = 3
+
+
+@ON_BOTH
+def test_each_task_takes_three_taps_at_most(context: BrowserContext, venue: tuple[Box, Page]) -> None:
+    """From Tonight, on a device that gave the PIN. Typing a name and dragging a corner are no taps."""
+    _, page = venue
+    tab = context.new_page()
+    tab.goto(page.origin)
+    await_box(tab)
+    unlock(tab, page)
+    asked: list[tuple[str, Any]] = []
+    for path in ("sensors", "prove", "command"):
+        tab.route(f"**/api/{path}", lambda route: _answered(route, asked))
+    wearing = f"async () => {{ {WEARABLES} }}"
+    tab.evaluate(wearing)
+    await_true(tab, "window.heard > 0")
+    for begin in (_pair, _replace, _measure, _corner):
+        press(tab, '[data-page="tonight"]')
+        asked.clear()
+        taps = Taps(tab)
+        begin(taps)
+        wait_until(lambda: bool(asked), f"{begin.__name__}: nothing was asked of the box")
+        assert taps.count <= MOST_TAPS, f"{begin.__name__} takes {taps.count} taps"
+        if tab.locator("#change").is_visible():
+            press(tab, "#change-cancel")
+
+
+# A worn sensor and a spare, of a show that plays real sensors.
+WEARABLES = """
+  const { Box } = await import("/box.js"), hear = Box.prototype.hear, get = fetch;
+  window.heard = 0;
+  window.fetch = async (path, ...more) => path !== "/api/show" ? get(path, ...more)
+    : new Response(JSON.stringify({ ...await (await get(path)).json(), rehearsal: null }));
+  Box.prototype.hear = function (value) {
+    const [worn] = value.sensors;
+    value.sensors = [worn, { ...worn, name: "spare-1", is_worn: false, neutral: "" }];
+    value.generation += 1000;
+    value.processes.push({ process: "projector", late: false });
+    value.wall = { corners: [[0, 0], [1, 0], [1, 1], [0, 1]], brightness: 1, grid: false, info: false };
+    hear.call(this, value);
+    window.heard++;
+  };
+"""
+
+
+def _answered(route: Any, asked: list[tuple[str, Any]]) -> None:
+    if route.request.method != "POST":
+        route.fulfill(json={"runs": None, "show_goes": False, "proofs": []})
+        return
+    asked.append((route.request.url, route.request.post_data_json))
+    route.fulfill(body='{"done": true, "words": "Done."}\n')
+
+
+def _pair(taps: Taps) -> None:
+    taps.press('[data-page="sensors"]')
+    taps.press("#pair")
+    taps.tab.fill("#change-name", "right-wrist")
+    taps.press("#change-send")
+
+
+def _replace(taps: Taps) -> None:
+    taps.press('[data-page="sensors"]')
+    taps.press("#cards article:first-child .changes button:nth-child(2)")
+    assert taps.tab.locator("#change-spare").input_value() == "spare-1"
+    taps.press("#change-send")
+
+
+def _measure(taps: Taps) -> None:
+    taps.press('[data-page="prove"]')
+    taps.press("#prove-begin")
+
+
+def _corner(taps: Taps) -> None:
+    taps.press('[data-page="picture"]')
+    box = taps.tab.locator("#corners button").nth(0).bounding_box()
+    assert box is not None
+    drag(taps.tab, box["x"] + 30, box["y"] + 30, 20, 20)
+    taps.count += 1
