@@ -1,16 +1,20 @@
-"""Pages that hold together: whole tables, and examples and defaults that the box reads."""
+"""Pages that hold together: tables, examples, links, commands. What they describe is tested, or says not."""
 
 from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from importlib.metadata import entry_points
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from PIL import Image, ImageChops, ImageSequence
 from pydantic import BaseModel, ValidationError
 
 from appliance.cli.app import PLUG_INS, parser, plug_ins
@@ -20,11 +24,21 @@ from appliance.show.section import Section
 from appliance.show.show import ShowConfig
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.data.catalogue import CatalogueFile
+from tests.test_readme import PAGES as RUN_BY_TEST_README
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 PARTIAL = ("missing", "refused")  # kinds of errors of a file's part; unknown keys and values are others
 OWN_READERS = {"still", "left-wrist"}  # excerpts of an experiment, a key file: no configuration
+FOR_ENGINEERS = {
+    *("CHANGELOG.md", "CODE_OF_CONDUCT.md", "CONTRIBUTING.md", "SECURITY.md"),
+    *("experiments.md", "firmware.md", "house.md", "image.md", "notebook.md", "releases.md", "units.md"),
+}
+REFERENCE = {"configuration.md", "journal.md", "osc.md", "outputs.md", "wire.md"}
+FOR_USERS = [page for page in PAGES if page.name not in FOR_ENGINEERS | REFERENCE]
+LINES_AT_MOST = 3000  # what a person may be asked to read
+OWN_COMMANDS = {"CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "experiments.md", "house.md", "notebook.md"}
+WITH_ANCHORS = {".py", ".sh", ".js", ".json", ".h", ".cpp", ".ino", ".yaml", ".toml", ".service", ".md", ""}
 
 
 def prose(page: str) -> Iterator[tuple[int, str]]:
@@ -208,3 +222,170 @@ def test_an_option_that_is_none_is_found() -> None:
     (found,) = commands_in("Type `sudo bunraku journal export --to-stick --bvh FILE`, or bunraku dance.")
     assert strange_words(found[1], bunraku) == ["--to-stick"]
     assert strange_words(["dance"], bunraku) == ["dance"]
+
+
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+PAGE_NAMED = re.compile(r"\bdocs/([a-z-]+\.md)(?:#([a-z0-9-]+))?")
+
+
+def anchors(page: Path) -> set[str]:
+    """What a link to a heading of a page may say behind the #, as GitHub writes it."""
+    headings = [
+        line.lstrip("#").strip() for _, line in prose(page.read_text("utf-8")) if line.startswith("#")
+    ]
+    plain = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower() for heading in headings]
+    return {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
+
+
+def leads_nowhere(source: Path, target: str) -> bool:
+    path, _, anchor = target.partition("#")
+    page = source.parent / path if path else source
+    return not page.exists() or bool(anchor and page.suffix == ".md" and anchor not in anchors(page))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_and_their_anchors_lead_somewhere(page: Path) -> None:
+    targets = [target for target in LINK.findall(page.read_text("utf-8")) if "://" not in target]
+    assert [target for target in targets if leads_nowhere(page, target)] == []
+
+
+def test_a_link_to_no_heading_is_found() -> None:
+    glossary = ROOT / "docs" / "glossary.md"
+    assert leads_nowhere(glossary, "#hands")
+    assert leads_nowhere(glossary, "nowhere.md")
+    assert not leads_nowhere(glossary, "faq.md")
+    assert not leads_nowhere(glossary, "#joints")
+
+
+def files_that_people_read() -> Iterator[Path]:
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode != 0:
+        pytest.skip("this is no git checkout")
+    for name in listed.stdout.splitlines():
+        if (ROOT / name).is_file() and Path(name).suffix in WITH_ANCHORS and name != "tests/test_docs.py":
+            yield ROOT / name
+
+
+def test_pages_that_messages_and_comments_name_exist() -> None:
+    """Also those of the scripts and of the firmware: a message that names a page is the only help at 7 pm."""
+    nowhere = {}
+    for file in files_that_people_read():
+        text = file.read_text("utf-8", errors="ignore")
+        for name, anchor in PAGE_NAMED.findall(
+            text.replace("docs/fixture-format.md", "")
+        ):  # another project's
+            page = ROOT / "docs" / name
+            if not page.is_file() or (anchor and anchor not in anchors(page)):
+                nowhere[str(file.relative_to(ROOT))] = f"docs/{name}#{anchor}"
+    assert nowhere == {}
+
+
+TESTED_BY = re.compile(r"<!-- tested by ([^>]+) -->")
+IS_COMMAND = re.compile(
+    r"\s*(?:\$ )?(?:sudo )?(bunraku(?:-[a-z-]+)?|make|apt|dd|oscsend|torchrun|arduino-cli|blender|nmcli"
+    r"|systemctl|python|ffmpeg|journalctl|cp|mount)(?: +([a-z-]+))?"
+)
+UNTRIED = ("(not tried", "not tried:", "tried by hand")
+
+
+def fences(page: str) -> Iterator[tuple[int, str, list[str], str]]:
+    """Line, kind and content of each fence, and the paragraph and the comment before it."""
+    lines, begun, kind = page.splitlines(), 0, ""
+    for number, line in enumerate(lines):
+        if not line.lstrip().startswith("```"):
+            continue
+        if begun:
+            before = "\n".join(lines[: begun - 1]).rstrip()
+            yield begun, kind, lines[begun:number], "\n".join(before.splitlines()[-8:])
+            begun = 0
+        else:
+            begun, kind = number + 1, line.strip().removeprefix("```")
+
+
+def untested(page: str, text: str) -> Iterator[str]:
+    """Blocks of commands that no test runs and that do not say so; page: its path in the checkout."""
+    for line, kind, body, before in fences(text):
+        commands = [found.groups() for row in body if (found := IS_COMMAND.match(row))]
+        run = kind == "sh" and page in RUN_BY_TEST_README
+        if not commands or run or any(words in before for words in UNTRIED):
+            continue
+        named = TESTED_BY.search(before.rpartition("\n")[2])
+        files = [ROOT / name for name in named[1].split()] if named else []
+        if not files:
+            yield f"{page}:{line}: neither run, nor tested, nor marked '(not tried)'"
+        tests = "".join(file.read_text("utf-8") for file in files if file.is_file())
+        for program, word in commands:
+            if files and program.startswith("bunraku") and not re.search(rf"\b{word}\b", tests):
+                yield f"{page}:{line}: {named[1] if named else ''} does not run '{program} {word}'"
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page.name not in OWN_COMMANDS], ids=lambda p: p.name
+)
+def test_each_path_is_walked_by_a_test_or_marked(page: Path) -> None:
+    assert list(untested(str(page.relative_to(ROOT)), page.read_text("utf-8"))) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("```text\nbunraku check\n```\n", 1),
+        ("(not tried)\n\n```text\nbunraku check\n```\n", 0),
+        ("<!-- tested by tests/test_docs.py -->\n```text\nbunraku check\n```\n", 0),
+        ("<!-- tested by tests/test_start.py -->\n```text\nbunraku quadrille\n```\n", 1),
+        ("<!-- tested by tests/nowhere.py -->\n```text\nbunraku check\n```\n", 1),
+        ("```text\nWhat it prints.\n```\n", 0),
+    ],
+)
+def test_an_unmarked_block_is_found(text: str, found: int) -> None:
+    assert len(list(untested("page.md", text))) == found
+
+
+def test_each_step_from_the_shop_to_the_wall_says_what_one_sees_and_whether_it_was_tried() -> None:
+    page = (ROOT / "docs" / "raspberry-pi.md").read_text("utf-8")
+    steps = re.findall(r"(?ms)^\d+\. (.+?)(?=^\d+\. |^[A-Z#])", page)
+    assert len(steps) == 12
+    for step in steps:
+        assert "You see: " in step, step
+        tested = TESTED_BY.search(step)
+        assert "(not tried" in step or (tested and (ROOT / tested[1]).is_file()), step
+
+
+def test_pages_for_users_are_short_enough_to_be_read() -> None:
+    lines = {page.name: len(page.read_text("utf-8").splitlines()) for page in FOR_USERS}
+    assert sum(lines.values()) < LINES_AT_MOST, lines
+
+
+def test_the_readme_leads_to_every_page() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    named = {Path(target.partition("#")[0]).name for target in LINK.findall(readme)}
+    assert {page.name for page in PAGES} - named == {"README.md", "CHANGELOG.md", "CODE_OF_CONDUCT.md"}
+
+
+def test_the_table_of_commands_is_that_of_the_help() -> None:
+    page = (ROOT / "docs" / "commands.md").read_text("utf-8")
+    asked = [Path(sys.executable).parent / "bunraku", "--help"]
+    printed = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    shown = printed.partition("Commands:")[2]
+    assert re.findall(r"(?m)^\| `bunraku ([a-z]+)` \|", page) == re.findall(r"(?m)^  ([a-z]+)  ", shown)
+
+
+def test_the_first_thing_to_see_is_six_seconds_of_a_hand_and_its_answer() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    picture = re.search(r"!\[.+\]\((.+?)\)", readme)
+    assert picture
+    assert readme.index(picture[0]) < 200
+    loop = ROOT / picture[1]
+    assert loop.stat().st_size < 2_000_000
+    with Image.open(loop) as opened:
+        frames = [(frame.convert("L"), frame.info["duration"]) for frame in ImageSequence.Iterator(opened)]
+    seconds = sum(duration for _, duration in frames) / 1000
+    pictures = [picture for picture, _ in frames]
+    moved = [0, 0]
+    for before, now in pairwise(pictures):
+        changed = ImageChops.difference(before, now).point(lambda value: 255 * (value > 60))
+        for half in (0, 1):
+            box = (half * now.width // 2, 0, (half + 1) * now.width // 2, now.height)
+            moved[half] += changed.crop(box).histogram()[255]
+    assert seconds == pytest.approx(6.0, abs=0.1)
+    assert 0 < moved[0] < moved[1]  # one arm on the left, a whole body on the right

@@ -216,7 +216,7 @@ def row(name: str, dancer: Dancer, pauses: bool, table: bool) -> str:
 
 
 def print_table(folder: Path, joint: str) -> None:
-    """The table of docs/results.md."""
+    """The table of docs/notebook.md."""
     print(f"95th percentile of the heading's error, degrees; drift {' / '.join(map(str, RATES))} a minute.\n")
     print("| dancer and evening | uncorrected | mean stays zero | stillness | the box |")
     print("|---|---|---|---|---|")

@@ -33,7 +33,7 @@ class PuppetNetwork:
     latent: Z numbers that a window is coded in; rest (M, 4).
 
     The session is bound to the arrays of the rows once: a run allocates nothing here. In int8 the rows'
-    activations share a range, so that a row depends a little on the others (docs/results.md).
+    activations share a range, so that a row depends a little on the others (docs/notebook.md).
     """
 
     def __init__(self, path: Path, skeleton: Skeleton, puppets: int = 1) -> None:

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 def test_every_board_has_a_drawing_and_the_page_shows_it() -> None:
     profiles = yaml.safe_load((ROOT / "firmware/wearable/sketch.yaml").read_text())["profiles"]
     assert set(WIRINGS) == set(profiles)
-    page = (ROOT / "docs" / "firmware.md").read_text()
+    page = (ROOT / "docs" / "build-a-wearable.md").read_text()
     assert all(f"pictures/wiring-{profile}.svg" in page for profile in profiles)
 
 
@@ -32,7 +32,7 @@ def test_a_drawing_is_as_the_tool_draws_it(profile: str) -> None:
 def test_the_page_names_the_pins_of_the_drawing(profile: str) -> None:
     wiring = WIRINGS[profile]
     board = re.sub(r"^(Arduino|Seeed) ", "", wiring.board)
-    page = (ROOT / "docs" / "firmware.md").read_text()
+    page = (ROOT / "docs" / "build-a-wearable.md").read_text()
     row = next(
         line
         for line in page.splitlines()

@@ -6,7 +6,7 @@ at given orientations. A hand moves the latent by a difference vector: that mean
 hand wants them, less that mean with the joints where the phrase has them. The phrase's own part, the
 residual, stays. So the answer keeps the dance's spread and energy whatever the hand asks for, and a hand
 that holds a joint where the phrase has it changes nothing. A network that learns the answer itself by
-distance gives the mean of all good ones instead, and the mean stands still (docs/results.md).
+distance gives the mean of all good ones instead, and the mean stands still (docs/notebook.md).
 
 The hand encoder learns two thirds of what a hand changes, so its differences are too short. The effect on the
 latent of putting the held joint into the window is known exactly; the rest, the body's share, counts more.
@@ -32,7 +32,7 @@ LONGEST_STEP = 0.5  # metres that one interaction asks of a joint at most
 SMALLEST_SPREAD = 0.02  # metres; of the places of a joint that hardly moves
 CALM = 0.6  # share of the residual that liveliness 0 keeps: as calm as the answers of release 0.1
 BODY = 1.2  # gain of the body's share of a difference vector, which the hand encoder leaves out
-LEARNED_BODY = 0.6  # the same in training: the critic works against the whole of it (docs/results.md)
+LEARNED_BODY = 0.6  # the same in training: the critic works against the whole of it (docs/notebook.md)
 NOISE = 0.25  # standard deviations of a latent, at liveliness 1
 
 # A rotation matrix, row by row, from the products of a quaternion's components (w, x, y, z) x (w, x, y, z).

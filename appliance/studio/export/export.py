@@ -32,7 +32,7 @@ def export(
     A coupled network's pass is there twice, with the same constants: while no row has a place weight above 0,
     none looks where the joints are.
     In int8 the rows' activations share a range, so that a row depends a little on the others
-    (docs/results.md); the same rows give the same bits.
+    (docs/notebook.md); the same rows give the same bits.
     """
     shape = autoencoder.shape
     main = Graph()
