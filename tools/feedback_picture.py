@@ -62,7 +62,7 @@ def _danced(gain: float) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
         slot = Slot(number, number * TICK_S, number * TICK_S, 0)
         tick.run(slot)
         tick.after(slot)
-        positions = tick.frames[0].positions
+        positions = tick.frame.puppets[0].positions
         way.append(float(positions[show.skeleton.index(HAND), 0]))
         instrument.dance(positions, slot.deadline)
         heard.append(instrument.render(960))

@@ -54,8 +54,8 @@ def _strip(out: Path, setting: str) -> Path:
         slot = Slot(number, number * TICK_S, number * TICK_S, 0)
         tick.run(slot)
         tick.after(slot)
-        poses.append(tick.frames[0].pose.copy())
-        roots.append(tick.frames[0].root.copy())
+        poses.append(tick.frame.puppets[0].pose.copy())
+        roots.append(tick.frame.puppets[0].root.copy())
     parts.close()
     begin = round(BEFORE_S / TICK_S)
     title = f"springs: {setting}" if setting else "without springs"

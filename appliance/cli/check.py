@@ -186,7 +186,7 @@ def _dead_map(show: Show) -> Iterator[str]:
 def _refuse_misfits(show: Show, box: BoxConfig) -> None:
     """Raises ConfigError where the box file names joints or fixtures that do not fit this show."""
     problems = [
-        *box.output_misfits(show.skeleton.names, len(show.config.hands_of_puppets)),
+        *box.output_misfits(show.skeleton.names, len(show.config.cast)),
         *misplaced(show, box),
     ]
     if problems:

@@ -86,7 +86,7 @@ def _danced(pair: Pair) -> tuple[float, float]:
         tick.run(slot)
         tick.after(slot)
         costs_ms.append(1000.0 * (time.thread_time() - begun))
-        if not all(np.isfinite(frame.pose).all() for frame in tick.frames):
+        if not all(np.isfinite(frame.pose).all() for frame in tick.frame.puppets):
             raise ValueError("The poses are not numbers.")
     parts.close()
     memory.close()

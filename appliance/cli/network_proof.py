@@ -66,12 +66,12 @@ def prove_network(show: Show) -> str:
     def run() -> None:
         require_danceable(verify_bundle(show.directory))
         print(not_as_packed(show.directory))
-        config = show.config
-        network = PuppetNetwork(show.network, show.skeleton, len(config.hands_of_puppets))
-        for number, puppet in enumerate(network.puppets):
-            held = np.isin(network.joints, [hand.joint for hand in config.hands_of_puppets[number]])
+        cast = show.config.cast
+        network = PuppetNetwork(show.network, show.skeleton, len(cast))
+        for start, puppet in zip(cast, network.puppets, strict=True):
+            held = np.isin(network.joints, [hand.joint for hand in start.hands])
             targets, weights = np.tile(network.rest, (network.window, 1, 1)), held.astype(np.float32)
-            puppet.hold(held, targets, weights, *config.iterations_of_puppets[number])
+            puppet.hold(held, targets, weights, *start.iterations)
         try:
             network.dance()
         except Exception as error:  # onnxruntime has a separate class for every kind of failure

@@ -151,8 +151,7 @@ def render_dance(dance: RecordedDance, out: Path, look: str, show: Path | None) 
     try:
         from appliance.projector.strip import render_strip
 
-        (first, *others), holds = dance.recordings, dance.holds
-        return render_strip(out, first, looks, look, None if holds is None else holds[:, 0], others)
+        return render_strip(out, dance.recordings, looks, look, dance.holds)
     except ProjectorError as error:
         raise StageError(str(error)) from error
     except OSError as error:

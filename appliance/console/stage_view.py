@@ -22,6 +22,7 @@ from appliance.outputs.frame_layout import (
     WRITER,
     FrameLayout,
 )
+from appliance.outputs.puppet_facts import led_by, unpacked
 from appliance.pose.foreign_file import plain_json
 from appliance.show_control.status_messages import SeenFacts
 
@@ -42,7 +43,7 @@ class StageView:
         self._file = RingFileReader(folder / FILE, KIND, FORMAT, WRITER)
         self._looked_at = -math.inf
         self._sequence = 0
-        self._layout = FrameLayout(0)
+        self._layout, self._led = FrameLayout(0), 0
         self.with_ghost = b""
         self._frame_time = -math.inf
         self.facts: dict[str, Any] = {}
@@ -66,7 +67,8 @@ class StageView:
         ends = range(layout.root_at + layout.stride, layout.bytes + 1, layout.stride)
         left_out = layout.world_at - layout.root_at
         seen = b"".join(payload[end - layout.stride + left_out : end] for end in ends)
-        source = payload[layout.source_at : layout.world_at]
+        begin = layout.source_at + self._led * layout.stride
+        source = payload[begin : begin + layout.world_at - layout.source_at]
         self.with_ghost = BROWSER_HEAD.pack(tick, flags & LATE | GHOST, joints) + seen + source
         return BROWSER_HEAD.pack(tick, flags & LATE, joints) + seen
 
@@ -107,35 +109,37 @@ class StageView:
         found = rings[FACTS].newest() if len(rings) > FRAMES else None
         try:
             facts = plain_json(found[1] if found else b"")
+            facts["puppets"] = unpacked(facts["puppets"])
+            self._led = facts["puppets"].index(led_by(facts["puppets"]))
             self.facts, self.show_directory = _for_browsers(facts), Path(facts["show_directory"])
             self.seen_facts = _seen(facts)
         except (ValueError, KeyError, TypeError, IndexError):
             self._file.refuse(f"holds no facts about a show. Start {WRITER} again.")
             return
-        self._layout = FrameLayout(len(self.facts["joints"]), len(self.facts["puppets"]) or 1)
+        self._layout = FrameLayout(len(self.facts["joints"]), len(facts["puppets"]))
         self.generation += 1
 
 
 def _seen(facts: dict[str, Any]) -> SeenFacts:
     """By attribute; what an earlier release did not tell is empty."""
     empty: dict[str, Any] = {"cards": (), "springs": (), "motion": {}}
-    skeleton = SimpleNamespace(names=tuple(facts["skeleton"]["joints"]))
-    return cast(SeenFacts, SimpleNamespace(**empty | facts | {"skeleton": skeleton}))
+    return cast(SeenFacts, SimpleNamespace(**empty | facts))
 
 
 def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:
     """No paths and no process numbers of the box."""
-    skeleton = facts["skeleton"]
+    skeleton, puppets = facts["skeleton"], facts["puppets"]
+    hands = led_by(puppets).hands
     return {
         "show": facts["show_name"],
         "joints": skeleton["joints"],
         "parents": skeleton["parents"],
         "offsets": skeleton["offsets"],
         "ends": skeleton["ends"],
-        "held": [skeleton["joints"][joint] for joint in facts["held"]],
-        "hands": facts["hands"],
-        "by_position": facts["by_position"],
-        "puppets": facts["puppets"],
+        "held": [hand.joint for hand in hands],
+        "hands": [hand.source for hand in hands],
+        "by_position": [place for place, hand in enumerate(hands) if hand.by == "position"],
+        "puppets": [puppet.name for puppet in puppets if puppet.name],
         "coding": facts["coding"],
         "interaction": facts["interaction"],
         "most_iterations": facts["most_iterations"],

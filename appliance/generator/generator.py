@@ -40,6 +40,7 @@ from appliance.levers.sources import IMPROVISE, KEPT, MAIN
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.bvh import BvhError
 from appliance.show.box import BoxConfig
+from appliance.show.puppets import PuppetStart
 from appliance.show.show import Show
 
 _TAKEN_S = 5.0  # what is to be danced at once and is not taken over until then is made again
@@ -56,7 +57,7 @@ _WRONG = (MotionNetworkError, GroundingError, PhraseError, BvhError, OSError, Lo
 class _Ahead:
     """Motion made ahead for one puppet. request: the one for the last motion; returns: since then."""
 
-    puppet: int
+    puppet: PuppetStart
     writer: MadeMotionWriter
     request: Request | None = None
     recipe: str = ""
@@ -91,8 +92,7 @@ class Generator:
         self._state, self._disk = box.state_folder, ""
         self._kept_names = KeptNamesWriter(folder)
         self._told_names: list[str] | None = None
-        puppets = range(max(1, len(config.puppets)))
-        self._ahead = [_Ahead(puppet, MadeMotionWriter(folder, puppet)) for puppet in puppets]
+        self._ahead = [_Ahead(puppet, MadeMotionWriter(folder, puppet.number)) for puppet in config.cast]
         self._number = 1000 + int(time.time()) % _MOST_NUMBERS
 
     def look(self, state_reader: ShowStateReader, now: float) -> bool:
@@ -105,7 +105,9 @@ class Generator:
             self._fallbacks.concern(NOT_KEPT.name, filter(None, [self._disk]))
         self._fallbacks.set(NOT_KEPT.name, self.kept.complaint)
         state = state_reader.read()
-        self._pointed = [] if self._pointing is None else self._pointing.point(self._stage.newest(now))
+        if self._pointing is not None:
+            frame, facts = self._stage.newest(now), self._stage.facts
+            self._pointed = self._pointing.point(facts.led_in(frame) if facts and frame else None)
         waiting_first = sorted(self._ahead, key=lambda one: one.request is not None)
         return any(self._look_at(one, state, now) for one in waiting_first)  # one motion, then it looks again
 
@@ -113,7 +115,7 @@ class Generator:
         """Carry out an order of show control's: keep."""
         if order.name != "keep":
             return False, f"The generator knows no order '{order.name}'."
-        danced = self._danced(0)
+        danced = self._danced(self._show.config.led)
         try:
             if not danced:
                 raise ValueError("The motion that dances now was not made ahead: there is nothing to keep.")
@@ -155,13 +157,13 @@ class Generator:
         ahead.request = request
         return True
 
-    def _told(self, puppet: int) -> Mapping[str, Any]:
+    def _told(self, puppet: PuppetStart) -> Mapping[str, Any]:
         """The stage's report on a puppet."""
         health = self._stage.health() or {}
-        puppets = health.get("puppets", ())
-        return {**health, **puppets[puppet]} if puppet < len(puppets) else {}
+        found = (one for one in health.get("puppets", ()) if one.get("name") == puppet.name)
+        return next(({**health, **one} for one in found), {})
 
-    def _danced(self, puppet: int) -> str:
+    def _danced(self, puppet: PuppetStart) -> str:
         """The recipe that a puppet dances; "" for none."""
         return str(self._told(puppet).get("made", ""))
 
@@ -197,7 +199,7 @@ class Generator:
         complaints = dict.fromkeys(one.complaint for one in self._ahead if one.complaint)
         self._fallbacks.set(NOT_MADE.name, " ".join(complaints))
 
-    def _going_on(self, puppet: int, at_once: bool) -> dict[str, Any]:
+    def _going_on(self, puppet: PuppetStart, at_once: bool) -> dict[str, Any]:
         """The pose that an improvisation continues: one that is soon danced, or the end of another one."""
         told, danced = self._told(puppet), self._danced(puppet)
         name = str(told.get("base", MAIN))

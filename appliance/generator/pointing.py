@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.joint_frame import PuppetFrame
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 
@@ -15,7 +15,7 @@ STEADY = 0.03  # fraction of the map: a limb that trembles by less stays where i
 
 
 class Pointing:
-    """Reads the first puppet's frames. joint: the name of the one that the hand holds."""
+    """Reads the frames of a puppet. joint: the name of the one that the hand holds."""
 
     def __init__(self, skeleton: Skeleton, joint: str) -> None:
         self._joint = skeleton.index(joint)
@@ -24,7 +24,7 @@ class Pointing:
         self._limb = limb / max(float(np.linalg.norm(limb)), 1e-6)
         self._point: list[float] = []
 
-    def point(self, frame: SeenFrame | None) -> list[float]:
+    def point(self, frame: PuppetFrame | None) -> list[float]:
         """x, y, each 0 to 1, as `/motion/path` takes them; [] while the hand does not hold.
 
         Depends only on the joint's rotation, seen from the front of the parent joint: ahead is the middle;

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from appliance.levers.show_state import ShowState
 from appliance.levers.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, PATH
 from appliance.levers.table import AGAIN, MADE_NUMBERS, PATH_POINTS, PHRASE
+from appliance.show.puppets import PuppetStart
 from appliance.show.show import ShowConfig
 
 STEP_S = 1.5  # seconds of a fade: each step is a separate motion, blended into the one before
@@ -45,20 +46,21 @@ class Requests:
         kept: Mapping[str, dict[str, Any]],
         now: float,
         wanted: str = "",
-        puppet: int = 0,
+        puppet: PuppetStart | None = None,
         pointed: Sequence[float] = (),
     ) -> Request | None:
         """A puppet's open request; None: phrases or a live dancer. base: the phrase that it danced last.
 
-        kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the first puppet waits for
-        while nothing is declared, after a power cut. pointed: x, y of the map at which a hand points.
+        kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the puppet that cues lead
+        waits for while nothing is declared, after a power cut. puppet: None: that one. pointed: x, y of the
+        map at which a hand points.
         """
         if state.show != self._config.name:
             state = ShowState()
-        if puppet:
-            name = self._config.puppets[puppet].phrase or ""
-        else:
-            name = state[PHRASE].value if PHRASE in state else wanted or self._config.motion.source
+        puppet = puppet or self._config.led
+        name = puppet.source
+        if puppet.is_led:
+            name = state[PHRASE].value if PHRASE in state else wanted or name
         if name in kept:
             return Request(name, {"source": KEPT, "name": name, "of": kept[name]})
         if name not in MADE or name not in self._sections:
@@ -67,7 +69,7 @@ class Requests:
         for parameter, about in PARAMETERS[name].items():
             value = self._value(state, name, parameter, now)
             recipe[parameter] = int(value) if about.is_whole else round(value, _DIGITS)
-        recipe["seed"] += AGAIN_SEEDS * state[AGAIN].value + APART * puppet
+        recipe["seed"] += AGAIN_SEEDS * state[AGAIN].value + APART * puppet.number
         if name == GRANULAR:
             section = self._sections[name]
             recipe |= {"from": getattr(section, "from_", None), "to": getattr(section, "to", None)}

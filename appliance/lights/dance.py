@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.motion_features import MotionFeatures
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
@@ -21,16 +21,28 @@ ROOT = 0
 _COORDINATE = {"across": 0, "height": 1, "depth": 2}
 
 
+class Dances:
+    """The dance of each puppet, by name."""
+
+    def __init__(self, skeleton: Skeleton, puppets: Sequence[str], led: str) -> None:
+        """led: the name of the one that cues lead."""
+        self._by_name, self._led = {name: Dance(skeleton) for name in puppets}, led
+
+    def take_frame(self, frame: JointFrame, generation: int, now: float) -> None:
+        """Take the newest frame, which may be the same again; `generation`: the stage's."""
+        for dance, puppet in zip(self._by_name.values(), frame.puppets, strict=False):
+            dance.take_frame(frame, puppet, generation, now)
+
+    def of(self, puppet: str | None) -> Dance:
+        """The dance of a puppet; None: of the one that cues lead."""
+        return self._by_name[self._led if puppet is None else puppet]
+
+
 class Dance:
-    """The newest frame and how fast its joints move. Arrays are (J, ...) in the skeleton's order.
+    """A puppet's newest frame and how fast its joints move. Arrays are (J, ...) in the skeleton's order."""
 
-    It is the first puppet's; `of` gives those of the others.
-    """
-
-    def __init__(self, skeleton: Skeleton, puppets: Sequence[str] = ()) -> None:
-        """puppets: the names of several, else ()."""
+    def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
-        self._others = {name: Dance(skeleton) for name in puppets[1:]}
         joints = len(skeleton)
         self.positions: NDArray[np.float64] = np.zeros((joints, 3))  # world, metres
         self.pose: NDArray[np.float64] = np.tile(quaternion.IDENTITY.astype(float), (joints, 1))
@@ -42,23 +54,17 @@ class Dance:
         self._time = -math.inf
         self._tick: tuple[int, int] | None = None
 
-    def take_frame(self, frame: SeenFrame, generation: int, now: float) -> None:
-        """Take the newest frame, which may be the same again; `generation`: the stage's."""
-        for dance, other in zip(self._others.values(), frame.others, strict=False):
-            dance.take_frame(other, generation, now)
+    def take_frame(self, frame: JointFrame, puppet: PuppetFrame, generation: int, now: float) -> None:
+        """Take the puppet's newest frame, which may be the same again; `generation`: the stage's."""
         tick = (generation, frame.tick)
         if tick == self._tick:
             if now - self._time > PAUSE_S:
                 self._settle(np.zeros_like(self.speeds), PAUSE_S)
                 self._feel(dict.fromkeys(FEATURES, 0.0), PAUSE_S)
             return
-        if (not frame.late or self._tick is None) and np.isfinite(frame.positions).all():
-            self._measure(frame, generation)
+        if (not frame.late or self._tick is None) and np.isfinite(puppet.positions).all():
+            self._measure(frame, puppet, generation)
         self._tick = tick
-
-    def of(self, puppet: str | None) -> Dance:
-        """The dance of a puppet; None: the first."""
-        return self if puppet is None else self._others.get(puppet, self)
 
     def read(self, rule: RuleConfig) -> float:
         """A rule's present input: metres, metres a second or degrees."""
@@ -78,20 +84,20 @@ class Dance:
         where: NDArray[np.float64] = self.positions[ROOT if joint is None else self.skeleton.index(joint)]
         return where
 
-    def _measure(self, frame: SeenFrame, generation: int) -> None:
+    def _measure(self, frame: JointFrame, puppet: PuppetFrame, generation: int) -> None:
         elapsed_s = frame.frame_time - self._time
         continues = self._tick is not None and self._tick[0] == generation
         if continues and 0.0 < elapsed_s < PAUSE_S:
-            speeds = np.linalg.norm(frame.positions - self.positions, axis=-1) / elapsed_s
+            speeds = np.linalg.norm(puppet.positions - self.positions, axis=-1) / elapsed_s
             if speeds.max() > FASTEST_M_S and self._features is not None:
                 self._features = MotionFeatures(len(self.skeleton))  # a jump: motion begins anew
             self._settle(np.minimum(speeds, FASTEST_M_S), elapsed_s)
         else:
             self._settle(np.zeros_like(self.speeds), PAUSE_S)
-        self.positions[:], self.pose[:], self.world[:] = frame.positions, frame.pose, frame.world
+        self.positions[:], self.pose[:], self.world[:] = puppet.positions, puppet.pose, puppet.world
         self._time = frame.frame_time
         if self._features is not None:
-            self._features.take_frame(frame.positions, frame.frame_time)
+            self._features.take_frame(puppet.positions, frame.frame_time)
             self._feel({name: float(self._features.numbers[name][0]) for name in FEATURES}, elapsed_s)
 
     def _settle(self, speeds: NDArray[np.float64], elapsed_s: float) -> None:

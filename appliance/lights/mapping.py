@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from appliance.lights.colour import between, mixed
 from appliance.lights.curve import bent, eased, share
-from appliance.lights.dance import Dance
+from appliance.lights.dance import Dances
 from appliance.lights.patch import Patch, Places, Values
 from appliance.show.light_rules import AIM, COLOUR, MappingConfig, RuleConfig
 
@@ -56,13 +56,13 @@ class Mapping:
         for rule in self._rules:
             rule.restart()
 
-    def evaluate(self, dance: Dance, seconds: float) -> MappingOutput:
+    def evaluate(self, dances: Dances, seconds: float) -> MappingOutput:
         """The rules' output now, `seconds` after the pass before."""
         output = MappingOutput(
             self._patch.defaults.copy(), np.zeros((len(self._aimed), 3)), self._aimed, self._steered
         )
         for rule in self._rules:
-            rule.apply(dance, seconds, output)
+            rule.apply(dances, seconds, output)
         return output
 
 
@@ -97,12 +97,12 @@ class _Rule:
     def restart(self) -> None:
         self._level = None
 
-    def apply(self, dance: Dance, seconds: float, output: MappingOutput) -> None:
+    def apply(self, dances: Dances, seconds: float, output: MappingOutput) -> None:
         config = self._config
         if config.reads == "steady":
             wanted = config.value
         else:
-            wanted = bent(config, share(dance.of(config.puppet).read(config), config.ends))
+            wanted = bent(config, share(dances.of(config.puppet).read(config), config.ends))
         if self._level is not None:
             wanted = eased(self._level, wanted, config.attack_s, config.release_s, seconds)
         self._level = wanted
@@ -131,8 +131,8 @@ class _Aim:
     def restart(self) -> None:
         """Nothing to reset: only the heads' own speed limits an aim."""
 
-    def apply(self, dance: Dance, seconds: float, output: MappingOutput) -> None:
-        point = dance.of(self._puppet).place(self._joint) if self._point is None else self._point
+    def apply(self, dances: Dances, seconds: float, output: MappingOutput) -> None:
+        point = dances.of(self._puppet).place(self._joint) if self._point is None else self._point
         output.aims[self.heads] = point + self._offset
 
 

@@ -12,7 +12,7 @@ from appliance.levers.show_state import ShowState
 from appliance.levers.table import LIGHTS
 from appliance.lights.patch import Patch, Values
 from appliance.lights.rig import Rig
-from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.pose.recording import Recording
 from appliance.show.lights import LightsConfig
 
@@ -45,13 +45,13 @@ def passes(
         frame = _frame(phrase, int(place), tick, step_s)
         rig.render(frame, 1, in_force, frame.frame_time)
         if tick >= settling:
-            yield Pass(float(place / phrase.fps), frame.positions.astype(float), rig.values)
+            yield Pass(float(place / phrase.fps), frame.puppets[0].positions.astype(float), rig.values)
 
 
-def _frame(phrase: Recording, place: int, tick: int, step_s: float) -> SeenFrame:
+def _frame(phrase: Recording, place: int, tick: int, step_s: float) -> JointFrame:
     """One instant of the phrase, as the stage would show it."""
     pose, root = phrase.poses[place], phrase.roots[place]
     positions, world = phrase.skeleton.forward_kinematics(pose, root)
     free = np.zeros(len(pose))
-    small = [np.asarray(part, np.float32) for part in (pose, world, positions, root, free)]
-    return SeenFrame(tick, tick * step_s, 0.0, False, -1, 0.0, *small)
+    small = [np.asarray(part, np.float32) for part in (root, pose, pose, world, positions, free)]
+    return JointFrame((PuppetFrame(*small),), tick, tick * step_s)

@@ -10,11 +10,11 @@ from appliance.box.pace import Pace
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import LIGHTS
 from appliance.lights.colour import mixed
-from appliance.lights.dance import Dance
+from appliance.lights.dance import Dances
 from appliance.lights.head import LONGEST_STEP_S
 from appliance.lights.mapping import Mapping, MappingOutput, faded, mappings_of
 from appliance.lights.patch import Patch, Values
-from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.joint_frame import JointFrame
 from appliance.pose.skeleton import Skeleton
 from appliance.show.fixture_profile import DIMMER
 from appliance.show.lights import LightsConfig, SafeConfig
@@ -39,10 +39,12 @@ class Rig:
         patch: Patch,
         skeleton: Skeleton,
         rate_hz: float = USUAL_RATE_HZ,
-        puppets: Sequence[str] = (),
+        puppets: Sequence[str] = ("",),
+        led: str = "",
     ) -> None:
+        """puppets: their names; led: the one that cues lead."""
         self.patch = patch
-        self.dance = Dance(skeleton, puppets)
+        self.dances = Dances(skeleton, puppets, led)
         self.safety = 1.0  # 0: only the dance; 1: only the safe look
         self._safe, self._homes = _safe_look(config.safe, patch), config.safe.heads == "home"
         self.values: Values = patch.dimmed(self._safe, 1.0)  # (S,) what the last pass showed
@@ -64,13 +66,13 @@ class Rig:
         return self._unseen_s > LOST_S
 
     def render(
-        self, frame: SeenFrame | None, generation: int, show_state: ShowState, now: float
+        self, frame: JointFrame | None, generation: int, show_state: ShowState, now: float
     ) -> dict[int, bytes]:
         """512 levels for each universe at `now` (monotonic seconds); `generation`: the stage's."""
         seconds = self._pace.step_s(now)
         self._unseen_s += seconds
         if frame is not None:
-            self.dance.take_frame(frame, generation, now)
+            self.dances.take_frame(frame, generation, now)
             self._unseen_s = min(self._unseen_s, now - frame.frame_time)
         self._update_safety(show_state, now, seconds)
         output = self._blend_mappings(show_state, now, seconds)
@@ -120,7 +122,7 @@ class Rig:
         """The output of the mapping in force, faded in over those before it."""
         self._call(show_state)
         mappings = {layer.mapping for layer in self._layers}  # each once, even if it fades out and in again
-        wanted = {mapping: mapping.evaluate(self.dance, seconds) for mapping in mappings}
+        wanted = {mapping: mapping.evaluate(self.dances, seconds) for mapping in mappings}
         output = wanted[self._layers[0].mapping]
         for layer in self._layers[1:]:
             output = faded(output, wanted[layer.mapping], layer.part(now), self.patch.snaps)

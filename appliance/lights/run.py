@@ -24,7 +24,8 @@ from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
 from appliance.outputs.dmx.open_wire import open_universes
 from appliance.outputs.dmx.pace import Universe
-from appliance.outputs.frame_reader import FrameReader, SeenFrame
+from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.joint_frame import JointFrame
 from appliance.pose.counted import counted
 from appliance.show.asked_for import no_wires
 from appliance.show.box import BoxConfig, load_box
@@ -55,8 +56,8 @@ class Lights:
         config = rig_here(show, box)
         patch = Patch(config.fixtures, show.directory)
         self.show, self.box = show, box
-        puppets = [puppet.name for puppet in show.config.puppets]
-        self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz, puppets)
+        puppets = [puppet.name for puppet in show.config.cast]
+        self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz, puppets, show.config.led.name)
         self.universes = wired(patch, box)
         self._walk, self._live = OrderedWalk(inbox, patch, box.lights.rate_hz), live
         self._stage, self._show_state, self._say, self._fallbacks = stage, show_state, say, fallbacks
@@ -114,7 +115,7 @@ class Lights:
             universe.offer(levels[universe.number], now)
         return now
 
-    def _frame(self, now: float) -> SeenFrame | None:
+    def _frame(self, now: float) -> JointFrame | None:
         """The newest frame, if it has the skeleton that these lights know."""
         frame, facts = self._stage.newest(now), self._stage.facts
         if frame is None or facts is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-FILE, KIND, FORMAT, WRITER = "frame", "frame", 3, "the stage (bunraku play)"
+FILE, KIND, FORMAT, WRITER = "frame", "frame", 4, "the stage (bunraku play)"
 FACTS, HEALTH, FRAMES = range(3)  # the file's rings
 FRAME_SLOTS = 64  # a reader has 1.28 s to copy the newest frame
 HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
@@ -13,13 +13,13 @@ GHOST = 2  # flag, only for browsers
 # Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
 FRAME_HEAD = struct.Struct("<qddqdII")
 # For browsers: tick, flags, joints; then each puppet's world rotations (w, x, y, z), positions and holds,
-# float32; with GHOST then the local rotations of what the first puppet starts from.
+# float32; with GHOST then the local rotations of what the puppet starts from that cues lead.
 BROWSER_HEAD = struct.Struct("<dII")
 
 
 class FrameLayout:
     """Offsets of the arrays of J joints in a frame's payload: all float32, little-endian, in this order.
-    Arrays of further puppets follow those of the first, `stride` bytes from one to the next.
+    Those of the next puppet follow, `stride` bytes after those of the one before.
     """
 
     def __init__(self, joints: int, puppets: int = 1) -> None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from appliance.box.ring_file import RingFileReader
 from appliance.outputs.frame_layout import (
@@ -25,32 +23,14 @@ from appliance.outputs.frame_layout import (
     WRITER,
     FrameLayout,
 )
-from appliance.outputs.shared_frame import Facts
+from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.shared_frame import Facts, puppets_in
 from appliance.pose.foreign_file import plain_json
 
 State = Literal["absent", "fresh", "stale"]
 STALE_S = 0.5
 _POLL_S = 0.1  # how often the file system is checked for a new stage
 _AHEAD_S = 1.0  # no reader's clock is this far behind the stage's
-
-
-@dataclass(frozen=True, slots=True)
-class SeenFrame:
-    """A copy of a joint frame; its arrays are read-only."""
-
-    tick: int
-    frame_time: float  # seconds on the monotonic clock
-    left: float  # when it left the stage, same clock
-    late: bool
-    sensor_sequence: int  # -1 without a sensor
-    sensor_arrival: float  # seconds on the monotonic clock
-    pose: NDArray[np.float32]  # (J, 4) w, x, y, z local to the parent joint
-    world: NDArray[np.float32]  # (J, 4) w, x, y, z
-    positions: NDArray[np.float32]  # (J, 3) world, metres
-    root: NDArray[np.float32]  # (3,) world, metres
-    holds: NDArray[np.float32]  # (J,) 0..1: how firmly a hand holds each joint
-    # The puppets after the first, in their order.
-    others: tuple[SeenFrame, ...] = field(default=(), kw_only=True)
 
 
 class FrameReader:
@@ -75,15 +55,15 @@ class FrameReader:
         """Why an existing file cannot be read, a sentence; else empty."""
         return self._file.complaint
 
-    def newest(self, now: float) -> SeenFrame | None:
-        """The newest whole frame, however old it is; None before the first one."""
+    def newest(self, now: float) -> JointFrame | None:
+        """A copy of the newest whole frame, however old it is; None before the first one."""
         self._follow(now)
         if not self._file.rings:
             return None
         found = self._file.rings[FRAMES].newest()
         return self._frame(found[1], now) if found else None
 
-    def frames(self, count: int, now: float) -> list[SeenFrame]:
+    def frames(self, count: int, now: float) -> list[JointFrame]:
         """At most `count` of the newest frames of this stage, newest last; torn ones are skipped."""
         self._follow(now)
         if not self._file.rings:
@@ -146,7 +126,7 @@ class FrameReader:
         self._layout = self.facts.layout
         self.generation += 1
 
-    def _frame(self, payload: bytes, now: float) -> SeenFrame | None:
+    def _frame(self, payload: bytes, now: float) -> JointFrame | None:
         """None for frames that must not be shown: not finite, or from before this machine's restart."""
         layout = self._layout
         if len(payload) != layout.bytes:
@@ -156,18 +136,5 @@ class FrameReader:
         is_ahead = frame_time > now + _AHEAD_S and frame_time > self._monotonic() + _AHEAD_S
         if is_ahead or not np.isfinite(numbers).all():
             return None
-        head = tick, frame_time, left, bool(flags & LATE), sequence, arrival
-        others = (SeenFrame(*head, *_arrays(payload, layout, one)) for one in range(1, layout.puppets))
-        return SeenFrame(*head, *_arrays(payload, layout, 0), others=tuple(others))
-
-
-def _arrays(payload: bytes, layout: FrameLayout, puppet: int) -> tuple[NDArray[np.float32], ...]:
-    """A puppet's pose, world, positions, root and holds."""
-    joints, at = layout.joints, puppet * layout.stride
-    return (
-        np.frombuffer(payload, "<f4", 4 * joints, at + layout.pose_at).reshape(joints, 4),
-        np.frombuffer(payload, "<f4", 4 * joints, at + layout.world_at).reshape(joints, 4),
-        np.frombuffer(payload, "<f4", 3 * joints, at + layout.positions_at).reshape(joints, 3),
-        np.frombuffer(payload, "<f4", 3, at + layout.root_at),
-        np.frombuffer(payload, "<f4", joints, at + layout.holds_at),
-    )
+        puppets = puppets_in(payload, layout)
+        return JointFrame(puppets, tick, frame_time, bool(flags & LATE), sequence, arrival, left)

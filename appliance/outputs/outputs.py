@@ -17,11 +17,10 @@ from appliance.show.box import OutputsConfig
 class Outputs:
     """The receivers that the stage sends joint frames to; lights and projector read the shared frame."""
 
-    def __init__(self, config: OutputsConfig, skeleton: Skeleton, puppets: Sequence[str] = ()) -> None:
-        """puppets: their names; (): one, without a name."""
-        names = puppets or ("",)
-        self._osc = OscOutputs(config.osc, skeleton, "osc" in config.model_fields_set, len(names))
-        self._posistagenet = tuple(PosiStageNet(one, skeleton, names) for one in config.posistagenet)
+    def __init__(self, config: OutputsConfig, skeleton: Skeleton, puppets: Sequence[str] = ("",)) -> None:
+        """puppets: their names."""
+        self._osc = OscOutputs(config.osc, skeleton, "osc" in config.model_fields_set, len(puppets))
+        self._posistagenet = tuple(PosiStageNet(one, skeleton, puppets) for one in config.posistagenet)
         self.receivers: tuple[DatagramSender, ...] = (*self._osc.receivers, *self._posistagenet)
         self._shared: FrameWriter | None = None
 
@@ -29,13 +28,13 @@ class Outputs:
         """Write frames to `shared` too, until `close`."""
         self._shared = shared
 
-    def publish_frame(self, frame: JointFrame, *others: JointFrame) -> None:
-        """Send one frame of each puppet to every receiver and share them. Never waits, never raises."""
-        self._osc.send_frame(frame, *others)
+    def publish_frame(self, frame: JointFrame) -> None:
+        """Send a frame to every receiver and share it. Never waits, never raises."""
+        self._osc.send_frame(frame)
         for output in self._posistagenet:
-            output.send_frame(frame, *others)
+            output.send_frame(frame)
         if self._shared is not None:
-            self._shared.write(frame, *others)
+            self._shared.write(frame)
 
     def publish_health(self, health: Mapping[str, Any]) -> None:
         """Share how the box is; once a second, after the frame has left."""

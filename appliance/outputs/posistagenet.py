@@ -27,7 +27,7 @@ class PosiStageNet(DatagramSender):
     def __init__(
         self, config: PosiStageNetConfig, skeleton: Skeleton, puppets: Sequence[str] = ("",)
     ) -> None:
-        """puppets: their names; trackers of all but the first have theirs before the joint's."""
+        """puppets: their names. Trackers have it before the joint's, but for those of puppet 0."""
         # Only multicast needs its interface named: the kernel knows the route to a single receiver.
         interface = config.interface if ipaddress.IPv4Address(config.host).is_multicast else None
         path = DatagramPath(config.host, config.port, interface)
@@ -47,19 +47,19 @@ class PosiStageNet(DatagramSender):
         self._started: float | None = None
         self._time_before = self._next_info = 0.0
 
-    def send_frame(self, frame: JointFrame, *others: JointFrame) -> None:
-        """Send this frame of each puppet, if it is an n-th one. Never waits, never raises."""
+    def send_frame(self, frame: JointFrame) -> None:
+        """Send this frame, if it is an n-th one. Never waits, never raises."""
         is_due = self._frames % self._every == 0
         self._frames += 1
         if is_due:
-            self.send_datagrams(self.encode(frame, *others), frame.frame_time)
+            self.send_datagrams(self.encode(frame), frame.frame_time)
 
-    def encode(self, frame: JointFrame, *others: JointFrame) -> Sequence[memoryview]:
-        """Datagrams of each puppet's frame, the same buffers each time; once a second the names first."""
+    def encode(self, frame: JointFrame) -> Sequence[memoryview]:
+        """Datagrams of this frame, the same buffers each time; once a second the names first."""
         if self._started is None:
             self._started = self._next_info = self._time_before = frame.frame_time
-            self._place((frame, *others), self._before)
-        self._place((frame, *others), self._positions)
+            self._place(frame, self._before)
+        self._place(frame, self._positions)
         if self._with_speed:
             self._note_speeds(frame)
         self._data.fill(self._positions, self._speeds)
@@ -69,10 +69,10 @@ class PosiStageNet(DatagramSender):
         self._next_info = frame.frame_time + INFO_PERIOD_S
         return (*self._info.stamped(time_us), *self._data.stamped(time_us))
 
-    def _place(self, frames: Sequence[JointFrame], out: NDArray[np.float32]) -> None:
+    def _place(self, frame: JointFrame, out: NDArray[np.float32]) -> None:
         """Positions of the trackers, (T, 3), in the receiver's axes and units."""
-        for one, taken in zip(frames, self._taken_of, strict=True):
-            np.take(one.positions, self._joints, axis=0, out=taken)
+        for puppet, taken in zip(frame.puppets, self._taken_of, strict=True):
+            np.take(puppet.positions, self._joints, axis=0, out=taken)
         np.matmul(self._taken, self._turn, out=out)
         np.add(out, self._offset, out=out)
 

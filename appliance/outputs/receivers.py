@@ -38,19 +38,18 @@ class OscOutputs:
         ]
         self._audience = list(zip(configs, forms, self.receivers, strict=True))
 
-    def send_frame(self, frame: JointFrame, *others: JointFrame) -> None:
-        """Send one frame of each puppet to every receiver. Never waits, never raises."""
+    def send_frame(self, frame: JointFrame) -> None:
+        """Send a frame to every receiver. Never waits, never raises."""
         mark = self._frame_message.encode(frame)
-        first, *more = (
-            {form: encoder.encode(one) for form, encoder in encoders.items()}
-            for one, encoders in zip((frame, *others), self._encoders, strict=True)
-        )
+        encoded = [
+            {form: encoder.encode(frame, puppet) for form, encoder in encoders.items()}
+            for puppet, encoders in zip(frame.puppets, self._encoders, strict=True)
+        ]
         for config, form, receiver in self._audience:
-            datagrams = first.get(form, ())
-            for encoded in more:
-                datagrams = (*datagrams, *encoded.get(form, ()))
-            marked = (*mark, *datagrams) if config.frame_message else datagrams
-            receiver.send_datagrams(marked, frame.frame_time)
+            datagrams = [*mark] if config.frame_message else []
+            for of_puppet in encoded:
+                datagrams += of_puppet.get(form, ())
+            receiver.send_datagrams(datagrams, frame.frame_time)
 
     def close(self) -> None:
         """Close all sockets."""

@@ -26,11 +26,10 @@ from appliance.outputs.frame_layout import (
     LATE,
     FrameLayout,
 )
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
+from appliance.outputs.puppet_facts import PuppetFacts, led_by, unpacked
 from appliance.pose.foreign_file import plain_json
 from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
-
-_Arrays = tuple[np.ndarray[Any, np.dtype[np.float32]], ...]
 
 
 @dataclass(frozen=True)
@@ -41,8 +40,7 @@ class Facts:
     box_file: Path | None
     show_name: str
     skeleton: Skeleton
-    held: tuple[int, ...]  # joints that hands hold
-    hands: tuple[str, ...]  # that hold them
+    puppets: tuple[PuppetFacts, ...]  # in the order of the frame's
     phrases: tuple[str, ...]
     cues: tuple[dict[str, Any], ...]
     looks: tuple[str, ...]
@@ -57,15 +55,22 @@ class Facts:
     has_strings: bool = False
     rehearsal: bool = False  # its sensors are emulated: nothing is kept
     cards: tuple[str, ...] = ()
-    puppets: tuple[str, ...] = ()  # their names; (): one, without a name
     motion: Mapping[str, Any] = field(default_factory=dict)  # sources that are made ahead, as in show.yaml
-    by_position: tuple[int, ...] = ()  # numbers of the hands that give positions
     trackers: Mapping[str, Sequence[str]] = field(default_factory=dict)  # joints that each VMC tracker moves
 
     @property
     def layout(self) -> FrameLayout:
         """How its frames lie."""
-        return FrameLayout(len(self.skeleton), len(self.puppets) or 1)
+        return FrameLayout(len(self.skeleton), len(self.puppets))
+
+    @property
+    def led(self) -> PuppetFacts:
+        """The puppet that cues and orders lead."""
+        return led_by(self.puppets)
+
+    def led_in(self, frame: JointFrame) -> PuppetFrame:
+        """That puppet in a frame of this stage."""
+        return frame.puppets[self.puppets.index(self.led)]
 
     def packed(self) -> bytes:
         """As JSON."""
@@ -73,6 +78,7 @@ class Facts:
         facts = {name: getattr(self, name) for name in self.__dataclass_fields__} | {
             "show_directory": str(self.show_directory),
             "box_file": None if self.box_file is None else str(self.box_file),
+            "puppets": [puppet.packed() for puppet in self.puppets],
             "skeleton": {
                 "joints": skeleton.names,
                 "parents": [int(parent) for parent in skeleton.parents],
@@ -88,11 +94,12 @@ class Facts:
         """From JSON. Raises ValueError, KeyError or TypeError for foreign data."""
         facts = plain_json(packed)
         skeleton, box_file = facts["skeleton"], facts["box_file"]
-        names = ("held", "hands", "by_position", "phrases", "cues", "looks", "lights", "springs", "cards")
+        names = ("phrases", "cues", "looks", "lights", "springs", "cards")
         return cls(
             **facts
-            | {name: tuple(facts[name]) for name in (*names, "puppets")}
+            | {name: tuple(facts[name]) for name in names}
             | {
+                "puppets": unpacked(facts["puppets"]),
                 "show_directory": Path(facts["show_directory"]),
                 "box_file": None if box_file is None else Path(box_file),
                 "skeleton": Skeleton(
@@ -121,11 +128,11 @@ class FrameWriter:
         self._ring = self._file.rings[FRAMES]
         self._payload = payload = self._ring.payload
         self._joints = layout.joints
-        self._arrays = [_arrays(payload, layout, puppet) for puppet in range(layout.puppets)]
+        self._puppets = puppets_in(payload, layout)
         self._file.publish()
 
-    def write(self, frame: JointFrame, *others: JointFrame) -> None:
-        """Publish the frames of all puppets: one copy, no system call, nothing for the collector."""
+    def write(self, frame: JointFrame) -> None:
+        """Publish a frame: one copy, no system call, nothing for the collector."""
         FRAME_HEAD.pack_into(
             self._payload,
             0,
@@ -137,21 +144,14 @@ class FrameWriter:
             LATE if frame.late else 0,
             self._joints,
         )
-        self._fill(self._arrays[0], frame)
-        if others:
-            for puppet, other in enumerate(others, 1):
-                self._fill(self._arrays[puppet], other)
+        for out, puppet in zip(self._puppets, frame.puppets, strict=True):
+            out.root[...] = puppet.root
+            out.pose[...] = puppet.pose
+            out.source[...] = puppet.source
+            out.world[...] = puppet.world
+            out.positions[...] = puppet.positions
+            out.holds[...] = puppet.holds
         self._ring.publish()
-
-    @staticmethod
-    def _fill(arrays: _Arrays, frame: JointFrame) -> None:
-        root, pose, source, world, positions, holds = arrays
-        root[...] = frame.root
-        pose[...] = frame.pose
-        source[...] = frame.source
-        world[...] = frame.world
-        positions[...] = frame.positions
-        holds[...] = frame.holds
 
     def write_health(self, health: Mapping[str, Any]) -> None:
         """Publish the box's health, after the frame has left; a list that is too long loses its end."""
@@ -168,16 +168,16 @@ class FrameWriter:
         self._file.close(remove=True)
 
 
-def _arrays(payload: memoryview, layout: FrameLayout, puppet: int) -> _Arrays:
-    """Where a puppet's root (3,), pose, source, world (J, 4), positions (J, 3) and holds (J,) are written."""
-    joints, at = layout.joints, puppet * layout.stride
-    root = np.frombuffer(payload, "<f4", 3, at + layout.root_at)
-    holds = np.frombuffer(payload, "<f4", joints, at + layout.holds_at)
-    pose, source, world, positions = (
-        np.frombuffer(payload, "<f4", joints * width, at + begin).reshape(joints, width)
-        for width, begin in (
-            *((4, layout.pose_at), (4, layout.source_at), (4, layout.world_at)),
-            (3, layout.positions_at),
+def puppets_in(payload: bytes | memoryview, layout: FrameLayout) -> tuple[PuppetFrame, ...]:
+    """The puppets' arrays in a frame's payload, as writable as that is."""
+    joints, found = layout.joints, []
+    for at in range(0, layout.puppets * layout.stride, layout.stride):
+        pose, source, world = (
+            np.frombuffer(payload, "<f4", 4 * joints, at + begin).reshape(joints, 4)
+            for begin in (layout.pose_at, layout.source_at, layout.world_at)
         )
-    )
-    return root, pose, source, world, positions, holds
+        root = np.frombuffer(payload, "<f4", 3, at + layout.root_at)
+        positions = np.frombuffer(payload, "<f4", 3 * joints, at + layout.positions_at).reshape(joints, 3)
+        holds = np.frombuffer(payload, "<f4", joints, at + layout.holds_at)
+        found.append(PuppetFrame(root, pose, source, world, positions, holds))
+    return tuple(found)

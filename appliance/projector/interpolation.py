@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from appliance.outputs.frame_reader import FrameReader, SeenFrame
+from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.joint_frame import JointFrame
 from appliance.pose import quaternion
-from appliance.projector.moment import TRAIL_S, Floats, Moment
+from appliance.projector.moment import TRAIL_S, Floats, Moment, PuppetMoment
 
 TICK_S = 0.02
 _KEPT = 64  # frames: the ring of the shared frame, a little more than the trail
@@ -70,20 +71,12 @@ class Interpolation:
         if after < len(self._seen):
             figures = _between(before, self._seen[after], time_s)
         trail = trail or [before]
-        times = [seen.time for seen in trail]
-        first, *others = (
-            Moment(
-                time_s=time_s,
-                positions=figure.positions,
-                world=figure.world,
-                trail=[(seen.figures[place].positions, seen.figures[place].world) for seen in trail],
-                trail_times=times,
-                holds=figure.holds,
-            )
-            for place, figure in enumerate(figures)
+        trails = zip(*(seen.figures for seen in trail), strict=True)
+        puppets = (
+            PuppetMoment(now.positions, now.world, [(one.positions, one.world) for one in before], now.holds)
+            for now, before in zip(figures, trails, strict=True)
         )
-        first.others = tuple(others)
-        return first
+        return Moment(time_s, [seen.time for seen in trail], tuple(puppets))
 
     @property
     def delay_s(self) -> float:
@@ -94,11 +87,11 @@ class Interpolation:
         """When what this moment shows left the stage, monotonic seconds."""
         return min(moment.time_s, self._seen[-1].time) + (self._latency_s or 0.0)
 
-    def _note(self, frame: SeenFrame) -> None:
+    def _note(self, frame: JointFrame) -> None:
         if frame.tick <= self._tick or (self._seen and frame.frame_time <= self._seen[-1].time):
             return
         self._tick = frame.tick
-        figures = tuple(_Figure(one.positions, one.world, one.holds) for one in (frame, *frame.others))
+        figures = tuple(_Figure(one.positions, one.world, one.holds) for one in frame.puppets)
         self._seen.append(_Seen(frame.frame_time, frame.left, figures))
 
     def _follow_latency(self, now: float) -> None:

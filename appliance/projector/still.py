@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose.recording import Recording
-from appliance.projector.moment import TRAIL_S, Floats, Moment
+from appliance.projector.moment import TRAIL_S, Floats, Moment, PuppetMoment
 from appliance.projector.picture.renderer import Renderer
 
 FINER = 2  # drawn this many times larger and then shrunk, as a projector's pixels melt on the wall
@@ -23,14 +23,9 @@ def moment_of(recording: Recording, time_s: float, holds: Floats | None = None) 
         recording.poses[first : last + 1].astype(np.float32),
         recording.roots[first : last + 1].astype(np.float32),
     )
-    return Moment(
-        time_s=last / recording.fps,
-        positions=positions[-1],
-        world=world[-1],
-        trail=list(zip(positions, world, strict=True)),
-        trail_times=[index / recording.fps for index in range(first, last + 1)],
-        holds=holds,
-    )
+    puppet = PuppetMoment(positions[-1], world[-1], list(zip(positions, world, strict=True)), holds)
+    times = [index / recording.fps for index in range(first, last + 1)]
+    return Moment(last / recording.fps, times, (puppet,))
 
 
 def draw_still(

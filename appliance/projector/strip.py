@@ -25,26 +25,26 @@ VIGNETTE = 0.0  # pictures side by side need no black around them
 
 def render_strip(
     out: Path,
-    recording: Recording,
+    recordings: Sequence[Recording],
     looks: Mapping[str, LookConfig],
     look: str,
     holds: Array | None = None,
-    others: Sequence[Recording] = (),
 ) -> Path:
     """Render ten instants at equal distances, the last one at the end, into `out`; returns it.
 
-    holds: (N, J) how firmly hands hold each joint, 0..1; others: the puppets beside this one. Raises
-    ProjectorError where nothing can be rendered here, OSError where `out` cannot be written.
+    recordings: one of each of P puppets, equally long; holds: (N, P, J) how firmly hands hold each joint,
+    0..1. Raises ProjectorError where nothing can be rendered here, OSError where `out` cannot be written.
     """
-    chosen = np.unique(np.linspace(0, len(recording) - 1, COLUMNS * ROWS + 1)[1:].round().astype(int))
+    skeleton, fps, length = recordings[0].skeleton, recordings[0].fps, len(recordings[0])
+    chosen = np.unique(np.linspace(0, length - 1, COLUMNS * ROWS + 1)[1:].round().astype(int))
     moments = []
     for last in chosen.tolist():
-        at_s = last / recording.fps
-        held = None if holds is None else holds[last].astype(np.float32)
-        beside = tuple(moment_of(other, at_s) for other in others)
-        moments.append(replace(moment_of(recording, at_s, held), others=beside))
+        held = [None] * len(recordings) if holds is None else holds[last].astype(np.float32)
+        each = [moment_of(one, last / fps, hold) for one, hold in zip(recordings, held, strict=True)]
+        puppets = tuple(puppet for moment in each for puppet in moment.puppets)
+        moments.append(replace(each[0], puppets=puppets))
     framed = {name: _framed(one) for name, one in looks.items()}
-    pictures = list(_render(recording.skeleton, framed, look, moments))
+    pictures = list(_render(skeleton, framed, look, moments))
     pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % COLUMNS)
     rows = [np.hstack(pictures[at : at + COLUMNS]) for at in range(0, len(pictures), COLUMNS)]
     _save(out, np.vstack(rows))

@@ -109,12 +109,12 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
 
 def puppets_of(show: Show) -> list[str]:
     """The name of each puppet; "" in a show that has one without a name."""
-    return [puppet.name for puppet in show.config.puppets] or [""]
+    return [puppet.name for puppet in show.config.cast]
 
 
 def hands_of(show: Show) -> list[tuple[int, HandConfig]]:
     """The hands of all puppets, each with its puppet's number."""
-    return [(number, hand) for number, held in enumerate(show.config.hands_of_puppets) for hand in held]
+    return [(puppet.number, hand) for puppet in show.config.cast for hand in puppet.hands]
 
 
 def require_sound(facts: dict[str, Any]) -> None:

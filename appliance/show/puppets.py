@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import Field, field_validator
@@ -14,7 +15,7 @@ from appliance.show.dance import MotionConfig
 from appliance.show.hand import HandConfig
 from appliance.show.light_rules import MappingConfig
 from appliance.show.section import Section, key, refuse_repeats
-from appliance.show.yaml_file import YamlFile
+from appliance.show.yaml_file import Location, YamlFile
 
 MAX_HANDS = 8
 LED_BY_THE_SHOW = ("phrase", "start_s", "hands", "iterations")  # keys that the first puppet must not have
@@ -70,6 +71,26 @@ class PuppetConfig(Section):
     @classmethod
     def _coding_then_interaction(cls, times: tuple[int, int] | None) -> tuple[int, int] | None:
         return require_coding_then_interaction(times, "A puppet")
+
+
+@dataclass(frozen=True)
+class PuppetStart:
+    """A puppet as it starts, whichever sections of show.yaml say it.
+
+    number: its place in joint frames, journals and receivers' addresses. name: "" of one without a name.
+    is_led: cues and orders lead it. source: what it starts from, a name in `motion.sources`. hands_at: where
+    its hands are in the file. position: None where its phrase has it.
+    """
+
+    number: int
+    name: str
+    is_led: bool
+    source: str
+    start_s: float
+    hands: Sequence[HandConfig]
+    hands_at: Location
+    iterations: tuple[int, int]
+    position: PuppetConfig | None
 
 
 def require_each_joint_once(hands: list[HandConfig]) -> list[HandConfig]:

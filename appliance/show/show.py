@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pydantic import field_validator, model_validator
 
+from appliance.levers.sources import MAIN
 from appliance.pose.body_facts import with_stance
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import require_inside
@@ -20,7 +21,13 @@ from appliance.show.dance import DancerConfig, MotionConfig
 from appliance.show.hand import HandConfig
 from appliance.show.lights import LightsConfig
 from appliance.show.look import LookConfig, looks_by_name
-from appliance.show.puppets import MAX_HANDS, PuppetConfig, puppet_problems, require_each_joint_once
+from appliance.show.puppets import (
+    MAX_HANDS,
+    PuppetConfig,
+    PuppetStart,
+    puppet_problems,
+    require_each_joint_once,
+)
 from appliance.show.section import MOST_PUPPETS, Section, key, part, refusal, refuse_repeats
 from appliance.show.sound import StringsConfig
 from appliance.show.springs import SpringsConfig, springs_by_name
@@ -131,22 +138,39 @@ class ShowConfig(Section):
     _each_card_once = field_validator("cards")(each_card_once)
 
     @property
-    def hands_of_puppets(self) -> list[list[HandConfig]]:
-        """The hands of each puppet, at least of one."""
-        return [self.hands, *(puppet.hands for puppet in self.puppets[1:])]
+    def cast(self) -> tuple[PuppetStart, ...]:
+        """Each puppet as it starts; the show's own sections describe the one that cues lead."""
+        motion, times = self.motion, (self.dancer.coding_iterations, self.dancer.interaction_iterations)
+        name, position = (self.puppets[0].name, self.puppets[0]) if self.puppets else ("", None)
+        led = PuppetStart(
+            0, name, True, motion.source, motion.start_s, self.hands, ("hands",), times, position
+        )
+        others = (
+            PuppetStart(
+                number=number,
+                name=puppet.name,
+                is_led=False,
+                source=puppet.phrase or MAIN,
+                start_s=puppet.start_s,
+                hands=puppet.hands,
+                hands_at=("puppets", number, "hands"),
+                iterations=puppet.iterations or times,
+                position=puppet,
+            )
+            for number, puppet in enumerate(self.puppets[1:], 1)
+        )
+        return (led, *others)
+
+    @property
+    def led(self) -> PuppetStart:
+        """The puppet that cues and orders lead."""
+        return next(puppet for puppet in self.cast if puppet.is_led)
 
     @property
     def hands_at(self) -> Iterator[tuple[Location, HandConfig]]:
         """All hands of all puppets, and their places in the file."""
-        for puppet, hands in enumerate(self.hands_of_puppets):
-            above: Location = ("puppets", puppet, "hands") if puppet else ("hands",)
-            yield from (((*above, place), hand) for place, hand in enumerate(hands))
-
-    @property
-    def iterations_of_puppets(self) -> list[tuple[int, int]]:
-        """Coding and interaction iterations of each puppet at the start."""
-        first = self.dancer.coding_iterations, self.dancer.interaction_iterations
-        return [first, *(puppet.iterations or first for puppet in self.puppets[1:])]
+        for puppet in self.cast:
+            yield from (((*puppet.hands_at, place), hand) for place, hand in enumerate(puppet.hands))
 
     @property
     def primary_sensor(self) -> str | None:

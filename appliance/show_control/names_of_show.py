@@ -26,8 +26,8 @@ def danced(facts: Facts | None) -> Facts:
 
 
 def held(facts: Facts) -> list[str]:
-    """Names of the joints that hands hold."""
-    return [facts.skeleton.names[joint] for joint in facts.held]
+    """Names of the joints that hands hold of the puppet that cues lead."""
+    return [hand.joint for hand in facts.led.hands]
 
 
 def known(kind: str, name: str | int, names: Sequence[str] | None) -> str:

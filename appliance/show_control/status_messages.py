@@ -10,6 +10,7 @@ from appliance.levers.addresses import LISTS, NAMED
 from appliance.levers.show_state import ShowState
 from appliance.levers.status import Status
 from appliance.levers.table import LIGHTS, LOOK, MADE_NUMBERS
+from appliance.outputs.puppet_facts import PuppetFacts, led_by
 from appliance.pose.foreign_file import plain_json
 from appliance.show_control.packet import Message
 
@@ -32,15 +33,9 @@ class SeenFacts(Protocol):
     @property
     def cues(self) -> Sequence[Mapping[str, Any]]: ...
     @property
-    def held(self) -> Sequence[int]: ...
-    @property
-    def hands(self) -> Sequence[str]: ...
-    @property
-    def by_position(self) -> Sequence[int]: ...
+    def puppets(self) -> Sequence[PuppetFacts]: ...
     @property
     def motion(self) -> Mapping[str, Any]: ...
-    @property
-    def skeleton(self) -> Any: ...
 
 
 class Seen(Protocol):
@@ -131,20 +126,17 @@ def names_of(
 
 def led(observer: Seen) -> dict[str, Any]:
     """The stage's report on the puppet that cues and orders lead; empty before the first."""
-    puppets = observer.health().get("puppets") or [{}]
-    return dict(puppets[0])
+    puppets = observer.health().get("puppets", ())
+    return dict(next((puppet for puppet in puppets if puppet.get("is_led")), {}))
 
 
 def hands_of(observer: Seen) -> Iterator[HandLine]:
-    """The hands of the show."""
+    """The hands of the puppet that cues and orders lead."""
     if (facts := observer.facts) is None:
         return
     let_go = led(observer).get("let_go", ())
-    for hand, (joint, source) in enumerate(zip(facts.held, facts.hands, strict=True)):
-        name = facts.skeleton.names[joint]
-        yield HandLine(
-            name, source, name not in let_go, "position" if hand in facts.by_position else "orientation"
-        )
+    for hand in led_by(facts.puppets).hands:
+        yield HandLine(hand.joint, hand.source, hand.joint not in let_go, hand.by)
 
 
 def _fallbacks(observer: Seen, now: float) -> Iterator[Message]:

@@ -96,9 +96,10 @@ class Sound:
             return
         if self.instrument is None:
             return
-        if frame is not None and frame.tick != self._tick:
+        facts = self._stage.facts
+        if frame is not None and facts is not None and frame.tick != self._tick:
             self._tick, self._seen_at = frame.tick, frame.left
-            self.instrument.dance(frame.positions, frame.frame_time)
+            self.instrument.dance(facts.led_in(frame).positions, frame.frame_time)
         age_s = now - self._seen_at
         if age_s >= LOST_S:
             self.instrument.rest()

@@ -36,11 +36,11 @@ def admitted(folder: Path, parts: StageParts, show: Show, box: BoxConfig, comes_
 
 def admission_record(show: Show, box: BoxConfig) -> Record:
     """The measurement, as a record whose scope is all that it depends on."""
-    network, config = show.network.stat(), show.config
+    network, cast = show.network.stat(), show.config.cast
     scope = {
         "network": [str(show.network.resolve()), network.st_size, network.st_mtime_ns],
-        "iterations": config.iterations_of_puppets,
-        "hands": [[hand.joint for hand in hands] for hands in config.hands_of_puppets],
+        "iterations": [puppet.iterations for puppet in cast],
+        "hands": [[hand.joint for hand in puppet.hands] for puppet in cast],
         "budget_ms": box.limits.tick_budget_ms,
         "priority": box.realtime.priority if box.realtime.enabled else None,
     }

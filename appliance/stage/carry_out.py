@@ -165,9 +165,9 @@ def _enable(order: Order, parts: StageParts) -> str:
 
 
 def _dance_made(order: Order, parts: StageParts) -> str:
-    """Let a puppet go over to what the generator made for it; the first, where no number follows the fade."""
-    fade_s, *number = order.values
-    parts.puppets[int(number[0]) if number else 0].play_made(order.text, fade_s)
+    """Let the puppet with the number that follows the fade go over to what the generator made for it."""
+    fade_s, number = order.values
+    parts.puppets[int(number)].play_made(order.text, fade_s)
     return ""
 
 
@@ -220,7 +220,7 @@ def _kick(order: Order, parts: StageParts) -> str:
 
 
 def _springs(parts: StageParts) -> Springs:
-    """The first puppet's. Raises ValueError where it has none."""
+    """Those that orders lead. Raises ValueError where there are none."""
     if parts.led.springs is None:
         raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")
     return parts.led.springs

@@ -54,7 +54,7 @@ class Comparison:
         words = self._words or _other(recorded, tick)
         self._words = ""
         root, pose = (
-            (recorded[name], np.stack([getattr(frame, name) for frame in tick.frames]))
+            (recorded[name], np.stack([getattr(frame, name) for frame in tick.frame.puppets]))
             for name in ("root", "pose")
         )
         if all(then.tobytes() == here.tobytes() for then, here in (root, pose)) and not words:
@@ -93,7 +93,7 @@ def _size(found: Difference) -> float:
 
 def _other(recorded: Any, tick: Tick) -> str:
     """Differences from the recording other than the pose, in words."""
-    was_late, sequence = bool(recorded["flags"] & RESENT), tick.frames[0].sensor_sequence
+    was_late, sequence = bool(recorded["flags"] & RESENT), tick.frame.sensor_sequence
     if was_late != tick.late:
         return "it was late then and is in time here" if was_late else "it was in time then and is late here"
     for puppet, had_failed, then in zip(

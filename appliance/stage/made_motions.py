@@ -31,7 +31,7 @@ class MadeMotions:
     """
 
     def __init__(
-        self, folder: Path, joints: tuple[str, ...], motion: Playback, puppet: int = 0, source: str = ""
+        self, folder: Path, joints: tuple[str, ...], motion: Playback, puppet: int, source: str
     ) -> None:
         self._reader, self._folder, self._joints = MadeMotionReader(folder, puppet), folder / FOLDER, joints
         self._motion, self._puppet, self.source = motion, puppet, source
@@ -114,10 +114,12 @@ def open_made_motions(folder: Path, show: Show, parts: StageParts) -> tuple[Made
     config, phrases = show.config, show.phrases
     if not config.motion.made_sources:
         return ()
-    wanted = [config.motion.source, *(one.phrase or "" for one in config.puppets[1:])]
     made = tuple(
-        MadeMotions(folder, show.skeleton.names, one.motion, number, "" if name in (*phrases, LIVE) else name)
-        for number, (one, name) in enumerate(zip(parts.puppets, wanted, strict=True))
+        MadeMotions(
+            *(folder, show.skeleton.names, one.motion, start.number),
+            "" if start.source in (*phrases, LIVE) else start.source,
+        )
+        for start, one in zip(config.cast, parts.puppets, strict=True)
     )
     parts.make_by(made[0].loop)
     return made

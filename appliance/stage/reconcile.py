@@ -89,9 +89,9 @@ class Reconciler:
         if wanted == LIVE and live is not None and not (orders or live.is_chosen):
             # After a restart: checkpoints know phrases only.
             orders.append(order_of(PHRASE, declared) if declared else Order(PHRASE.name, (), LIVE))
-        for puppet, made in enumerate(self._made):
+        for puppet, made in zip(self.parts.puppets, self._made, strict=False):
             source, fade_s = made.source, MELT_S
-            if puppet == 0:
+            if puppet is self.parts.led:
                 source, fade_s = wanted if self._is_made(wanted) else "", melt_s
             if (order := made.order(source, fade_s, now)) is not None:
                 orders.append(order)

@@ -71,8 +71,8 @@ class Recorder:
         field["frame_time"][0] = slot.deadline
         field["started"][0] = slot.started
         field["skipped"][0] = slot.skipped
-        field["sensor_sequence"][0] = tick.frames[0].sensor_sequence
-        field["sensor_arrival"][0] = tick.frames[0].sensor_arrival
+        field["sensor_sequence"][0] = tick.frame.sensor_sequence
+        field["sensor_arrival"][0] = tick.frame.sensor_arrival
         jumped = any(puppet.motion.jumped for puppet in puppets)
         field["flags"][0] = (
             late * LATE | tick.late * RESENT | tick.network_failed * NOT_FINITE | jumped * JUMPED

@@ -15,6 +15,7 @@ from appliance.box.checkpoint import (
 )
 from appliance.show.box import Resume
 from appliance.stage.reconcile import Reconciler
+from appliance.stage.stage_parts import StageParts
 
 _BEGINS = (
     "The place where the dance stood is damaged, or holds numbers that no stage has: it was dropped, and the "
@@ -66,7 +67,7 @@ class Resumption:
         why = "After a power cut" if self._after_power_cut else "After a restart of the stage"
         if place.tries >= TRIES:
             return (
-                f"{why}: {place.tries} starts at {_where(place)} "
+                f"{why}: {place.tries} starts at {_where(place, reconciler.parts)} "
                 "ended without a frame. The show begins at the beginning. Export its journal for us."
             )
         try:
@@ -75,7 +76,7 @@ class Resumption:
             return f"{why}: the show begins at the beginning. {error}"
         self.went_on = True
         where = f" in the cue '{place.cue}'" if place.cue else ""
-        where += f" at {_where(place)}"
+        where += f" at {_where(place, reconciler.parts)}"
         return f"{why} the show goes on{where}. {words}".rstrip()
 
     def write_start(self, reconciler: Reconciler) -> None:
@@ -147,8 +148,9 @@ class Resumption:
             self._writer, self.complaint = None, f"The place of the dance is not kept: {error}"
 
 
-def _where(place: Checkpoint) -> str:
-    one = place.puppets[0]
+def _where(place: Checkpoint, parts: StageParts) -> str:
+    is_led = [puppet is parts.led for puppet in parts.puppets]
+    one = place.puppets[is_led.index(True)] if len(place.puppets) == len(is_led) else place.puppets[-1]
     return f"{one.position_s:.1f} s of the phrase '{one.phrase}'"
 
 

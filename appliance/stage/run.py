@@ -201,7 +201,7 @@ class Stage:
         if orders or self.reconciler.generation != before:
             words = [self._carry_out(order, now)[1] for order in orders]
             self.reconciler.words = " ".join(filter(None, words))
-            self.resuming.write_checkpoint(self.reconciler, self.tick.frames[0].tick)  # before it is reported
+            self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
             self._publish_health(now)
 
     def _take_orders(self, started: float, monotonic: Callable[[], float]) -> None:
@@ -219,7 +219,7 @@ class Stage:
             self._reconcile(started)  # what was declared before this order was sent comes before it
             done.append((order, *self._carry_out(order, monotonic())))
         if done:
-            self.resuming.write_checkpoint(self.reconciler, self.tick.frames[0].tick)  # before it is reported
+            self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
         if any(not order.quiet for order, _, _ in done):
             self._publish_health(started)  # the next question is answered with it
         for answer in done:

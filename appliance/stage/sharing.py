@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from appliance.box.runtime_folder import Claim, RuntimeFolderError, runtime_folder
+from appliance.outputs.puppet_facts import HandFacts, PuppetFacts
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show.box import BoxConfig
 from appliance.show.hand import HandConfig
@@ -26,15 +27,20 @@ def facts_of(
     show: Show, box_file: Path | None, iterations: Iterations, now: float, rehearsal: bool = False
 ) -> Facts:
     """Facts about this stage for readers; `now`: it is about to dance."""
-    config, names, joints = show.config, show.config.names, show.skeleton.names
+    config, names = show.config, show.config.names
     return Facts(
         show_directory=show.directory.resolve(),
         box_file=None if box_file is None else box_file.resolve(),
         show_name=config.name,
         skeleton=show.skeleton,
-        held=tuple(joints.index(hand.joint) for hand in config.hands),
-        hands=tuple(hand.sensor or hand.kind for hand in config.hands),
-        by_position=tuple(place for place, hand in enumerate(config.hands) if hand.by == "position"),
+        puppets=tuple(
+            PuppetFacts(
+                puppet.name,
+                tuple(HandFacts(hand.joint, hand.sensor or hand.kind, hand.by) for hand in puppet.hands),
+                puppet.is_led,
+            )
+            for puppet in config.cast
+        ),
         trackers=_trackers(hand for _, hand in config.hands_at),
         phrases=names["phrase"],
         cues=tuple(cue.model_dump(mode="json") for cue in config.cues),
@@ -50,7 +56,6 @@ def facts_of(
         pid=os.getpid(),
         started=now,
         rehearsal=rehearsal,
-        puppets=tuple(puppet.name for puppet in config.puppets),
         motion={
             name: section.model_dump(mode="json", by_alias=True)
             for name, section in config.motion.made_sources.items()
@@ -127,15 +132,17 @@ class Sharing:
             "motion": dict(reconciler.motion),
             "puppets": [
                 {
+                    "name": name,
                     "coding": one.iterations.coding,
                     "interaction": one.iterations.interaction,
                     "phrase": one.source,
                     "base": one.motion.base,
                     "made": one.motion.made.recipe if one.motion.made else "",
                     "position_s": one.motion.position_s,
+                    "is_led": one is parts.led,
                     "let_go": [held.joint for held in one.hands.puppeteers if not held.enabled],
                 }
-                for one in parts.puppets
+                for name, one in zip(parts.names, parts.puppets, strict=True)
             ],
             "cue": reconciler.cue,
             "applied": [reconciler.generation, reconciler.words],

@@ -24,7 +24,7 @@ from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 from appliance.dancer.puppeteers import WornSensor
 from appliance.dancer.springs import Springs
 from appliance.levers.sources import LIVE, MAIN
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import PuppetFrame
 from appliance.outputs.outputs import Outputs
 from appliance.pose.bvh import BvhError
 from appliance.pose.recording import Recording
@@ -34,6 +34,7 @@ from appliance.sensor.neutral import Mounting
 from appliance.sensor.state import restored_reading
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
+from appliance.show.puppets import PuppetStart
 from appliance.show.show import Show
 from appliance.stage.admission import MOST_ITERATIONS, Admission, admit, lowered
 from appliance.stage.iterations import Iterations
@@ -48,9 +49,9 @@ from appliance.stage.stage_puppet import StagePosition, StagePuppet
 class StageParts:
     """Everything that dances, hears and speaks.
 
-    network: dances all puppets in one run. puppets: at least one; cues and commands lead the first. `worn`:
-    which joints a sensor holds, of any puppet; `mountings`: how it is worn for each of these; `complaints`:
-    why sensors are not let in.
+    network: dances all puppets in one run. names: the puppets'. led: the one that cues and orders lead.
+    `worn`: which joints a sensor holds, of any puppet; `mountings`: how it is worn for each of these;
+    `complaints`: why sensors are not let in.
     """
 
     SNAPSHOT = ("puppets", "liveliness", "newest_primary")
@@ -58,6 +59,8 @@ class StageParts:
     skeleton: Skeleton
     network: PuppetNetwork
     puppets: tuple[StagePuppet, ...]
+    names: tuple[str, ...]
+    led: StagePuppet
     liveliness: Liveliness
     worn: dict[str, list[WornSensor]]
     mountings: dict[str, list[Mounting]]
@@ -73,11 +76,6 @@ class StageParts:
     def not_let_in(self) -> list[str]:
         """Sensors of the show that have no key here."""
         return [name for name in self.worn if not self.link.lets_in(name)]
-
-    @property
-    def led(self) -> StagePuppet:
-        """The puppet that cues and orders lead: the one that the show names first."""
-        return self.puppets[0]
 
     @property
     def are_due(self) -> bool:
@@ -151,22 +149,21 @@ def assemble(
     Raises StageError or ConfigError before anything dances. Keys that are missing are no reason not to dance:
     see `complaints`.
     """
-    config = show.config
+    config, cast = show.config, show.config.cast
     try:
-        network = network_of(show.network, show.skeleton, len(config.hands_of_puppets))
+        network = network_of(show.network, show.skeleton, len(cast))
         show.require_moving(network.joints)
         motion, floor = _playback(show, network.window, PhraseCache(show.directory, memory))
-        first, *others = network.puppets
-        puppets = [_stage_puppet(show, 0, first, motion, floor)]
-        for number, (one, puppet) in enumerate(zip(config.puppets[1:], others, strict=True), 1):
-            other = motion.another(one.phrase if one.phrase in motion.phrases else MAIN, one.start_s)
-            puppets.append(_stage_puppet(show, number, puppet, other, floor))
+        puppets = [
+            _stage_puppet(show, start, puppet, _motion_of(start, motion), floor)
+            for start, puppet in zip(cast, network.puppets, strict=True)
+        ]
     except PuppetError as error:
         raise StageError(str(error)) from error
     worn: dict[str, list[WornSensor]] = {}
     mountings: dict[str, list[Mounting]] = {}
-    for hands, made in zip(config.hands_of_puppets, puppets, strict=True):
-        for hand, puppeteer in zip(hands, made.hands.puppeteers, strict=True):
+    for start, made in zip(cast, puppets, strict=True):
+        for hand, puppeteer in zip(start.hands, made.hands.puppeteers, strict=True):
             if hand.sensor is not None and isinstance(puppeteer, WornSensor):
                 worn.setdefault(hand.sensor, []).append(puppeteer)
                 mountings.setdefault(hand.sensor, []).append(mounting_of(hand))
@@ -175,6 +172,8 @@ def assemble(
         skeleton=show.skeleton,
         network=network,
         puppets=tuple(puppets),
+        names=tuple(puppet.name for puppet in cast),
+        led=next(one for start, one in zip(cast, puppets, strict=True) if start.is_led),
         liveliness=Liveliness(config.dancer.liveliness, config.dancer.seed, puppets),
         worn=worn,
         mountings=mountings,
@@ -191,7 +190,7 @@ def admission(parts: StageParts, show: Show, box: BoxConfig) -> Admission:
     Raises StageError where the network fails.
     """
     dance = _dance(parts, show)
-    asked = max(show.config.iterations_of_puppets)
+    asked = max(puppet.iterations for puppet in show.config.cast)
     with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
         return replace(admit(dance, *asked, box.limits.tick_budget_ms), puppets=len(parts.puppets))
 
@@ -206,12 +205,12 @@ def _dance(parts: StageParts, show: Show) -> Callable[[int, int], object]:
     with more iterations than the show gives it, but where there is one puppet.
     """
     held = []
-    for one, most in zip(parts.puppets, show.config.iterations_of_puppets, strict=True):
+    for one, start in zip(parts.puppets, show.config.cast, strict=True):
         mask = one.hands.mask.copy()
         for place, is_by_place in zip(one.hand_places, one.hands.by_place, strict=True):
             (one.puppet.place_weights if is_by_place else mask)[place] = 1
         one.puppet.select(one.motion.window())
-        held.append((one.puppet, most, (mask, one.hands.targets, one.hands.weights)))
+        held.append((one.puppet, start.iterations, (mask, one.hands.targets, one.hands.weights)))
 
     def dance(coding: int, interaction: int) -> object:
         try:
@@ -265,22 +264,27 @@ def _phrase(show: Show, path: Path, preparations: PhraseCache) -> tuple[Recordin
 
 
 def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
-    problems = box.output_misfits(show.skeleton.names, len(show.config.hands_of_puppets))
+    problems = box.output_misfits(show.skeleton.names, len(show.config.cast))
     if problems:
         raise ConfigError(problems)
-    return Outputs(box.outputs, show.skeleton, [puppet.name for puppet in show.config.puppets])
+    return Outputs(box.outputs, show.skeleton, [puppet.name for puppet in show.config.cast])
+
+
+def _motion_of(start: PuppetStart, motion: Playback) -> Playback:
+    """A puppet's own playback of the show's phrases."""
+    if start.is_led:
+        return motion
+    return motion.another(start.source if start.source in motion.phrases else MAIN, start.start_s)
 
 
 def _stage_puppet(
-    show: Show, number: int, puppet: Puppet, motion: Playback, floor: Floor | None
+    show: Show, start: PuppetStart, puppet: Puppet, motion: Playback, floor: Floor | None
 ) -> StagePuppet:
-    """One of the show's puppets; the first one has number 0."""
-    config, times = show.config, show.config.iterations_of_puppets[number]
-    hands, grounding = config.hands_of_puppets[number], Grounding(show.skeleton, floor)
-    puppeteers = puppeteers_of(show, hands, puppet, grounding, motion)
-    joints, window, placed = puppet.joints, puppet.network.window, config.puppets
+    config, grounding = show.config, Grounding(show.skeleton, floor)
+    puppeteers = puppeteers_of(show, start.hands, puppet, grounding, motion)
+    joints, window, times = puppet.joints, puppet.network.window, start.iterations
     blending = Blending(len(joints), window, config.dancer.hop, config.dancer.blending)
-    place = StagePosition(placed[number], motion.roots()[0]) if placed else None
+    place = None if start.position is None else StagePosition(start.position, motion.roots()[0])
     made = StagePuppet(
         puppet=puppet,
         motion=motion,
@@ -289,15 +293,15 @@ def _stage_puppet(
         hands=Hands(
             puppeteers, joints, window, None if place is None else place.placement, TICK_S * blending.ahead
         ),
-        hand_places=[joints.index(hand.joint) for hand in hands],
+        hand_places=[joints.index(hand.joint) for hand in start.hands],
         iterations=Iterations(*times, MOST_ITERATIONS, times),
-        frame=JointFrame(len(show.skeleton)),
+        frame=PuppetFrame.of(len(show.skeleton)),
         crossfade_s=config.motion.crossfade_s,
         live=Live(len(show.skeleton), window) if config.motion.live else None,
         feet=show.skeleton.feet,
         springs=next((one for one in puppeteers if isinstance(one, Springs)), None),
         place=place,
     )
-    if number and placed[number].phrase == LIVE:
+    if start.source == LIVE and not start.is_led:
         made.play(LIVE, 0.0)
     return made

@@ -22,7 +22,7 @@ from appliance.dancer.puppet import Puppet, weights_of_one_pass
 from appliance.dancer.slerp import FloatArray
 from appliance.dancer.springs import Springs
 from appliance.levers.sources import LIVE
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import PuppetFrame
 from appliance.pose import quaternion
 from appliance.pose.possible import FARTHEST_ON_STAGE_M
 from appliance.show.puppets import PuppetConfig
@@ -45,7 +45,7 @@ class StagePosition:
         self._columns = np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]], np.float32)
         self._shift = np.array([x, 0.0, z], np.float32)
 
-    def put(self, frame: JointFrame) -> None:
+    def put(self, frame: PuppetFrame) -> None:
         """Move a frame from where the puppet danced it to its place."""
         frame.positions[:] = frame.positions @ self._columns + self._shift
         frame.root[:] = frame.root @ self._columns + self._shift
@@ -78,7 +78,7 @@ class StagePuppet:
     hands: Hands
     hand_places: list[int]
     iterations: Iterations
-    frame: JointFrame
+    frame: PuppetFrame
     crossfade_s: float
     live: Live | None = None  # None: the show has no such source
     feet: Sequence[int] = ()  # joints of the skeleton

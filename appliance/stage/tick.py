@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from appliance.box.clock import Slot
 from appliance.box.live_pose import LivePose
 from appliance.dancer.puppeteers import HOLD_S
+from appliance.outputs.joint_frame import JointFrame
 from appliance.recorder.record import SECTIONS
 from appliance.sensor.link import SensorReading
 from appliance.stage.sensor_fit import SensorFit
@@ -30,7 +31,7 @@ class Tick:
     Where the network gives no sound poses, the last good pose stays.
     """
 
-    SNAPSHOT = ("parts", "wearing", "latest_start_s")
+    SNAPSHOT = ("parts", "wearing", "latest_start_s", "frame")
 
     def __init__(
         self,
@@ -51,7 +52,7 @@ class Tick:
         self.late_s = late_s
         self.waited_s = 0.0  # for a late reading, in this tick
         self._slowest_s = 0.0  # cost of the slowest tick lately
-        self.frames = tuple(one.frame for one in parts.puppets)
+        self.frame = JointFrame(tuple(one.frame for one in parts.puppets))
         self.late = False  # in this slot the last poses were sent again
         self.readings: Sequence[SensorReading] = ()
         self.live_heard: LivePose | None = None
@@ -70,8 +71,8 @@ class Tick:
         """Everything from the sensors' datagrams to the receivers'."""
         parts, ends, now = self.parts, self._section_ends, self._monotonic
         self.late = slot.lateness_s > self.latest_start_s
-        for frame in self.frames:
-            frame.tick, frame.frame_time, frame.late = slot.tick, slot.deadline, self.late
+        frame = self.frame
+        frame.tick, frame.frame_time, frame.late = slot.tick, slot.deadline, self.late
 
         self.readings = parts.link.drain(slot.started)
         self.waited_s = 0.0
@@ -102,7 +103,7 @@ class Tick:
                 puppet.stand()
             ends[FIGURE] = now()
 
-        parts.outputs.publish_frame(*self.frames)
+        parts.outputs.publish_frame(frame)
         ends[SEND] = now()
 
     def warm_up(self) -> None:
@@ -154,8 +155,7 @@ class Tick:
         self.waited_s = self._monotonic() - before
 
     def _name_reading(self) -> None:
-        """The frames name the reading that went into them."""
+        """The frame names the reading that went into it."""
         newest = self.parts.newest_primary
         if newest is not None:
-            for frame in self.frames:
-                frame.sensor_sequence, frame.sensor_arrival = newest.sequence, newest.arrival
+            self.frame.sensor_sequence, self.frame.sensor_arrival = newest.sequence, newest.arrival

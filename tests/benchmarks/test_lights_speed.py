@@ -13,7 +13,7 @@ from appliance.levers.show_state import ShowState
 from appliance.levers.table import LIGHTS
 from appliance.lights.patch import Patch
 from appliance.lights.rig import Rig
-from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import default_show_path
 from appliance.show.lights import LightsConfig
@@ -65,11 +65,12 @@ def test_pass(measured: Callable[..., Any], fading: bool, request: pytest.Fixtur
     assert set(levels) == {1, 2}
 
 
-def _frame(skeleton: Skeleton, number: int) -> SeenFrame:
+def _frame(skeleton: Skeleton, number: int) -> JointFrame:
     """A figure that wanders."""
     pose = np.tile(np.array([1, 0, 0, 0], np.float32), (len(skeleton), 1))
     root = np.array([np.sin(number / 30), 0.9, np.cos(number / 30)], np.float32)
     positions, world = skeleton.forward_kinematics(pose, root)
     seconds = number * 0.02
     holds = np.zeros(len(positions), np.float32)
-    return SeenFrame(number, seconds, seconds, False, -1, 0.0, pose, world, positions, root, holds)
+    puppet = PuppetFrame(root, pose, pose, world, positions, holds)
+    return JointFrame((puppet,), number, seconds, left=seconds)

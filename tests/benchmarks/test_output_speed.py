@@ -29,7 +29,7 @@ from appliance.show.show import load_show
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST
 from hw_sim.posistagenet import PsnReceiver
-from tests.outputs.small_stage import facts_of
+from tests.outputs.small_stage import encoded, facts_of, one_puppet
 from tests.studio.tiny import skeleton, swaying
 
 FIGURE_GROUP = "forward kinematics of one pose"
@@ -43,11 +43,11 @@ OUTPUTS_GROUP = "all outputs of one tick, the default show's figure"
 @pytest.fixture
 def frame() -> JointFrame:
     """A pose of the tiny figure."""
-    made = JointFrame(len(skeleton()))
+    made = one_puppet(len(skeleton()))
     dance = swaying(1.0)
-    made.pose[:] = dance.poses[7]
-    positions, world = skeleton().forward_kinematics(made.pose, dance.roots[7].astype(np.float32))
-    made.positions[:], made.world[:] = positions, world
+    made.puppets[0].pose[:] = dance.poses[7]
+    positions, world = skeleton().forward_kinematics(made.puppets[0].pose, dance.roots[7].astype(np.float32))
+    made.puppets[0].positions[:], made.puppets[0].world[:] = positions, world
     return made
 
 
@@ -61,28 +61,28 @@ def message(address: str, floats: list[float]) -> bytes:
 def pack_with_python_osc(frame: JointFrame) -> list[bytes]:
     """The same three messages as the ai-toolbox dialect."""
     return [
-        message("/mocap/0/joint/rot_local", frame.pose.ravel().tolist()),
-        message("/mocap/0/joint/pos_world", frame.positions.ravel().tolist()),
-        message("/mocap/0/joint/rot_world", frame.world.ravel().tolist()),
+        message("/mocap/0/joint/rot_local", frame.puppets[0].pose.ravel().tolist()),
+        message("/mocap/0/joint/pos_world", frame.puppets[0].positions.ravel().tolist()),
+        message("/mocap/0/joint/rot_world", frame.puppets[0].world.ravel().tolist()),
     ]
 
 
 def test_python_osc(measured: Callable[..., Any], frame: JointFrame) -> None:
     benchmark = measured("python-osc", OSC_GROUP, reference=True)
     packed = benchmark(pack_with_python_osc, frame)
-    ours = DIALECTS["ai-toolbox"](skeleton(), OscConfig(), 0).encode(frame)
+    ours = encoded(DIALECTS["ai-toolbox"](skeleton(), OscConfig(), 0), frame)
     assert packed == [bytes(datagram) for datagram in ours]
 
 
 def test_ai_toolbox(measured: Callable[..., Any], frame: JointFrame) -> None:
     encoder = DIALECTS["ai-toolbox"](skeleton(), OscConfig(), 0)
-    assert len(measured("ours", OSC_GROUP)(encoder.encode, frame)) == 3
+    assert len(measured("ours", OSC_GROUP)(encoder.encode, frame, frame.puppets[0])) == 3
 
 
 @pytest.mark.parametrize("dialect", sorted(DIALECTS.keys() - {"ai-toolbox"}))
 def test_dialect(measured: Callable[..., Any], frame: JointFrame, dialect: str) -> None:
     encoder = DIALECTS[dialect](skeleton(), OscConfig(), 0)
-    assert measured(dialect, DIALECTS_GROUP)(encoder.encode, frame)
+    assert measured(dialect, DIALECTS_GROUP)(encoder.encode, frame, frame.puppets[0])
 
 
 def one_joint_after_another(bones: Skeleton, pose: Any, root: Any) -> list[Any]:
@@ -101,20 +101,26 @@ def one_joint_after_another(bones: Skeleton, pose: Any, root: Any) -> list[Any]:
 
 def test_forward_kinematics_joint_by_joint(measured: Callable[..., Any], frame: JointFrame) -> None:
     benchmark = measured("joint by joint", FIGURE_GROUP, reference=True)
-    positions = benchmark(one_joint_after_another, skeleton(), frame.pose, frame.positions[0])
-    np.testing.assert_allclose(positions, frame.positions, atol=1e-5)
+    positions = benchmark(
+        one_joint_after_another, skeleton(), frame.puppets[0].pose, frame.puppets[0].positions[0]
+    )
+    np.testing.assert_allclose(positions, frame.puppets[0].positions, atol=1e-5)
 
 
 def test_forward_kinematics_of_many_poses(measured: Callable[..., Any], frame: JointFrame) -> None:
     benchmark = measured("skeleton, any shape", FIGURE_GROUP)
-    positions, _ = benchmark(skeleton().forward_kinematics, frame.pose, frame.positions[0])
-    np.testing.assert_allclose(positions, frame.positions, atol=1e-5)
+    positions, _ = benchmark(
+        skeleton().forward_kinematics, frame.puppets[0].pose, frame.puppets[0].positions[0]
+    )
+    np.testing.assert_allclose(positions, frame.puppets[0].positions, atol=1e-5)
 
 
 def test_forward_kinematics_in_the_tick(measured: Callable[..., Any], frame: JointFrame) -> None:
     figure = Figure(skeleton())
-    measured("figure, in the tick", FIGURE_GROUP)(figure.set_pose, frame.pose, frame.positions[0])
-    np.testing.assert_allclose(figure.positions, frame.positions, atol=1e-5)
+    measured("figure, in the tick", FIGURE_GROUP)(
+        figure.set_pose, frame.puppets[0].pose, frame.puppets[0].positions[0]
+    )
+    np.testing.assert_allclose(figure.positions, frame.puppets[0].positions, atol=1e-5)
 
 
 def chunk(number: int, data: bytes, parent: bool = False) -> bytes:
@@ -138,8 +144,10 @@ def dancer() -> Skeleton:
 
 @pytest.fixture
 def full_frame(dancer: Skeleton) -> JointFrame:
-    made = JointFrame(len(dancer))
-    made.positions[:], made.world[:] = dancer.forward_kinematics(made.pose, np.zeros(3, np.float32))
+    made = one_puppet(len(dancer))
+    made.puppets[0].positions[:], made.puppets[0].world[:] = dancer.forward_kinematics(
+        made.puppets[0].pose, np.zeros(3, np.float32)
+    )
     return made
 
 
@@ -147,7 +155,7 @@ def test_posistagenet_chunk_by_chunk(
     measured: Callable[..., Any], dancer: Skeleton, full_frame: JointFrame
 ) -> None:
     benchmark = measured("struct, chunk by chunk", PSN_GROUP, reference=True)
-    packed = benchmark(lambda: pack_one_by_one(full_frame.positions.tolist()))
+    packed = benchmark(lambda: pack_one_by_one(full_frame.puppets[0].positions.tolist()))
     psn = PosiStageNet(PosiStageNetConfig(), dancer)
     psn.encode(full_frame)
     assert packed == bytes(psn.encode(full_frame)[0])
@@ -183,7 +191,7 @@ def test_shared_frame_read(
     writer.write(full_frame)
     reader = FrameReader(tmp_path)
     seen = measured("read the newest, in the reader", SHARED_GROUP)(reader.newest, 0.0)
-    np.testing.assert_array_equal(seen.positions, full_frame.positions)
+    np.testing.assert_array_equal(seen.puppets[0].positions, full_frame.puppets[0].positions)
 
 
 @pytest.fixture

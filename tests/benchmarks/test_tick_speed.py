@@ -99,4 +99,4 @@ def test_the_whole_tick(measured: Callable[..., Any], parts: StageParts, key: Se
     sensor.close()
     assert parts.link.counts["accepted"] - paired == ran
     assert not tick.late and not tick.network_failed
-    assert tick.frames[0].sensor_sequence == paired + ran - 1
+    assert tick.frame.sensor_sequence == paired + ran - 1

@@ -37,7 +37,7 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     assert tab.evaluate("seen.puppets") == 2
     before = tab.locator("#stage").screenshot()
     tick, root = tab.evaluate("[seen.tick, seen.root]")
-    seen = {frame.tick: frame.root for frame in reader.frames(60, time.monotonic())}
+    seen = {frame.tick: frame.puppets[0].root for frame in reader.frames(60, time.monotonic())}
     assert np.allclose(root, seen[int(tick)], atol=0.001)
     await_true(tab, f"seen.tick > {tick + 20}")
     assert tab.locator("#stage").screenshot() != before, "the figure moves"

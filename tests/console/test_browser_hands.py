@@ -45,7 +45,7 @@ def held(studio: Studio, joint: str = HELD) -> float:
     reader = studio[2]
     frame, facts = reader.newest(time.monotonic()), reader.facts
     assert frame is not None and facts is not None
-    return float(frame.holds[facts.skeleton.index(joint)])
+    return float(frame.puppets[0].holds[facts.skeleton.index(joint)])
 
 
 def opened(context: BrowserContext, studio: Studio) -> Tab:
@@ -128,7 +128,7 @@ def test_a_square_ring_takes_its_joint_to_a_place(browser: Browser, studio: Stud
     finger, (x, y) = Finger(tab), ring(tab, PLACED)
     frame = studio[2].newest(time.monotonic())
     assert frame is not None and studio[2].facts is not None
-    stood = frame.positions[studio[2].facts.skeleton.index(PLACED)]
+    stood = frame.puppets[0].positions[studio[2].facts.skeleton.index(PLACED)]
     finger.down(x, y)
     wait_until(lambda: held(studio, PLACED) == 1.0, "the joint is not held")
     finger.move(x, y - 60)

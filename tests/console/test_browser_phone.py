@@ -104,13 +104,13 @@ def angle(stage: Stage, degrees: float) -> float:
     frame = stage[2].newest(time.monotonic())
     assert frame is not None
     wanted = quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.radians(degrees))
-    return float(quaternion.angle_between(frame.pose[JOINT], wanted))
+    return float(quaternion.angle_between(frame.puppets[0].pose[JOINT], wanted))
 
 
 def held(stage: Stage, joint: int = JOINT) -> float:
     frame = stage[2].newest(time.monotonic())
     assert frame is not None
-    return float(frame.holds[joint])
+    return float(frame.puppets[0].holds[joint])
 
 
 @pytest.mark.parametrize("script", ["", NO_SOCKETS], ids=["WebSocket", "POST"])

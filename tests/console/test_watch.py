@@ -71,7 +71,7 @@ def test_a_browser_gets_the_poses_that_leave_the_box(venue: tuple[Box, Page]) ->
                 puppets = np.frombuffer(frame, "<f4", -1, BROWSER_HEAD.size).reshape(2, 8 * joints)
                 for seen in reader.frames(10, time.monotonic()):
                     if seen.tick == tick:
-                        for numbers, puppet in zip(puppets, (seen, *seen.others), strict=True):
+                        for numbers, puppet in zip(puppets, seen.puppets, strict=True):
                             assert np.array_equal(numbers[: 4 * joints], puppet.world.ravel())
                             assert np.array_equal(numbers[4 * joints : 7 * joints], puppet.positions.ravel())
                             assert np.array_equal(numbers[7 * joints :], puppet.holds)

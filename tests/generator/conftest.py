@@ -28,7 +28,7 @@ class Bench:
     def __init__(self, show: Path, folder: Path, state: Path | None) -> None:
         self.show, self.folder = load_show(show), folder
         self.declared = ShowState(show=self.show.config.name)
-        self.told: dict[str, Any] = {"base": "main", "made": ""}
+        self.told: dict[str, Any] = {"name": "", "base": "main", "made": ""}
         self.health: dict[str, Any] = {"puppets": [self.told]}
         self._closed, self._now = False, time.monotonic()
         self.fallbacks = Fallbacks(OF_THE_GENERATOR)

@@ -18,7 +18,7 @@ from appliance.generator import request as requests
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
 from appliance.generator.pointing import Pointing
 from appliance.levers.show_state import ShowState
-from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.joint_frame import PuppetFrame
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.show.show import load_show
@@ -96,7 +96,8 @@ def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: 
 def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
     puppets = [{"name": "a"}, {"name": "b", "phrase": "vary"}, {"name": "c"}, {"name": "d", "phrase": "path"}]
     one = bench(write_show_with_sources(tmp_path / "show", puppets=puppets))
-    told = [{"base": "main", "made": "", "position_s": 0.0} for _ in puppets[1:]]
+    told = [{"name": one["name"], "base": "main", "made": "", "position_s": 0.0} for one in puppets[1:]]
+    one.told["name"] = "a"
     one.health |= {"puppets": [one.told, *told], "looked_at": time.monotonic()}
     made = [MadeMotionReader(one.folder, puppet) for puppet in range(4)]
     one.recipe()
@@ -130,7 +131,7 @@ def test_a_limb_that_a_hand_holds_points_at_the_map(tmp_path: Path) -> None:
     def pointed(*to: float) -> list[float]:
         axis, angle = np.cross(limb, to), np.arccos(limb @ np.array(to) / np.linalg.norm(limb))
         pose[joint] = quaternion.from_axis_angle(axis, angle)
-        return pointing.point(cast(SeenFrame, SimpleNamespace(pose=pose, holds=holds)))
+        return pointing.point(cast(PuppetFrame, SimpleNamespace(pose=pose, holds=holds)))
 
     assert pointed(0.0, 0.1, 1.0) == []
     holds[joint] = 1.0

@@ -47,7 +47,7 @@ def note(night: Night, ticks: int) -> None:
     """This many ticks that cost no dance; their poses pack no smaller than those of one."""
     noise = np.random.default_rng(0)
     for _ in range(ticks):
-        night.tick.frames[0].pose[...] = noise.random(night.tick.frames[0].pose.shape)
+        night.tick.frame.puppets[0].pose[...] = noise.random(night.tick.frame.puppets[0].pose.shape)
         night.slot.tick += 1
         night.slot.deadline += TICK_S
         night.slot.started = night.slot.deadline

@@ -9,7 +9,7 @@ import numpy as np
 
 from appliance.lights.patch import Patch
 from appliance.lights.rig import Rig
-from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 from appliance.show.lights import LightsConfig
@@ -24,22 +24,18 @@ def frame(
     hip: Sequence[float] = (0.0, 1.0, 0.0),
     turned: Any = quaternion.IDENTITY,
     late: bool = False,
-) -> SeenFrame:
+) -> JointFrame:
     """A frame at tick * 20 ms; `turned` is the hand's orientation (w, x, y, z) in the world."""
     world = np.array([quaternion.IDENTITY, turned], np.float32)
-    return SeenFrame(
-        tick=tick,
-        frame_time=tick * PERIOD_S,
-        left=tick * PERIOD_S,
-        late=late,
-        sensor_sequence=-1,
-        sensor_arrival=0.0,
+    puppet = PuppetFrame(
+        root=np.array(hip, np.float32),
         pose=world.copy(),
+        source=world.copy(),
         world=world,
         positions=np.array([hip, hand], np.float32),
-        root=np.array(hip, np.float32),
         holds=np.zeros(2, np.float32),
     )
+    return JointFrame((puppet,), tick, tick * PERIOD_S, late, left=tick * PERIOD_S)
 
 
 def lights(

@@ -12,7 +12,7 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.pose.skeleton import Skeleton
-from tests.outputs.small_stage import facts_of
+from tests.outputs.small_stage import facts_of, one_puppet, stand
 
 # (joint, parent, offset in metres); lButtock, rButtock and tail have no Unity name.
 JOINTS = [
@@ -53,17 +53,18 @@ def fill(frame: JointFrame, skeleton: Skeleton, seed: int) -> JointFrame:
     """A random pose somewhere on the stage."""
     random = np.random.default_rng(seed)
     pose = random.normal(size=(len(skeleton), 4)).astype(np.float32)
-    frame.pose[:] = pose / np.linalg.norm(pose, axis=-1, keepdims=True)
-    frame.root[:] = random.uniform(-3, 3, 3)
-    frame.positions[:], frame.world[:] = skeleton.forward_kinematics(frame.pose, frame.root)
-    frame.holds[:] = random.uniform(0, 1, len(skeleton))
+    puppet = frame.puppets[0]
+    puppet.pose[:] = pose / np.linalg.norm(pose, axis=-1, keepdims=True)
+    puppet.root[:] = random.uniform(-3, 3, 3)
+    stand(frame, skeleton)
+    puppet.holds[:] = random.uniform(0, 1, len(skeleton))
     frame.tick, frame.frame_time = seed, 1000.0 + 0.02 * seed
     return frame
 
 
 @pytest.fixture
 def frame(skeleton: Skeleton) -> JointFrame:
-    return fill(JointFrame(len(skeleton)), skeleton, seed=1)
+    return fill(one_puppet(len(skeleton)), skeleton, seed=1)
 
 
 @pytest.fixture
@@ -81,6 +82,6 @@ def writer(tmp_path: Path, skeleton: Skeleton) -> Iterator[FrameWriter]:
 
 
 def write(writer: FrameWriter, skeleton: Skeleton, *ticks: int) -> None:
-    frame = JointFrame(len(skeleton))
+    frame = one_puppet(len(skeleton))
     for tick in ticks:
         writer.write(fill(frame, skeleton, tick))

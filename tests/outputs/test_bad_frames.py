@@ -16,17 +16,17 @@ from appliance.box.ring_file import RingFileWriter
 from appliance.outputs import shared_frame
 from appliance.outputs.frame_layout import FRAME_SLOTS, FrameLayout
 from appliance.outputs.frame_reader import FrameReader
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.pose.skeleton import Skeleton
 from tests.outputs.conftest import write
-from tests.outputs.small_stage import NOW, WRITES, facts_of, small
+from tests.outputs.small_stage import NOW, WRITES, facts_of, one_puppet, small
 
 READS = """
 import sys, time
 from pathlib import Path
 import numpy as np
 from appliance.outputs.frame_reader import FrameReader
+from tests.outputs.small_stage import NUMBERS
 reader, seen, torn, oldest, last = FrameReader(Path(sys.argv[1])), 0, 0, 0, 0
 until = time.monotonic() + float(sys.argv[2])
 give_up = until + 20.0
@@ -36,8 +36,8 @@ while (now := time.monotonic()) < until or ((seen <= 1000 or not oldest) and now
     oldest += len(frames) < 64
     for frame in (*frames, newest):
         seen += 1
-        for numbers in (frame.pose, frame.world, frame.positions, frame.root, frame.holds):
-            torn += not (numbers == frame.tick % 65536).all()
+        for name in NUMBERS:
+            torn += not (getattr(frame.puppets[0], name) == frame.tick % 65536).all()
         torn += frame.frame_time != 1e-6 * frame.tick
     torn += newest.tick < last
     last = newest.tick
@@ -152,10 +152,10 @@ def test_a_file_cut_short_under_a_reader_does_no_harm(
 @pytest.mark.parametrize("part", ["pose", "world", "positions", "root"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_frame_that_is_not_a_number_is_nobodys(tmp_path: Path, part: str, value: float) -> None:
-    writer, reader, frame = FrameWriter(tmp_path, facts_of(small(3))), FrameReader(tmp_path), JointFrame(3)
+    writer, reader, frame = FrameWriter(tmp_path, facts_of(small(3))), FrameReader(tmp_path), one_puppet(3)
     frame.tick = 1
     writer.write(frame)
-    getattr(frame, part)[-1] = value
+    getattr(frame.puppets[0], part)[-1] = value
     frame.tick = 2
     writer.write(frame)
     assert reader.newest(NOW) is None
@@ -166,7 +166,7 @@ def test_a_frame_that_is_not_a_number_is_nobodys(tmp_path: Path, part: str, valu
 
 def test_a_frame_left_from_before_the_machine_started_anew_is_nobodys(tmp_path: Path) -> None:
     """In a folder on a disk, after a power cut: its times are still to come, and it would count as fresh."""
-    writer, frame = FrameWriter(tmp_path, facts_of(small(3))), JointFrame(3)
+    writer, frame = FrameWriter(tmp_path, facts_of(small(3))), one_puppet(3)
     frame.frame_time = NOW
     writer.write(frame)
     reader = FrameReader(tmp_path, lambda: 60.0)

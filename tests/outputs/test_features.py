@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.motion_features import PAUSE_S, WINDOW
 from appliance.outputs.osc.features import Features
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
 from hw_sim.osc_receiver import decode
+from tests.outputs.small_stage import encoded, one_puppet
 
 JOINTS, STEP_S = 3, 0.02
 FIGURE = Skeleton(("a", "b", "c"), (-1, 0, 1), np.zeros((JOINTS, 3)))
@@ -25,13 +25,13 @@ class Dancer:
     """All joints go the same way."""
 
     def __init__(self, way: Way, prefix: str = "/mocap/0/joint") -> None:
-        self._way, self._frame = way, JointFrame(JOINTS)
+        self._way, self._frame = way, one_puppet(JOINTS)
         self._features = Features(FIGURE, OscConfig(dialect="features", prefix=prefix))
 
     def at(self, second: float, late: bool = False) -> dict[str, NDArray[np.float64]]:
         self._frame.frame_time, self._frame.late = 100.0 + second, late
-        self._frame.positions[:] = PLACES + self._way(second)
-        messages = [decode(bytes(one))[0] for one in self._features.encode(self._frame)]
+        self._frame.puppets[0].positions[:] = PLACES + self._way(second)
+        messages = [decode(bytes(one))[0] for one in encoded(self._features, self._frame)]
         return {address: np.array(values, float) for address, values in messages}
 
     def dance(self, frames: int) -> dict[str, NDArray[np.float64]]:

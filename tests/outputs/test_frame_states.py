@@ -7,11 +7,10 @@ import sys
 from pathlib import Path
 
 from appliance.outputs.frame_reader import STALE_S, FrameReader
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.pose.skeleton import Skeleton
 from tests.outputs.conftest import write
-from tests.outputs.small_stage import NOW, WRITES, facts_of, small
+from tests.outputs.small_stage import NOW, WRITES, facts_of, one_puppet, small
 
 
 def test_a_stage_is_fresh_while_its_frames_are_young(
@@ -60,9 +59,9 @@ def test_another_stage_with_another_skeleton_takes_over(
     other = FrameWriter(tmp_path, facts_of(small(5)))
     writer.close()
     assert reader.newest(NOW + 0.4) is None and reader.generation == 2
-    other.write(JointFrame(5))
+    other.write(one_puppet(5))
     seen = reader.newest(NOW + 0.6)
-    assert seen is not None and seen.pose.shape == (5, 4)
+    assert seen is not None and seen.puppets[0].pose.shape == (5, 4)
     assert reader.facts is not None and len(reader.facts.skeleton) == 5
     other.close()
 

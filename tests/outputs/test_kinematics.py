@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.motion_features import PAUSE_S
 from appliance.outputs.osc.ai_toolbox import AiToolbox
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
 from hw_sim.osc_receiver import decode
+from tests.outputs.small_stage import encoded, one_puppet
 
 FIGURE = Skeleton(("a", "b", "c"), (-1, 0, 1), np.zeros((3, 3)))
 UP = np.array([0.0, 1.0, 0.0])  # the box's; the pieces call it z
@@ -22,15 +22,15 @@ class Piece:
     """A receiver of the first joint: it circles about the vertical, and turns faster and faster about it."""
 
     def __init__(self, **keys: object) -> None:
-        self._frame = JointFrame(3)
+        self._frame = one_puppet(3)
         self._encoder = AiToolbox(FIGURE, OscConfig.model_validate({"program": "supercollider", **keys}))
 
     def at(self, second: float, late: bool = False) -> dict[str, np.ndarray]:
         frame, angle = self._frame, CIRCLES_RAD_S * second
         frame.frame_time, frame.late = 100.0 + second, late
-        frame.positions[0] = np.cos(angle), 1.0, -np.sin(angle)
-        frame.world[0] = quaternion.from_axis_angle(UP, TURNS_RAD_S2 * second**2 / 2)
-        found = [decode(bytes(one))[0] for one in self._encoder.encode(frame)]
+        frame.puppets[0].positions[0] = np.cos(angle), 1.0, -np.sin(angle)
+        frame.puppets[0].world[0] = quaternion.from_axis_angle(UP, TURNS_RAD_S2 * second**2 / 2)
+        found = [decode(bytes(one))[0] for one in encoded(self._encoder, frame)]
         return {address: np.array(values).reshape(3, -1)[0] for address, values in found}
 
     def play(self, seconds: float) -> dict[str, np.ndarray]:

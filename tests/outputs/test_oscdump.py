@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
@@ -19,6 +18,7 @@ from hw_sim.osc_receiver import OscReceiver, Received
 from hw_sim.peers import free_ports
 from tests.outputs.conftest import fill
 from tests.outputs.osc_peers import LOOPBACK
+from tests.outputs.small_stage import one_puppet
 
 PATIENCE_S = 30.0
 
@@ -62,7 +62,7 @@ def test_oscdump_reads_every_message(
             [OscConfig.model_validate({"port": ours.port, "dialect": dialect, "frame_message": True})],
             skeleton,
         )
-        frame = JointFrame(len(skeleton))
+        frame = one_puppet(len(skeleton))
         expected: list[Received] = []
         dumped: list[list[str]] = []
         assert process.stdout is not None

@@ -42,7 +42,7 @@ def test_everybody_gets_the_frame(tmp_path: Path, skeleton: Skeleton, frame: Joi
         reader = FrameReader(tmp_path)
         seen = reader.newest(frame.frame_time)
         assert seen is not None
-        np.testing.assert_array_equal(seen.positions, frame.positions)
+        np.testing.assert_array_equal(seen.puppets[0].positions, frame.puppets[0].positions)
         assert reader.health() == {"state": "dancing"}
         assert [one.is_data for one in psn.poll(5.0)] == [False, True]
         assert osc.poll(5.0)[0][1] == "/mocap/0/joint/rot_local"

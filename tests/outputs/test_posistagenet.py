@@ -21,6 +21,7 @@ from appliance.show.yaml_file import YamlFile
 from hw_sim.peers import free_ports
 from hw_sim.posistagenet import MalformedPsnError, Packet, PsnReceiver, decode
 from tests.outputs.conftest import fill
+from tests.outputs.small_stage import one_puppet, together
 
 LOOPBACK = "127.0.0.1"
 
@@ -45,7 +46,7 @@ def test_every_joint_is_a_tracker_with_its_position_and_name(skeleton: Skeleton,
     assert [one.system for one in info] == ["Bunraku"]
     found = positions(data)
     assert list(found) == list(range(len(skeleton)))
-    np.testing.assert_array_equal(np.array(list(found.values()), np.float32), frame.positions)
+    np.testing.assert_array_equal(np.array(list(found.values()), np.float32), frame.puppets[0].positions)
     assert {tracker.status for one in data for tracker in one.trackers.values()} == {1.0}
     assert {tracker.speed for one in data for tracker in one.trackers.values()} == {None}
 
@@ -57,13 +58,13 @@ def test_chosen_joints_keep_their_order_and_get_their_numbers(skeleton: Skeleton
     assert info[0].system == "Röhre"
     found = positions(data)
     for number, name in info[0].names.items():
-        assert found[number] == tuple(frame.positions[skeleton.names.index(name)])
+        assert found[number] == tuple(frame.puppets[0].positions[skeleton.names.index(name)])
 
 
 def test_axes_scale_and_offset_are_the_receivers(skeleton: Skeleton, frame: JointFrame) -> None:
     psn = output(skeleton, joints=["lHand"], axes=["x", "-z", "y"], scale=100.0, offset=[10, 20, 30])
     _, data = encoded(psn, frame)
-    x, y, z = frame.positions[skeleton.names.index("lHand")]
+    x, y, z = frame.puppets[0].positions[skeleton.names.index("lHand")]
     np.testing.assert_allclose(positions(data)[0], (100 * x + 10, -100 * z + 20, 100 * y + 30), rtol=1e-6)
 
 
@@ -88,8 +89,8 @@ def test_a_frame_is_split_into_packets_that_fit_an_ethernet_frame(joints: int, s
     many = Skeleton(
         tuple(f"joint number {n}" for n in range(joints)), tuple(range(-1, joints - 1)), np.zeros((joints, 3))
     )
-    frame = JointFrame(joints)
-    frame.positions[:] = np.random.default_rng(joints).normal(size=(joints, 3))
+    frame = one_puppet(joints)
+    frame.puppets[0].positions[:] = np.random.default_rng(joints).normal(size=(joints, 3))
     psn = output(many, speed=speed)
     assert max(map(len, psn.encode(frame))) <= 1472
     frame.frame_time = 2.0
@@ -97,7 +98,9 @@ def test_a_frame_is_split_into_packets_that_fit_an_ethernet_frame(joints: int, s
     for packets in (info, data):
         assert {one.packets for one in packets} == {len(packets)}
         assert len({one.frame for one in packets}) == 1
-    np.testing.assert_array_equal(np.array(list(positions(data).values()), np.float32), frame.positions)
+    np.testing.assert_array_equal(
+        np.array(list(positions(data).values()), np.float32), frame.puppets[0].positions
+    )
     assert {number: name for one in info for number, name in one.names.items()} == dict(enumerate(many.names))
 
 
@@ -108,7 +111,11 @@ def test_speeds_are_metres_a_second_and_a_late_frame_keeps_them(
     hip = skeleton.names.index("hip")
     speeds = []
     for tick, (x, late) in enumerate([(0.0, False), (0.1, False), (0.1, True), (0.3, False), (0.3, False)]):
-        frame.positions[hip], frame.late, frame.frame_time = (x, 1.0, -2 * x), late, 50.0 + 0.02 * tick
+        frame.puppets[0].positions[hip], frame.late, frame.frame_time = (
+            (x, 1.0, -2 * x),
+            late,
+            50.0 + 0.02 * tick,
+        )
         _, data = encoded(psn, frame)
         speeds.append(data[0].trackers[0].speed)
     expected = [(0, 0, 0), (-5, 0, 10), (-5, 0, 10), (-5, 0, 10), (0, 0, 0)]
@@ -118,7 +125,7 @@ def test_speeds_are_metres_a_second_and_a_late_frame_keeps_them(
 def test_pypsn_reads_the_same(skeleton: Skeleton, frame: JointFrame) -> None:
     psn = output(skeleton, speed=True, system_name="Stage left")
     psn.encode(frame)
-    before = frame.positions.copy()
+    before = frame.puppets[0].positions.copy()
     fill(frame, skeleton, seed=51)
     trackers: dict[int, Any] = {}
     names: dict[int, str] = {}
@@ -134,9 +141,9 @@ def test_pypsn_reads_the_same(skeleton: Skeleton, frame: JointFrame) -> None:
             names |= {tracker.tracker_id: tracker.tracker_name.decode() for tracker in packet.trackers}
     assert names == dict(enumerate(skeleton.names))
     found = np.array([tuple(trackers[number].pos) for number in range(len(skeleton))], np.float32)
-    np.testing.assert_array_equal(found, frame.positions)
+    np.testing.assert_array_equal(found, frame.puppets[0].positions)
     speeds = np.array([tuple(trackers[number].speed) for number in range(len(skeleton))])
-    np.testing.assert_allclose(speeds, (frame.positions - before) / 1.0, atol=1e-5)
+    np.testing.assert_allclose(speeds, (frame.puppets[0].positions - before) / 1.0, atol=1e-5)
     assert {tracker.status for tracker in trackers.values()} == {1.0}
 
 
@@ -164,7 +171,7 @@ def test_each_nth_frame_is_sent(skeleton: Skeleton, frame: JointFrame) -> None:
     with PsnReceiver(LOOPBACK, port=port) as receiver:
         psn = output(skeleton, port=port, joints=["hip"], every=3)
         for tick in range(10):
-            frame.positions[0, 0], frame.frame_time = tick, 10.0 + 0.02 * tick
+            frame.puppets[0].positions[0, 0], frame.frame_time = tick, 10.0 + 0.02 * tick
             psn.send_frame(frame)
         data = [one for one in receiver.poll(5.0) if one.is_data]
         assert [one.trackers[0].position[0] for one in data if one.trackers[0].position] == [0, 3, 6, 9]
@@ -254,14 +261,14 @@ def test_trackers_beyond_the_last_number_are_refused(tmp_path: Path, skeleton: S
 
 
 def test_the_trackers_of_a_second_puppet_follow_and_have_its_name(skeleton: Skeleton) -> None:
-    frames = [fill(JointFrame(len(skeleton)), skeleton, seed) for seed in (3, 4)]
+    frames = [fill(one_puppet(len(skeleton)), skeleton, seed) for seed in (3, 4)]
     settings = PosiStageNetConfig(joints=["head", "hip"], first_tracker=10, speed=True)
     psn = PosiStageNet(settings, skeleton, ("left", "right"))
-    info, *data = (decode(bytes(one)) for one in psn.encode(*frames))
+    info, *data = (decode(bytes(one)) for one in psn.encode(together(*frames)))
     assert info.names == {10: "head", 11: "hip", 12: "right head", 13: "right hip"}
     found = positions(data)
     for number, (frame, joint) in enumerate([(f, j) for f in frames for j in ("head", "hip")], 10):
-        assert found[number] == tuple(frame.positions[skeleton.names.index(joint)])
+        assert found[number] == tuple(frame.puppets[0].positions[skeleton.names.index(joint)])
     (problem,) = misfits(
         [PosiStageNetConfig(first_tracker=65500)], skeleton.names, 2, YamlFile(Path("box.yaml"))
     )

@@ -62,7 +62,9 @@ def test_mocap_analysis_gets_positions_in_centimetres(skeleton: Skeleton, frame:
     lists = sent(skeleton, frame, **program("mocap-analysis"))
     pattern = re.compile("^" + re.escape("/mocap/*/joint/pos_world").replace("\\*", ".*") + "$")
     (address,) = [address for address in lists if pattern.match(address)]
-    np.testing.assert_allclose(lists[address].reshape(len(skeleton), 3) * 0.01, frame.positions, atol=1e-5)
+    np.testing.assert_allclose(
+        lists[address].reshape(len(skeleton), 3) * 0.01, frame.puppets[0].positions, atol=1e-5
+    )
 
 
 def test_the_classifier_gets_local_positions_and_rotations(skeleton: Skeleton, frame: JointFrame) -> None:
@@ -70,8 +72,10 @@ def test_the_classifier_gets_local_positions_and_rotations(skeleton: Skeleton, f
     lists = sent(skeleton, frame, **program("classifier"))
     offsets = lists["/mocap/0/joint/pos_local"].reshape(-1, 3) / 100
     np.testing.assert_allclose(offsets[1:], skeleton.offsets[1:], atol=1e-5)
-    np.testing.assert_allclose(offsets[0], frame.positions[0], atol=1e-5)
-    np.testing.assert_allclose(lists["/mocap/0/joint/rot_local"].reshape(-1, 4), frame.pose, atol=1e-6)
+    np.testing.assert_allclose(offsets[0], frame.puppets[0].positions[0], atol=1e-5)
+    np.testing.assert_allclose(
+        lists["/mocap/0/joint/rot_local"].reshape(-1, 4), frame.puppets[0].pose, atol=1e-6
+    )
 
 
 def test_the_clustering_gets_its_three_lists(skeleton: Skeleton, frame: JointFrame) -> None:
@@ -86,7 +90,7 @@ def test_vae_rnn_counts_end_sites_as_joints(skeleton: Skeleton, frame: JointFram
     rows = rotations.reshape(-1, 4)
     assert len(rows) == len(skeleton) + 3
     np.testing.assert_array_equal(rows[[5, 11, 20]], np.tile(quaternion.IDENTITY, (3, 1)))
-    np.testing.assert_allclose(np.delete(rows, [5, 11, 20], axis=0), frame.pose, atol=1e-6)
+    np.testing.assert_allclose(np.delete(rows, [5, 11, 20], axis=0), frame.puppets[0].pose, atol=1e-6)
 
 
 def test_ends_lie_where_the_bones_end(skeleton: Skeleton, frame: JointFrame) -> None:
@@ -94,10 +98,10 @@ def test_ends_lie_where_the_bones_end(skeleton: Skeleton, frame: JointFrame) -> 
     lists = sent(ended, frame, ends=True, messages=["pos_world", "rot_world"])
     rows = lists["/mocap/0/joint/pos_world"].reshape(-1, 3)
     for row, (joint, offset) in zip((5, 11, 20), ended.ends, strict=True):
-        reach = quaternion.rotate(frame.world[joint], np.array(offset))
-        np.testing.assert_allclose(rows[row], frame.positions[joint] + reach, atol=1e-5)
+        reach = quaternion.rotate(frame.puppets[0].world[joint], np.array(offset))
+        np.testing.assert_allclose(rows[row], frame.puppets[0].positions[joint] + reach, atol=1e-5)
         turned = lists["/mocap/0/joint/rot_world"].reshape(-1, 4)[row]
-        np.testing.assert_allclose(turned, frame.world[joint], atol=1e-6)
+        np.testing.assert_allclose(turned, frame.puppets[0].world[joint], atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["ray-marching", "supercollider"])
@@ -105,7 +109,7 @@ def test_programs_with_z_up_read_the_height_as_z(skeleton: Skeleton, frame: Join
     lists = sent(skeleton, frame, **program(name))
     (positions,) = [numbers.reshape(-1, 3) for at, numbers in lists.items() if at.endswith("pos_world")]
     scale = 100.0 if name == "ray-marching" else 1.0
-    np.testing.assert_allclose(positions[:, 2] / scale, frame.positions[:, 1], atol=1e-5)
+    np.testing.assert_allclose(positions[:, 2] / scale, frame.puppets[0].positions[:, 1], atol=1e-5)
     prefix = "/mocap/joint" if name == "supercollider" else "/mocap/0/joint"
     assert all(address.startswith(f"{prefix}/") for address in lists)
 
@@ -125,7 +129,7 @@ def test_rotations_turn_in_the_receivers_axes_as_positions_do(
 def test_a_receiver_may_choose_joints_and_their_order(skeleton: Skeleton, frame: JointFrame) -> None:
     lists = sent(skeleton, frame, joints=["head", "hip"], messages=["pos_world"], prefix="/mocap/1/joint")
     rows = lists["/mocap/1/joint/pos_world"].reshape(-1, 3)
-    np.testing.assert_allclose(rows, frame.positions[[4, 0]], atol=1e-6)
+    np.testing.assert_allclose(rows, frame.puppets[0].positions[[4, 0]], atol=1e-6)
 
 
 def test_euler_angles_turn_about_x_then_y_then_z(skeleton: Skeleton, frame: JointFrame) -> None:
@@ -135,7 +139,7 @@ def test_euler_angles_turn_about_x_then_y_then_z(skeleton: Skeleton, frame: Join
         for axis in range(3)
     ]
     turned = quaternion.multiply(about[2], quaternion.multiply(about[1], about[0]))
-    assert np.degrees(quaternion.angle_between(turned, frame.pose)).max() < 0.1
+    assert np.degrees(quaternion.angle_between(turned, frame.puppets[0].pose)).max() < 0.1
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import free_ports
 from tests.outputs.conftest import fill
 from tests.outputs.osc_peers import LOOPBACK, take
+from tests.outputs.small_stage import one_puppet
 
 FRAME_RATE_HZ = 50
 IN_A_NETWORK_OF_ITS_OWN = """
@@ -31,12 +32,13 @@ from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
 from hw_sim.osc_receiver import OscReceiver
+from tests.outputs.small_stage import one_puppet
 def ip(*commands):
     for command in commands:
         subprocess.run(["ip", *command.split()], check=True)
 ip("link set lo up")
 skeleton = Skeleton(tuple(map(str, range(43))), tuple(range(-1, 42)), np.zeros((43, 3)))
-frame = JointFrame(43)
+frame = one_puppet(43)
 """
 TWO_DARK_MACHINES = """
 ip("link add v0 type veth peer name v1", "addr add 10.99.0.1/24 dev v0", "link set v0 up", "link set v1 up")
@@ -136,7 +138,7 @@ def test_messages_too_long_for_a_datagram_are_dropped_with_the_reason(peer: OscR
     joints = 5000
     skeleton = Skeleton(tuple(map(str, range(joints))), tuple(range(-1, joints - 1)), np.zeros((joints, 3)))
     outputs = OscOutputs([OscConfig(port=peer.port)], skeleton)
-    outputs.send_frame(JointFrame(joints))
+    outputs.send_frame(one_puppet(joints))
     receiver = outputs.receivers[0]
     assert (receiver.sent, receiver.dropped) == (0, 3)
     assert receiver.last_error == "the message is too long for a datagram"

@@ -14,6 +14,7 @@ from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.outputs.osc.vmc import TIME_WRAP_S, Vmc
 from appliance.pose.skeleton import Skeleton
 from tests.outputs.conftest import JOINTS, fill
+from tests.outputs.small_stage import encoded, one_puppet, stand
 
 # The bone above each bone in Unity's humanoid, as far as the test's dancer has them.
 UNITY_PARENT = {
@@ -38,7 +39,7 @@ MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 def sent(encoder: Vmc, frame: JointFrame) -> dict[str, list[float]]:
     """Bone name, or address of the other messages -> arguments."""
     found = {}
-    for datagram in encoder.encode(frame):
+    for datagram in encoded(encoder, frame):
         for timed in OscPacket(bytes(datagram)).messages:
             address, arguments = timed.message.address, list(timed.message.params)
             found[str(arguments.pop(0)) if address == "/VMC/Ext/Bone/Pos" else address] = arguments
@@ -61,9 +62,9 @@ def our_worlds(frame: JointFrame) -> dict[str, NDArray[np.float64]]:
     """Each joint's world transform, multiplied up with matrices from the local pose."""
     worlds: dict[str, NDArray[np.float64]] = {}
     for index, (name, parent, offset) in enumerate(JOINTS):
-        w, x, y, z = map(float, frame.pose[index])
+        w, x, y, z = map(float, frame.puppets[0].pose[index])
         if parent is None:
-            worlds[name] = matrix(frame.root.astype(float), x, y, z, w)
+            worlds[name] = matrix(frame.puppets[0].root.astype(float), x, y, z, w)
         else:
             worlds[name] = worlds[parent] @ matrix(np.array(offset), x, y, z, w)
     return worlds
@@ -71,7 +72,7 @@ def our_worlds(frame: JointFrame) -> dict[str, NDArray[np.float64]]:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_unity_s_chain_arrives_at_the_mirrored_dancer(skeleton: Skeleton, seed: int) -> None:
-    frame = fill(JointFrame(len(skeleton)), skeleton, seed)
+    frame = fill(one_puppet(len(skeleton)), skeleton, seed)
     messages = sent(Vmc(skeleton), frame)
     p, q = messages["/VMC/Ext/Root/Pos"][1:4], messages["/VMC/Ext/Root/Pos"][4:]
     unity = {"root": matrix(np.array(p), *q)}
@@ -107,16 +108,16 @@ def test_known_movements_have_unity_s_signs(
     bone: str,
     unity_xyzw: tuple[float, ...],
 ) -> None:
-    frame = JointFrame(len(skeleton))
-    frame.pose[skeleton.index(joint)] = ours_wxyz
-    frame.positions[:], frame.world[:] = skeleton.forward_kinematics(frame.pose, frame.root)
+    frame = one_puppet(len(skeleton))
+    frame.puppets[0].pose[skeleton.index(joint)] = ours_wxyz
+    stand(frame, skeleton)
     np.testing.assert_allclose(sent(Vmc(skeleton), frame)[bone][3:], unity_xyzw, atol=1e-6)
 
 
 def test_the_left_hand_is_on_unity_s_left(skeleton: Skeleton) -> None:
-    frame = JointFrame(len(skeleton))
-    frame.root[:] = 1.0, 0.9, 2.0
-    frame.positions[:], frame.world[:] = skeleton.forward_kinematics(frame.pose, frame.root)
+    frame = one_puppet(len(skeleton))
+    frame.puppets[0].root[:] = 1.0, 0.9, 2.0
+    stand(frame, skeleton)
     messages = sent(Vmc(skeleton), frame)
     np.testing.assert_allclose(messages["Hips"][:3], [-1.0, 0.9, 2.0], atol=1e-6)
     np.testing.assert_allclose(messages["LeftLowerArm"][:3], [-0.28, -0.017, 0.005], atol=1e-6)
@@ -139,7 +140,7 @@ def test_time_tells_neighbouring_ticks_apart_for_as_long_as_a_show_may_run(
 ) -> None:
     encoder = Vmc(skeleton)
     start = frame.frame_time
-    encoder.encode(frame)
+    encoded(encoder, frame)
     times = []
     for tick in range(10):
         frame.frame_time = start + TIME_WRAP_S - 1.0 + 0.02 * tick

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.outputs.osc.vmc import Vmc
 from appliance.pose import quaternion
@@ -17,6 +16,7 @@ from appliance.pose.stage_frame import in_stage_frame
 from appliance.pose.t_pose import t_pose
 from appliance.show_control.figure_pose import FigurePose
 from appliance.show_control.vmc_input import BONE, VmcInput
+from tests.outputs.small_stage import one_puppet, stand
 from tests.outputs.test_vmc import MIRROR, matrix, sent
 from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of, skeleton_of
 
@@ -71,19 +71,20 @@ def test_an_avatar_takes_the_pose_of_every_system_s_figure(convention: str) -> N
     meant = dance_of(convention, 4.0)
     given, _ = in_stage_frame(as_the_system_writes(meant, convention))
     skeleton = given.skeleton
-    encoder, frame = Vmc(skeleton), JointFrame(len(skeleton))
+    encoder, frame = Vmc(skeleton), one_puppet(len(skeleton))
     joint_of = humanoid_bones(skeleton.names)
     in_t_pose = meant.skeleton.forward_kinematics(meant.poses, meant.roots, meant.translations)[1]
     for number in (0, 90, 199):
-        frame.pose[:], frame.root[:] = given.poses[number], given.roots[number]
-        frame.positions[:], frame.world[:] = skeleton.forward_kinematics(frame.pose, frame.root)
+        frame.puppets[0].pose[:], frame.puppets[0].root[:] = given.poses[number], given.roots[number]
+        stand(frame, skeleton)
         avatar = posed_avatar(sent(encoder, frame))
         for start, end in LIMBS:
-            ours = (frame.positions[joint_of[end]] - frame.positions[joint_of[start]]) * [-1, 1, 1]
+            positions = frame.puppets[0].positions
+            ours = (positions[joint_of[end]] - positions[joint_of[start]]) * [-1, 1, 1]
             theirs = avatar[end][:3, 3] - avatar[start][:3, 3]
             assert degrees(ours.astype(float), theirs) < WAYS_DEGREES, (number, start)
         came_back = returned(skeleton, sent(encoder, frame))
-        angles = np.degrees(quaternion.angle_between(came_back, frame.pose))
+        angles = np.degrees(quaternion.angle_between(came_back, frame.puppets[0].pose))
         assert angles[sorted(joint_of.values())].max() < 0.1
         for bone, joint in joint_of.items():
             w, x, y, z = in_t_pose[number, meant.skeleton.index(skeleton.names[joint])]

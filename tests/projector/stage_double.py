@@ -7,13 +7,14 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.puppet_facts import PuppetFacts
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.loop import Looks
 from appliance.projector.moment import Moment
 from appliance.projector.picture.camera import NOT_CUED, CuedCamera
 from appliance.projector.picture.wall import Wall, flat
+from tests.outputs.small_stage import one_puppet
 
 SIZE = (64, 36)
 
@@ -31,18 +32,18 @@ class StageDouble:
     def __init__(self, folder: Path, show: Path, joints: int = 3) -> None:
         skeleton = chain(joints)
         facts = Facts(
-            *(show, None, "A test", skeleton, (1,), ("left-wrist",), ("main",), (), ("plaster",), ()),
+            *(show, None, "A test", skeleton, (PuppetFacts(),), ("main",), (), ("plaster",), ()),
             *(10, 9, 12, 1, 0.0),
         )
         self._writer = FrameWriter(folder, facts)
-        self._frame = JointFrame(joints)
+        self._frame = one_puppet(joints)
         self._frame.tick = -1
 
     def write(self, frame_time: float, height: float = 1.0) -> None:
         """The next frame, all joints at one height."""
         self._frame.tick += 1
         self._frame.frame_time = frame_time
-        self._frame.positions[:, 1] = height
+        self._frame.puppets[0].positions[:, 1] = height
         self._writer.write(self._frame)
 
     def close(self) -> None:
@@ -69,7 +70,7 @@ class TellingPainter:
         cued: CuedCamera = NOT_CUED,
     ) -> None:
         wall = target if isinstance(target, Wall) else flat(target)
-        colours = float(moment.positions[0, 1]), 0.1 * self._joints, mix
+        colours = float(moment.puppets[0].positions[0, 1]), 0.1 * self._joints, mix
         wall.framebuffer.clear(*(wall.level * colour for colour in colours), 1.0)
 
     def release(self) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.pose import quaternion
 from appliance.projector.interpolation import TICK_S, TRAIL_S, Interpolation
 
@@ -16,21 +16,22 @@ TURN = 2.0  # radians a second
 SPEED = 3.0  # metres a second
 
 
-def frame(tick: int, frame_time: float, left: float) -> SeenFrame:
+def frame(tick: int, frame_time: float, left: float) -> JointFrame:
     """Everything moves evenly with time, so that the right pose at any time is known."""
     world = quaternion.from_axis_angle([0, 1, 0], np.array([TURN * frame_time] * 2)).astype(np.float32)
     positions = np.full((2, 3), SPEED * frame_time, np.float32)
     holds = np.array([0.0, tick % 2], np.float32)
-    return SeenFrame(tick, frame_time, left, False, -1, 0.0, world, world, positions, positions[0], holds)
+    puppet = PuppetFrame(positions[0], world, world, world, positions, holds)
+    return JointFrame((puppet,), tick, frame_time, left=left)
 
 
 @dataclass
 class Ring:
     """What a reader would read: frames that have left the stage by now, the newest 64 of them."""
 
-    frames_to_come: list[SeenFrame] = field(default_factory=list)
+    frames_to_come: list[JointFrame] = field(default_factory=list)
 
-    def frames(self, count: int, now: float) -> list[SeenFrame]:
+    def frames(self, count: int, now: float) -> list[JointFrame]:
         there = [one for one in self.frames_to_come if one.left <= now]
         return there[-min(count, 64) :]
 
@@ -50,9 +51,10 @@ def shown_times(poses: Interpolation, times: np.ndarray) -> np.ndarray:
         poses.take(now)
         moment = poses.moment(now)
         assert moment is not None
-        found.append(moment.positions[0, 0] / SPEED)
+        (puppet,) = moment.puppets
+        found.append(puppet.positions[0, 0] / SPEED)
         angle = quaternion.angle_between(
-            moment.world[0], quaternion.from_axis_angle([0, 1, 0], TURN * found[-1]).astype(np.float32)
+            puppet.world[0], quaternion.from_axis_angle([0, 1, 0], TURN * found[-1]).astype(np.float32)
         )
         assert angle < 1e-3
     return np.array(found)
@@ -71,7 +73,7 @@ def test_nothing_before_the_first_frame_and_the_first_one_alone() -> None:
     assert poses.moment(9.0) is None and poses.newest is None
     poses.take(10.01)
     moment = poses.moment(10.01)
-    assert moment is not None and moment.positions[0, 0] / SPEED == pytest.approx(10.0, abs=1e-5)
+    assert moment is not None and moment.puppets[0].positions[0, 0] / SPEED == pytest.approx(10.0, abs=1e-5)
     assert moment.time_s == 10.0 and moment.trail_times == [10.0]
 
 
@@ -119,7 +121,7 @@ def test_the_trail_is_the_last_moments_newest_last() -> None:
     assert moment is not None
     assert moment.trail_times[-1] <= moment.time_s < moment.trail_times[-1] + TICK_S
     assert TRAIL_S - TICK_S < moment.time_s - moment.trail_times[0] <= TRAIL_S
-    for when, (positions, world) in zip(moment.trail_times, moment.trail, strict=True):
+    for when, (positions, world) in zip(moment.trail_times, moment.puppets[0].trail, strict=True):
         assert positions[0, 0] / SPEED == pytest.approx(when, abs=1e-5)
         assert world.shape == (2, 4)
 
@@ -147,8 +149,9 @@ def test_holds_grow_evenly_between_two_frames() -> None:
     for now in 10.2 + np.arange(0.0, 0.04, 0.001):
         poses.take(now)
         moment = poses.moment(now)
-        assert moment is not None and moment.holds is not None
-        assert moment.holds[0] == 0.0
-        held.append(float(moment.holds[1]))
+        assert moment is not None
+        holds = np.asarray(moment.puppets[0].holds)
+        assert holds[0] == 0.0
+        held.append(float(holds[1]))
     assert min(held) < 0.1 and max(held) > 0.9
     assert np.abs(np.diff(held)).max() < 0.06

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -18,7 +21,7 @@ ASPECTS = (16 / 9, 4 / 3, 9 / 16)
 
 def seen(moment: Moment, config: CameraConfig, aspect: float) -> tuple[View, np.ndarray]:
     """The view of a moment and where its joints are in the picture, -1 to 1."""
-    poses = poses_of(moment, HEIGHT, SOLE)
+    poses = poses_of(moment, moment.puppets[0], HEIGHT, SOLE)
     at = view(config, config, 1.0, moment.time_s, poses, aspect)
     joints = np.concatenate([poses.positions[0], np.ones((poses.positions.shape[1], 1))], axis=1)
     clip = joints @ at.projection.T
@@ -26,14 +29,18 @@ def seen(moment: Moment, config: CameraConfig, aspect: float) -> tuple[View, np.
     return at, clip[:, :2] / clip[:, 3:]
 
 
+def with_puppet(moment: Moment, **changes: Any) -> Moment:
+    return replace(moment, puppets=(replace(moment.puppets[0], **changes),))
+
+
 def travelled(moment: Moment, metres: float) -> Moment:
     """The same moment on its way across the stage at 4 m/s."""
     way = [(metres - 4.0 * (moment.time_s - time)) * np.array([1.0, 0.0, 0.3]) for time in moment.trail_times]
     trail = [
         ((positions + step).astype(np.float32), world)
-        for step, (positions, world) in zip(way, moment.trail, strict=True)
+        for step, (positions, world) in zip(way, moment.puppets[0].trail, strict=True)
     ]
-    return Moment(moment.time_s, trail[-1][0], moment.world, trail, moment.trail_times)
+    return with_puppet(moment, positions=trail[-1][0], trail=trail)
 
 
 @pytest.mark.parametrize("aspect", ASPECTS)
@@ -58,8 +65,8 @@ def test_no_joint_leaves_the_picture(dance: Recording, config: CameraConfig, asp
 def test_a_jump_of_the_phrase_is_still_in_the_picture(dance: Recording) -> None:
     """Where a phrase starts over the dancer is elsewhere from one tick to the next."""
     moment = moment_of(dance, 20.0)
-    far = (moment.positions + np.float32([3.0, 0.0, -2.0])).astype(np.float32)
-    jumped = Moment(moment.time_s, far, moment.world, moment.trail, moment.trail_times)
+    far = (moment.puppets[0].positions + np.float32([3.0, 0.0, -2.0])).astype(np.float32)
+    jumped = with_puppet(moment, positions=far)
     assert np.abs(seen(jumped, CameraConfig(), 16 / 9)[1]).max() < 1.0
 
 
@@ -75,7 +82,7 @@ def test_moves_softly(dance: Recording) -> None:
 
 
 def test_stands_where_its_time_says(dance: Recording) -> None:
-    poses = poses_of(moment_of(dance, 20.0), HEIGHT, SOLE)
+    poses = poses_of(moment_of(dance, 20.0), moment_of(dance, 20.0).puppets[0], HEIGHT, SOLE)
     orbit = CameraConfig(move="orbit", angle_deg=0.0, period_s=40.0)
     angles = [np.degrees(view(orbit, orbit, 1.0, at, poses, 1.5).azimuth) for at in (0.0, 10.0, 40.0)]
     assert angles == pytest.approx([0.0, 90.0, 360.0])
@@ -84,7 +91,7 @@ def test_stands_where_its_time_says(dance: Recording) -> None:
 
 
 def test_fades_from_place_to_place_the_short_way(dance: Recording) -> None:
-    poses = poses_of(moment_of(dance, 20.0), HEIGHT, SOLE)
+    poses = poses_of(moment_of(dance, 20.0), moment_of(dance, 20.0).puppets[0], HEIGHT, SOLE)
     before, now = CameraConfig(move="still", angle_deg=170.0), CameraConfig(move="still", angle_deg=-170.0)
     ends = [np.degrees(view(before, now, mix, 0.0, poses, 1.5).azimuth) for mix in (0.0, 0.5, 1.0)]
     assert ends == pytest.approx([170.0, 180.0, 190.0])
@@ -92,7 +99,7 @@ def test_fades_from_place_to_place_the_short_way(dance: Recording) -> None:
 
 def test_a_cue_moves_the_camera_whatever_the_look(dance: Recording) -> None:
     """Softly from the looks' own place, also while the look changes; what a cue leaves out stays."""
-    poses = poses_of(moment_of(dance, 20.0), HEIGHT, SOLE)
+    poses = poses_of(moment_of(dance, 20.0), moment_of(dance, 20.0).puppets[0], HEIGHT, SOLE)
     before, now = CameraConfig(move="still", angle_deg=10.0), CameraConfig(move="still", angle_deg=50.0)
     turns = []
     for mix in (0.0, 0.5, 1.0):

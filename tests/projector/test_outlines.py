@@ -27,8 +27,9 @@ PERIOD_S = 1 / 60
 def moved(moment: Moment, right_m: float) -> Moment:
     """The same moment a little further right, trail and all."""
     way = np.float32([right_m, 0.0, 0.0])
-    trail = [(positions + way, world) for positions, world in moment.trail]
-    return replace(moment, positions=moment.positions + way, trail=trail)
+    (one,) = moment.puppets
+    trail = [(positions + way, world) for positions, world in one.trail]
+    return replace(moment, puppets=(replace(one, positions=one.positions + way, trail=trail),))
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 
 from appliance.pose.recording import Recording
 from appliance.projector.interpolation import TICK_S
-from appliance.projector.moment import Moment
+from appliance.projector.moment import Moment, PuppetMoment
 from appliance.projector.picture.camera import view
 from appliance.projector.picture.poses import poses_of, together
 from appliance.projector.picture.renderer import Renderer
@@ -25,9 +25,10 @@ AT_S = 17.4
 
 def moved(moment: Moment, x: float, z: float) -> Moment:
     """The same dance with its root there on the stage, metres."""
-    step = (np.array([x, 0.0, z]) - moment.positions[0] * [1, 0, 1]).astype(np.float32)
-    trail = [(positions + step, world) for positions, world in moment.trail]
-    return replace(moment, positions=moment.positions + step, trail=trail)
+    (one,) = moment.puppets
+    step = (np.array([x, 0.0, z]) - one.positions[0] * [1, 0, 1]).astype(np.float32)
+    trail = [(positions + step, world) for positions, world in one.trail]
+    return replace(moment, puppets=(replace(one, positions=one.positions + step, trail=trail),))
 
 
 @pytest.mark.parametrize("aspect", [16 / 9, 9 / 16])
@@ -36,7 +37,7 @@ def test_the_camera_frames_all_of_them(dance: Recording, aspect: float, figures:
     stands = [(-0.9, 0.0), (0.9, 0.0), (-2.0, -1.5), (2.5, -1.5)][:figures]
     for time_s in (3.0, 17.4, 40.0):
         moments = [moved(moment_of(dance, time_s + place), *at) for place, at in enumerate(stands)]
-        poses = together([poses_of(moment, HEIGHT, SOLE) for moment in moments])
+        poses = together([poses_of(moment, moment.puppets[0], HEIGHT, SOLE) for moment in moments])
         for camera in (CameraConfig(), CameraConfig(move="orbit", figure=0.9, period_s=10.0)):
             seen = view(camera, camera, 1.0, time_s, poses, aspect)
             joints = np.concatenate([poses.positions[0], np.ones((poses.positions.shape[1], 1))], axis=1)
@@ -57,7 +58,7 @@ def test_each_look_draws_each_of_them_where_it_stands(
     left, right = (moved(moment_of(dance, AT_S), x, 0.0) for x in (-1.1, 1.1))
     with renderer(gl, dance.skeleton, {"it": look}) as made:
         free, of_left, of_right = (
-            picture(gl, made, replace(left, holds=first, others=(replace(right, holds=second),)))
+            picture(gl, made, replace(left, puppets=(holding(left, first), holding(right, second))))
             for first, second in ((None, None), (holds, None), (None, holds))
         )
     half = SIZE[0] // 2
@@ -72,18 +73,23 @@ def test_each_look_draws_each_of_them_where_it_stands(
 def test_all_of_them_are_interpolated_to_one_time() -> None:
     frames = []
     for tick in range(10):
-        first = frame(tick, 10.0 + tick * TICK_S, 10.004 + tick * TICK_S)
-        second = replace(first, positions=first.positions + np.float32(1.0), holds=first.holds * 0.5)
-        frames.append(replace(first, others=(second,)))
+        seen = frame(tick, 10.0 + tick * TICK_S, 10.004 + tick * TICK_S)
+        (one,) = seen.puppets
+        other = replace(one, positions=one.positions + np.float32(1.0), holds=one.holds * 0.5)
+        frames.append(replace(seen, puppets=(one, other)))
     poses = following(Ring(frames))
     poses.take(10.2)
     moment = poses.moment(10.13)
     assert moment is not None
-    (second,) = moment.others
-    assert second.positions == pytest.approx(moment.positions + 1.0)
-    assert second.holds == pytest.approx(0.5 * np.asarray(moment.holds))
-    assert moment.positions[0, 0] == pytest.approx(SPEED * moment.time_s, rel=1e-5)
-    assert second.trail_times == moment.trail_times and len(second.trail) == len(moment.trail)
+    one, other = moment.puppets
+    assert other.positions == pytest.approx(one.positions + 1.0)
+    assert other.holds == pytest.approx(0.5 * np.asarray(one.holds))
+    assert one.positions[0, 0] == pytest.approx(SPEED * moment.time_s, rel=1e-5)
+    assert len(other.trail) == len(one.trail) == len(moment.trail_times)
+
+
+def holding(moment: Moment, holds: np.ndarray | None) -> PuppetMoment:
+    return replace(moment.puppets[0], holds=holds)
 
 
 def picture(gl: moderngl.Context, made: Renderer, moment: Moment) -> np.ndarray:

@@ -50,7 +50,11 @@ def write_journal(path: Path, ticks: int = 100) -> Path:
 def test_ten_instants_side_by_side(tmp_path: Path, look: str) -> None:
     dance = swaying_phrase()
     out = render_strip(
-        tmp_path / "deep" / "strip.png", dance, looks_by_name(()), look, held_throughout(dance.poses, [2])
+        tmp_path / "deep" / "strip.png",
+        [dance],
+        looks_by_name(()),
+        look,
+        held_throughout(dance.poses, [2])[:, None],
     )
     assert Image.open(out).size == (COLUMNS * WIDTH, ROWS * HEIGHT)
     assert out.stat().st_size < LARGEST_BYTES
@@ -64,7 +68,7 @@ def test_ten_instants_side_by_side(tmp_path: Path, look: str) -> None:
 @pytest.mark.usefixtures("_small")
 def test_two_poses_give_two_pictures_and_black(tmp_path: Path) -> None:
     dance = swaying_phrase(0.04)
-    out = render_strip(tmp_path / "two.png", dance, looks_by_name(()), "plaster")
+    out = render_strip(tmp_path / "two.png", [dance], looks_by_name(()), "plaster")
     pictures = pictures_of(out)
     assert len(pictures) == COLUMNS
     assert pictures[0].max() > 150

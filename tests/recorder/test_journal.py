@@ -41,7 +41,7 @@ def test_every_tick_the_readings_and_the_figure_are_read_back(night: Night, tmp_
     night.dance(30)
     (run,) = read_journal(night.kept(tmp_path / "journal")).runs
     assert run.ticks["tick"].tolist() == list(range(100))
-    np.testing.assert_array_equal(run.ticks["pose"][-1, 0], night.tick.frames[0].pose)
+    np.testing.assert_array_equal(run.ticks["pose"][-1, 0], night.tick.frame.puppets[0].pose)
     np.testing.assert_array_equal(run.ticks["reading_here"][:, 0], [1] * 70 + [0] * 30)
     np.testing.assert_array_equal(run.ticks["reading_orientation"][69, 0], TURNED)
     assert run.header["hands"] == [WORN | {"puppet": 0, "kind": "sensor", "by": "orientation"}]

@@ -22,13 +22,14 @@ from appliance.box.orders import Order, OrderInbox
 from appliance.box.show_state import ShowStateReader
 from appliance.levers.addresses import Receiver
 from appliance.levers.status import STATUS, Status
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.puppet_facts import HandFacts, PuppetFacts
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show_control.packet import datagram
 from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
 from appliance.show_control.settings import Settings
 from tests.bundles import FIGURE
+from tests.outputs.small_stage import one_puppet
 
 HOST = "127.0.0.1"
 OF_PUPPET = {"coding", "interaction", "phrase", "base", "made", "position_s", "let_go"}
@@ -59,8 +60,7 @@ def facts(**changes: Any) -> Facts:
         "box_file": None,
         "show_name": "A test",
         "skeleton": FIGURE,
-        "held": (2,),
-        "hands": ("left-wrist",),
+        "puppets": (PuppetFacts(hands=(HandFacts(FIGURE.names[2], "left-wrist"),)),),
         "phrases": ("main", "quiet"),
         "cues": CUES,
         "looks": ("plaster", "lines", "ink", "cloud"),
@@ -95,14 +95,14 @@ class StageDouble:
         self.obeys = True
         self.answer: Callable[[Order], tuple[bool, str]] = lambda order: (True, f"{order.name} it is.")
         self.orders: list[Order] = []
-        self.told: dict[str, Any] = {"state": "dancing", "rate_hz": 50.0, "puppets": [{}]}
+        self.told: dict[str, Any] = {"state": "dancing", "rate_hz": 50.0, "puppets": [{"is_led": True}]}
         self.remark = ""
         self._show_state = ShowStateReader(folder)
         self._telling = threading.Lock()
         show = show or facts()
         self._writer = FrameWriter(folder, show)
         self._inbox = OrderInbox(folder, "stage")
-        self._frame = JointFrame(len(show.skeleton))
+        self._frame = one_puppet(len(show.skeleton))
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._live, daemon=True)
 

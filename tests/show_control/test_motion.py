@@ -93,7 +93,7 @@ def test_the_status_tells_what_is_danced_and_every_parameter() -> None:
     shown = facts(motion={"vary": {"sigma": 0.7, "seed": 3}})
     recipe = {"source": "vary", "sigma": 0.9, "seed": 4, "number": 1001, "prompt": "long"}
     for made, danced in (("", []), (json.dumps(recipe), [("source", "vary"), ("sigma", 0.9), ("seed", 4)])):
-        health = {"puppets": [{"made": made}]}
+        health = {"puppets": [{"is_led": True, "made": made}]}
         seen = SimpleNamespace(facts=shown, health=lambda health=health: health)
         observer = cast(StageObserver, seen)
         *answers, end = told("/motion", state, observer, Status(phrase="vary"), NOW)

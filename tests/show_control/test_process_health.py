@@ -12,13 +12,13 @@ from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.keeper import KeeperHealth
 from appliance.keeper.mirror import Mirror, Mirrored
 from appliance.keeper.records import mirrored_checkpoint, mirrored_sensor_memory
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 from appliance.release.trial import MirroredProof
 from appliance.show_control.stage_observer import StageObserver
 from tests.bundles import FIGURE
+from tests.outputs.small_stage import one_puppet
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts, until
 
 DMX = Fallback("dmx-away", "A wire is away.")
@@ -127,7 +127,7 @@ def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
 
 def test_a_stage_that_hangs_is_counted_once(folder: Path) -> None:
     writer = FrameWriter(folder, facts())
-    frame = JointFrame(len(FIGURE))
+    frame = one_puppet(len(FIGURE))
     frame.frame_time = time.monotonic()
     writer.write(frame)
     sight = StageObserver(folder)
@@ -142,7 +142,7 @@ def test_a_stage_that_hangs_is_counted_once(folder: Path) -> None:
 
 
 def test_a_stage_is_not_absent_for_who_was_held_up_between_its_clock_and_its_look(folder: Path) -> None:
-    writer, frame = FrameWriter(folder, facts()), JointFrame(len(FIGURE))
+    writer, frame = FrameWriter(folder, facts()), one_puppet(len(FIGURE))
     frame.frame_time = time.monotonic()
     writer.write(frame)
     sight = StageObserver(folder)

@@ -22,6 +22,7 @@ from appliance.show_control.figure_pose import FigurePose
 from appliance.show_control.vmc_input import BONE, ROOT, VmcInput
 from hw_sim.osc_receiver import OscReceiver, Received
 from tests.outputs.conftest import fill
+from tests.outputs.small_stage import one_puppet, stand
 from tests.show_control.doubles import FIGURE, HOST, Asker, ControlInThread, StageDouble, facts
 from tests.system.processes import wait_until
 
@@ -51,8 +52,8 @@ def sent(frame: JointFrame) -> list[Received]:
 
 
 def standing(frame: JointFrame, root: Sequence[float]) -> JointFrame:
-    frame.root[:] = root
-    frame.positions[:], frame.world[:] = FIGURE.forward_kinematics(frame.pose, frame.root)
+    frame.puppets[0].root[:] = root
+    stand(frame, FIGURE)
     return frame
 
 
@@ -63,7 +64,7 @@ def test_the_boxs_own_vmc_comes_back_as_the_same_dance(
     client = SimpleUDPClient(HOST, control.port)
     with closing(LivePoseReader(folder)) as reader:
         for seed in (1, 2):
-            frame = fill(JointFrame(len(FIGURE)), FIGURE, seed)
+            frame = fill(one_puppet(len(FIGURE)), FIGURE, seed)
             for _ in range(2):  # of the first frame nobody knows where it ends
                 for _, address, arguments in sent(frame):
                     client.send_message(address, arguments)
@@ -74,8 +75,9 @@ def test_the_boxs_own_vmc_comes_back_as_the_same_dance(
                     return None
                 turned = np.frombuffer(heard.rotations, np.float32).reshape(-1, 4)
                 positions, world = FIGURE.forward_kinematics(turned, np.array(heard.root, np.float32))
-                is_same = float(quaternion.angle_between(world, frame.world).max()) < 2e-3
-                return heard if is_same and np.allclose(positions, frame.positions, atol=1e-4) else None
+                is_same = float(quaternion.angle_between(world, frame.puppets[0].world).max()) < 2e-3
+                is_same &= np.allclose(positions, frame.puppets[0].positions, atol=1e-4)
+                return heard if is_same else None
 
             wait_until(same, "the dance did not come back", pause=lambda: None)
 

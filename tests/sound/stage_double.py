@@ -16,7 +16,10 @@ class StageDouble:
 
     def __init__(self, directory: Path) -> None:
         cues = ({"name": "strings", "fade_s": 2.0},)
-        self.facts, self.generation = SimpleNamespace(show_directory=directory, cues=cues), 1
+        self.facts, self.generation = (
+            SimpleNamespace(show_directory=directory, cues=cues, led_in=lambda frame: frame),
+            1,
+        )
         self.number, self.lives = 0, True
 
     def newest(self, now: float) -> Any:

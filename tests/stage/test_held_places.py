@@ -60,11 +60,11 @@ def test_the_network_is_given_the_place_and_the_weight_of_one_pass(night: Night)
     night.dance(60)
     assert given(night) == pytest.approx(PLACE, abs=5e-3)
     assert row.place_weights.tolist() == [float(joint == ARM) for joint in MOVING]
-    assert night.tick.frames[0].holds[FIGURE.index(ARM)] == 1.0
+    assert night.tick.frame.puppets[0].holds[FIGURE.index(ARM)] == 1.0
     night.order("release", text=ARM)
     night.dance(60)
     assert not row.place_weights.any()
-    assert night.tick.frames[0].holds[FIGURE.index(ARM)] == 0.0
+    assert night.tick.frame.puppets[0].holds[FIGURE.index(ARM)] == 0.0
 
 
 def test_one_joint_goes_to_a_place_with_a_hands_orientation(tmp_path: Path) -> None:
@@ -114,17 +114,17 @@ def test_a_turned_puppet_has_the_place_in_the_room(tmp_path: Path) -> None:
 
 def test_the_hips_go_to_their_place_with_the_feet_on_the_floor(night: Night) -> None:
     night.dance(20)
-    begun = night.tick.frames[0].root.copy()
+    begun = night.tick.frame.puppets[0].root.copy()
     night.order("place", 0.4, 0.3, -0.3, text="Hips")
     roots = []
     for _ in range(200):
         night.dance(1)
-        roots.append(night.tick.frames[0].root.copy())
+        roots.append(night.tick.frame.puppets[0].root.copy())
         assert not night.parts.led.puppet.place_weights.any()
     assert roots[-1][[0, 2]] == pytest.approx([0.4, -0.3], abs=0.02)
     assert roots[-1][1] == pytest.approx(begun[1], abs=0.05)  # the height is the legs'
     assert np.linalg.norm(np.diff(roots, axis=0), axis=1).max() < 0.03
-    assert night.tick.frames[0].holds[FIGURE.index("Hips")] == 1.0
+    assert night.tick.frame.puppets[0].holds[FIGURE.index("Hips")] == 1.0
 
 
 def test_a_night_with_places_dances_again_bit_for_bit(night: Night, tmp_path: Path) -> None:

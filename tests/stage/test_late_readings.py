@@ -70,7 +70,7 @@ def test_the_frame_carries_the_late_reading(parts: StageParts, radio: Radio) -> 
     run(tick, 2)
     thread.join()
     assert [one.sequence for one in tick.readings] == [radio.wearable.sequence]
-    assert tick.frames[0].sensor_sequence == radio.wearable.sequence
+    assert tick.frame.sensor_sequence == radio.wearable.sequence
     assert tick.waited_s > 0.0
 
 
@@ -83,7 +83,7 @@ def test_the_wait_is_no_cost_of_the_tick(parts: StageParts, radio: Radio) -> Non
     assert tick.waited_s >= 0.19
     took_s = time.monotonic() - now
     assert tick.after(Slot(2, now, now)) <= 1000.0 * (took_s - tick.waited_s) + 1.0
-    assert tick.frames[0].sensor_sequence == radio.wearable.sequence  # still the one before
+    assert tick.frame.sensor_sequence == radio.wearable.sequence  # still the one before
 
 
 def test_a_sensor_that_fell_silent_is_not_waited_for(parts: StageParts, radio: Radio) -> None:
@@ -118,5 +118,5 @@ def test_packets_of_others_do_not_end_the_wait(parts: StageParts, link: SensorLi
     thread.start()
     run(tick, 3)
     thread.join()
-    assert tick.frames[0].sensor_sequence == radio.wearable.sequence
+    assert tick.frame.sensor_sequence == radio.wearable.sequence
     assert link.counts["duplicate"] == 1

@@ -63,7 +63,7 @@ class Stream(LivePoseReader):
 
 
 def angle_of(night: Night) -> float:
-    return float(quaternion.angle_between(night.tick.frames[0].pose[2], quaternion.IDENTITY))
+    return float(quaternion.angle_between(night.tick.frame.puppets[0].pose[2], quaternion.IDENTITY))
 
 
 def with_a_guest(night: Night) -> None:

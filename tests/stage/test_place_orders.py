@@ -71,8 +71,8 @@ def test_what_a_hand_does_not_give_is_refused_in_words(parts: StageParts) -> Non
 def test_other_processes_know_which_joints_are_held_by_place(tmp_path: Path) -> None:
     show = load_show(write_show(tmp_path / "show", HANDS))
     facts = facts_of(show, None, ITERATIONS, 0.0)
-    assert [facts.hands[hand] for hand in facts.by_position] == ["osc"]
-    assert [show.skeleton.names[facts.held[hand]] for hand in facts.by_position] == ["lShldr"]
+    by_position = [hand for hand in facts.led.hands if hand.by == "position"]
+    assert [(hand.source, hand.joint) for hand in by_position] == [("osc", "lShldr")]
     assert facts.trackers == {"wrist": ["lShldr"]}
     again = type(facts).unpacked(facts.packed())
-    assert (again.by_position, again.trackers) == (facts.by_position, facts.trackers)
+    assert (again.puppets, again.trackers) == (facts.puppets, facts.trackers)

@@ -105,7 +105,7 @@ def test_a_stop_and_a_late_tick_hold_all_of_them(night: Night) -> None:
     night.dance(10)
     before = [puppet.motion.position_s for puppet in night.parts.puppets]
     night.dance(1, late_s=0.012)
-    assert all(puppet.frame.late and puppet.frame.tick == 10 for puppet in night.parts.puppets)
+    assert night.tick.frame.late and night.tick.frame.tick == 10
     assert [puppet.motion.position_s for puppet in night.parts.puppets] == before
     night.command("/player/rate", 0.5)
     assert {puppet.motion.rate for puppet in night.parts.puppets} == {0.5}
@@ -170,10 +170,12 @@ def test_the_shared_frame_has_room_for_them(night: Night, tmp_path: Path) -> Non
     night.dance(5, reading(STILL))
     reader = FrameReader(tmp_path / "run", lambda: 1000.0)
     seen = reader.newest(1000.0)
-    assert reader.facts is not None and reader.facts.puppets == ("left", "right", "late", "slow")
-    assert seen is not None and len(seen.others) == 3
-    for frame, puppet in zip((seen, *seen.others), night.parts.puppets, strict=True):
-        assert frame.tick == 4
+    assert reader.facts is not None and [one.name for one in reader.facts.puppets] == [
+        *("left", "right", "late", "slow")
+    ]
+    assert seen is not None and seen.tick == 4
+    assert reader.facts.led.name == "left" and reader.facts.led_in(seen) is seen.puppets[0]
+    for frame, puppet in zip(seen.puppets, night.parts.puppets, strict=True):
         for name in ("pose", "world", "positions", "root", "holds"):
             assert np.array_equal(getattr(frame, name), getattr(puppet.frame, name)), name
     writer.close()

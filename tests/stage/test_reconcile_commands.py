@@ -34,7 +34,7 @@ def danced(tick: Tick, ticks: int, begin: int = 0) -> np.ndarray:
     for number in range(begin, begin + ticks):
         slot = Slot(number, 10 + 0.02 * number, 10 + 0.02 * number, 0)
         tick.run(slot)
-        poses.append(tick.frames[0].pose.copy())
+        poses.append(tick.frame.puppets[0].pose.copy())
         tick.after(slot)
     return np.array(poses)
 

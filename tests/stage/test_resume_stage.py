@@ -36,7 +36,9 @@ def test_the_whole_stage_goes_on_where_it_was(show: Show, box: BoxConfig) -> Non
         assert again.parts.led.motion.position_s == pytest.approx(was_at_s, abs=1e-3)
         assert any("After a restart of the stage the show goes on at" in words for words in said)
         # The figure stands where it stood: no step through the room.
-        np.testing.assert_allclose(again.tick.frames[0].root, stage.tick.frames[0].root, atol=0.02)
+        np.testing.assert_allclose(
+            again.tick.frame.puppets[0].root, stage.tick.frame.puppets[0].root, atol=0.02
+        )
         again.dance(0.1, lambda: False)
     fresh = Stage(show, box, said.append)  # that one ended as it should
     with closing(fresh):

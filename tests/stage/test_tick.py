@@ -99,9 +99,9 @@ def test_a_worn_sensor_turns_its_joint_and_the_frame_names_the_reading(
 ) -> None:
     tick = stage()
     dance(tick, range(60), heard=TURNED)
-    assert tick.frames[0].sensor_sequence == 59
-    assert tick.frames[0].sensor_arrival == pytest.approx(100.0 + 59 * TICK_S - 0.001)
-    assert quaternion.angle_between(tick.frames[0].pose[SHOULDER], LEANS) < 0.01
+    assert tick.frame.sensor_sequence == 59
+    assert tick.frame.sensor_arrival == pytest.approx(100.0 + 59 * TICK_S - 0.001)
+    assert quaternion.angle_between(tick.frame.puppets[0].pose[SHOULDER], LEANS) < 0.01
     assert frames(receiver)[-1][2] == 59
 
 
@@ -110,7 +110,7 @@ def test_a_frame_says_how_firmly_each_joint_is_held(stage: Callable[..., Tick]) 
     held = []
     for number in range(180):
         dance(tick, range(number, number + 1), heard=TURNED if 20 <= number < 80 else None)
-        held.append(tick.frames[0].holds.copy())
+        held.append(tick.frame.puppets[0].holds.copy())
     weights = np.array(held)
     assert not np.delete(weights, SHOULDER, axis=1).any()
     of_hand = weights[:, SHOULDER]
@@ -123,7 +123,7 @@ def test_a_frame_says_how_firmly_each_joint_is_held(stage: Callable[..., Tick]) 
 def test_the_neutral_orientation_of_a_sensor_means_the_rest_pose(stage: Callable[..., Tick]) -> None:
     tick = stage(hands=[{"sensor": "left-wrist", "joint": "lShldr", "neutral": list(TURNED)}])
     dance(tick, range(60), heard=TURNED)
-    assert quaternion.angle_between(tick.frames[0].pose[SHOULDER], quaternion.IDENTITY) < 0.01
+    assert quaternion.angle_between(tick.frame.puppets[0].pose[SHOULDER], quaternion.IDENTITY) < 0.01
 
 
 def test_a_neutral_pose_taken_in_stillness_leads_the_joint_over(stage: Callable[..., Tick]) -> None:
@@ -132,7 +132,7 @@ def test_a_neutral_pose_taken_in_stillness_leads_the_joint_over(stage: Callable[
     shown = []
     for number in range(110):
         dance(tick, range(number, number + 1), heard=TURNED)
-        shown.append(tick.frames[0].pose[SHOULDER].copy())
+        shown.append(tick.frame.puppets[0].pose[SHOULDER].copy())
     assert quaternion.angle_between(shown[70], quaternion.IDENTITY) < 0.01  # turned up from hanging
     assert quaternion.angle_between(shown[-1], np.array(hanging)) < 0.01
     steps = quaternion.angle_between(np.array(shown[61:]), np.array(shown[60:-1]))
@@ -161,20 +161,20 @@ def test_a_late_tick_does_not_claim_the_reading_that_it_could_not_show(stage: Ca
     tick = stage()
     dance(tick, range(10), heard=TURNED)
     dance(tick, range(10, 11), late_s=0.006, heard=TURNED)
-    assert tick.frames[0].sensor_sequence == 9
+    assert tick.frame.sensor_sequence == 9
     dance(tick, range(11, 12))
-    assert tick.frames[0].sensor_sequence == 10
+    assert tick.frame.sensor_sequence == 10
 
 
 def test_a_network_that_gives_no_numbers_holds_the_last_good_pose(
     stage: Callable[..., Tick], receiver: OscReceiver
 ) -> None:
     tick = stage("broken")
-    first = tick.frames[0].pose.copy()
+    first = tick.frame.puppets[0].pose.copy()
     dance(tick, range(20), heard=TURNED)
     assert tick.network_failed
-    assert np.isfinite(tick.frames[0].pose).all()
-    np.testing.assert_array_equal(tick.frames[0].pose, first)
+    assert np.isfinite(tick.frame.puppets[0].pose).all()
+    np.testing.assert_array_equal(tick.frame.puppets[0].pose, first)
     assert np.isfinite(poses(receiver)).all()
 
 

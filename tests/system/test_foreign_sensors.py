@@ -87,7 +87,7 @@ def test_programs_hold_joints_as_wearables_do(tmp_path: Path) -> None:
             if frame is None:
                 return False
             wanted = quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), radians)
-            return float(quaternion.angle_between(frame.pose[joint], wanted)) < 0.02
+            return float(quaternion.angle_between(frame.puppets[0].pose[joint], wanted)) < 0.02
 
         with contextlib.ExitStack() as programs:
             for made, port in zip((gyrosc, slimevr, mocopi), ports, strict=True):

@@ -75,7 +75,8 @@ def await_elbow(box: Box, reader: FrameReader, radians: float) -> None:
         frame = reader.newest(time.monotonic())
         if frame is None:
             return False
-        return abs(float(quaternion.angle_between(frame.pose[ELBOW], quaternion.IDENTITY)) - radians) < 0.01
+        turned = float(quaternion.angle_between(frame.puppets[0].pose[ELBOW], quaternion.IDENTITY))
+        return abs(turned - radians) < 0.01
 
     wait_until(has_it, lambda: box.words)
 

@@ -10,11 +10,11 @@ import pytest
 from appliance.cli import preflight as commands
 from appliance.cli.preflight import preflight
 from appliance.cli.run_with_timeout import run_with_timeout
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN
 from appliance.release.trial import MirroredProof, pair_to_dance
 from tests.bundles import FIGURE
+from tests.outputs.small_stage import one_puppet
 from tests.show_control.doubles import facts
 from tests.system.box_folders import Machine, late
 
@@ -52,7 +52,7 @@ def dance_for_long(machine: Machine) -> None:
     """Let the keeper see the chosen show dance."""
     now = time.monotonic()
     shown = facts(started=now - 60.0, show_directory=machine.choice.first.show.resolve())
-    writer, frame = FrameWriter(machine.run, shown), JointFrame(len(FIGURE))
+    writer, frame = FrameWriter(machine.run, shown), one_puppet(len(FIGURE))
     frame.frame_time = now
     writer.write(frame)
     proof = MirroredProof(machine.run, machine.run / CHOSEN)

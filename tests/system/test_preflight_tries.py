@@ -13,11 +13,11 @@ from appliance.box.durable import alone_in
 from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.keeper.mirror import Mirror
 from appliance.keeper.mirror_process import MirrorProcess
-from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN, Choice, Pair
 from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
 from tests.bundles import FIGURE, write_show
+from tests.outputs.small_stage import one_puppet
 from tests.show_control.doubles import facts
 from tests.system.box_folders import choice_in
 from tests.system.processes import run, wait_until
@@ -70,7 +70,7 @@ class Evening:
         directory = self.choice.first.show.resolve()
         started = {"pid": os.getpid(), "started": now - seconds, "rehearsal": rehearsal}
         writer = FrameWriter(self.run, facts(show_directory=directory, **started))
-        frame = JointFrame(len(FIGURE))
+        frame = one_puppet(len(FIGURE))
         frame.frame_time = now
         writer.write(frame)
 

@@ -34,8 +34,7 @@ def test_readers_get_frames_facts_and_health(show: Path, tmp_path: Path) -> None
         facts = reader.facts
         assert facts is not None and facts.pid == box.process.pid and facts.skeleton.names == FIGURE.names
         assert facts.show_directory == show and facts.box_file == tmp_path / "box.yaml"
-        assert facts.hands == ("left-wrist",)
-        assert [facts.skeleton.names[joint] for joint in facts.held] == ["lShldr"]
+        assert [tuple(hand) for hand in facts.led.hands] == [("lShldr", "left-wrist", "orientation")]
 
         sent = {frame[0]: frame for frame in box.frames(100)}
         seen = reader.frames(50, time.monotonic())

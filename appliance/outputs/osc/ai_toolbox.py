@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.outputs.axes import turn_of
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.osc.kinematics import KINEMATICS, Kinematics
 from appliance.outputs.osc.template import message, single
 from appliance.pose import quaternion
@@ -46,19 +46,19 @@ class AiToolbox:
             for name, place in zip(config.messages, self._template.places, strict=True)
         ]
 
-    def encode(self, frame: JointFrame) -> Sequence[memoryview]:
+    def encode(self, frame: JointFrame, puppet: PuppetFrame) -> Sequence[memoryview]:
         """Datagrams of this frame; the same buffers each time."""
         layout, kinematics = self._layout, self._kinematics
         if kinematics is not None and not frame.late:  # a late frame repeats the numbers before it
-            turned = layout.rotations(frame.world, "rot_world")
-            kinematics.take_frame(layout.positions(frame), turned, frame.frame_time)
+            turned = layout.rotations(puppet.world, "rot_world")
+            kinematics.take_frame(layout.positions(puppet), turned, frame.frame_time)
         for name, numbers in self._lists:
             if kinematics is not None and name in KINEMATICS:
                 numbers[...] = kinematics.lists[name]
             elif name.startswith("pos"):
-                numbers[...] = layout.positions(frame) if name == "pos_world" else layout.offsets(frame)
+                numbers[...] = layout.positions(puppet) if name == "pos_world" else layout.offsets(puppet)
             else:
-                turned = layout.rotations(frame.pose if name == "rot_local" else frame.world, name)
+                turned = layout.rotations(puppet.pose if name == "rot_local" else puppet.world, name)
                 if name == "rot":
                     numbers[...] = _radians(turned)
                 else:
@@ -91,17 +91,17 @@ class _Layout:
         self._spin = turn * np.float32(round(float(np.linalg.det(turn))))  # an axis turns back in a mirror
         self._scale = np.float32(config.scale)
 
-    def positions(self, frame: JointFrame) -> Floats:
+    def positions(self, puppet: PuppetFrame) -> Floats:
         """(R, 3): in the world."""
-        found = frame.positions if self._is_plain else frame.positions[self.rows]
+        found = puppet.positions if self._is_plain else puppet.positions[self.rows]
         if len(self._tips):
-            found[self._is_end] += quaternion.rotate(frame.world[self.rows[self._is_end]], self._tips)
+            found[self._is_end] += quaternion.rotate(puppet.world[self.rows[self._is_end]], self._tips)
         return self._placed(found)
 
-    def offsets(self, frame: JointFrame) -> Floats:
+    def offsets(self, puppet: PuppetFrame) -> Floats:
         """(R, 3): relative to the parent joint."""
         found = self._offsets.copy()
-        found[self._roots] = frame.positions[self.rows[self._roots]]
+        found[self._roots] = puppet.positions[self.rows[self._roots]]
         return self._placed(found)
 
     def rotations(self, turned: Floats, name: str) -> Floats:

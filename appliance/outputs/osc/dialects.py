@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.osc.ai_toolbox import AiToolbox
 from appliance.outputs.osc.features import Features
 from appliance.outputs.osc.joint import Joint
@@ -15,10 +15,10 @@ from appliance.show.osc import OscConfig
 
 
 class Encoder(Protocol):
-    """Turns joint frames into datagrams, always into the same buffers."""
+    """Turns the frames of one puppet into datagrams, always into the same buffers."""
 
-    def encode(self, frame: JointFrame) -> Sequence[memoryview]:
-        """Datagrams of this frame, valid until the next call."""
+    def encode(self, frame: JointFrame, puppet: PuppetFrame) -> Sequence[memoryview]:
+        """Datagrams of this puppet in this frame, valid until the next call."""
         ...
 
 

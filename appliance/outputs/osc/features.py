@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.motion_features import MotionFeatures
 from appliance.outputs.osc.template import message, single
 from appliance.pose.skeleton import Skeleton
@@ -29,10 +29,10 @@ class Features:
             [*lists, *(message(f"{whole}/{name}", floats=len(values)) for name, values in numbers)]
         )
 
-    def encode(self, frame: JointFrame) -> Sequence[memoryview]:
+    def encode(self, frame: JointFrame, puppet: PuppetFrame) -> Sequence[memoryview]:
         """Datagrams of this frame; the same buffers each time."""
         features, template = self._features, self._template
-        if not frame.late and features.take_frame(frame.positions, frame.frame_time):
+        if not frame.late and features.take_frame(puppet.positions, frame.frame_time):
             for values, place in zip(
                 [*features.derived, *features.numbers.values()], template.places, strict=True
             ):

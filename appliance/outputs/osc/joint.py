@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.osc.template import address_part, bundles, message
 from appliance.pose.skeleton import Skeleton
 
@@ -28,8 +28,8 @@ class Joint:
         self._rotations = np.stack(self._template.places[0::2])
         self._positions = np.stack(self._template.places[1::2])
 
-    def encode(self, frame: JointFrame) -> Sequence[memoryview]:
+    def encode(self, frame: JointFrame, puppet: PuppetFrame) -> Sequence[memoryview]:
         """Datagrams of this frame; the same buffers each time."""
-        self._template.numbers[self._rotations] = frame.pose
-        self._template.numbers[self._positions] = frame.positions
+        self._template.numbers[self._rotations] = puppet.pose
+        self._template.numbers[self._positions] = puppet.positions
         return self._template.datagrams

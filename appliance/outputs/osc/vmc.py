@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.outputs.osc.template import bundles, message
 from appliance.pose import quaternion
@@ -70,15 +70,15 @@ class Vmc:
         self._rotation_places = np.stack(bone_places)[:, _WXYZ_IN_MESSAGE]
         self._first_time: float | None = None
 
-    def encode(self, frame: JointFrame) -> Sequence[memoryview]:
+    def encode(self, frame: JointFrame, puppet: PuppetFrame) -> Sequence[memoryview]:
         """Datagrams of this frame; the same buffers each time."""
         if self._first_time is None:
             self._first_time = frame.frame_time
-        np.take(frame.pose, self._joints, axis=0, out=self._rotations)
-        self._rotations[0] = frame.world[self._hips]
-        self._positions[0] = frame.positions[self._hips] * _MIRRORED_POSITION
+        np.take(puppet.pose, self._joints, axis=0, out=self._rotations)
+        self._rotations[0] = puppet.world[self._hips]
+        self._positions[0] = puppet.positions[self._hips] * _MIRRORED_POSITION
         if len(self._folded):
-            self._fold(frame)
+            self._fold(puppet)
         if self._counts_from_rest:
             self._rotations[:] = quaternion.multiply(
                 self._above_at_rest, quaternion.multiply(self._rotations, self._back_to_rest)
@@ -90,11 +90,11 @@ class Vmc:
         numbers[self._rotation_places] = self._rotations
         return self._template.datagrams
 
-    def _fold(self, frame: JointFrame) -> None:
+    def _fold(self, puppet: PuppetFrame) -> None:
         """Bones whose parent joint has no Unity name: through the world into the frame of the bone above."""
-        from_world = quaternion.inverse(frame.world[self._folded_above])
-        reach = frame.positions[self._folded_joints] - frame.positions[self._folded_above]
-        self._rotations[self._folded] = quaternion.multiply(from_world, frame.world[self._folded_joints])
+        from_world = quaternion.inverse(puppet.world[self._folded_above])
+        reach = puppet.positions[self._folded_joints] - puppet.positions[self._folded_above]
+        self._rotations[self._folded] = quaternion.multiply(from_world, puppet.world[self._folded_joints])
         reach = quaternion.rotate(quaternion.multiply(self._above_at_rest[self._folded], from_world), reach)
         self._positions[self._folded] = reach * _MIRRORED_POSITION
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.body.skinning import BodyMesh, dual_quaternions
-from appliance.projector.moment import Moment
+from appliance.projector.moment import Moment, PuppetMoment
 
 ROWS = 48
 ROW_S = 0.025  # from one row to the next; 48 of them reach 1.175 s back
@@ -59,14 +59,14 @@ def together(poses: Sequence[Poses]) -> Poses:
     return Poses(np.concatenate(positions, axis=1), np.concatenate(world, axis=1), len(poses))
 
 
-def poses_of(moment: Moment, height: float, sole: float) -> Poses:
-    """A moment's trail at even ages; height: the figure's, metres; sole: skin below the lowest joint, metres.
+def poses_of(moment: Moment, puppet: PuppetMoment, height: float, sole: float) -> Poses:
+    """A puppet's trail at even ages; height: the figure's, metres; sole: skin below the lowest joint, metres.
 
     Ages that the trail does not reach show its oldest pose.
     """
     times = np.array([*moment.trail_times, moment.time_s])
-    positions = np.stack([*(at for at, _ in moment.trail), moment.positions])
-    world = np.stack([*(turn for _, turn in moment.trail), moment.world])
+    positions = np.stack([*(at for at, _ in puppet.trail), puppet.positions])
+    world = np.stack([*(turn for _, turn in puppet.trail), puppet.world])
     at = np.clip(moment.time_s - ROW_S * np.arange(ROWS), times[0], times[-1])
     after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
     step = np.maximum(times[after] - times[after - 1], 1e-9)

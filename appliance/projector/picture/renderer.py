@@ -73,13 +73,12 @@ class Renderer:
         first = next(iter(self._looks.values()))
         now, before = self._looks.get(look, first), self._looks.get(look_before, first)
         easel = self._easel
-        figures = (moment, *moment.others)
-        each = [poses_of(one, easel.height, easel.sole) for one in figures]
+        each = [poses_of(moment, puppet, easel.height, easel.sole) for puppet in moment.puppets]
         poses = together(each)
         wall = target if isinstance(target, Wall) else flat(target)
         seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect, cued)
         scene = Scene(moment.time_s, seen, poses, wall.aspect)
-        easel.show(each, [one.holds for one in figures])
+        easel.show(each, [puppet.holds for puppet in moment.puppets])
         layers = [(before, 1.0), (now, mix)] if 0.0 < mix < 1.0 else [(now if mix > 0 else before, 1.0)]
         for layer, opacity in layers:
             self._styles[layer.style].draw(scene, layer, opacity, wall)
