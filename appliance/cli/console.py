@@ -28,6 +28,7 @@ from appliance.cli.page_address import address, address_of, open_console_port
 from appliance.cli.phones import offer_phones, out_of_phones_reach, phone_names
 from appliance.console.devices import Devices
 from appliance.console.settings import WHERE, Settings
+from appliance.console.update import pending_code
 from appliance.show.config_error import NotAskedForError, Problem
 from appliance.stage.stage_error import StageError
 
@@ -157,7 +158,9 @@ def card_lines(box: BoxConfig) -> tuple[str, ...]:
     """For the projector's test card: address and PIN of the page that runs here; nothing without one."""
     try:
         kept, host, port, https = (runtime_of(box) / WHERE).read_text().splitlines()
-        return f"page {address(host, int(port), bool(https))}", f"pin {Devices(Path(kept)).pin}"
+        code = pending_code(runtime_of(box))
+        update = (f"update code {code}",) if code else ()
+        return f"page {address(host, int(port), bool(https))}", f"pin {Devices(Path(kept)).pin}", *update
     except (OSError, ValueError, StageError):
         return ()
 

@@ -39,6 +39,7 @@ from appliance.console.night import Night
 from appliance.console.phones import Phones
 from appliance.console.pose_map import PoseMap
 from appliance.console.prove import Prove
+from appliance.console.proving import Proving
 from appliance.console.rehearsed import FOLDER, ZIP, Rehearsed
 from appliance.console.report import send, settings_in, watch
 from appliance.console.rig import Rig
@@ -47,6 +48,7 @@ from appliance.console.sensor_changes import SensorChanges
 from appliance.console.server import Server
 from appliance.console.settings import WHERE, Settings
 from appliance.console.stage_view import StageView
+from appliance.console.update import Update
 from appliance.console.venue import Venue
 from appliance.console.watchers import Watchers
 
@@ -90,7 +92,8 @@ async def _serve(settings: Settings) -> int:
     hands, rig = Hands(guard, desk, folder), Rig(folder)
     phones = Phones(guard, door, settings.phones, folder, fallbacks)
     others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes(), *phones.routes()]
-    others += [*night.routes(), *helping.routes()]
+    update = Update(guard, folder, settings.is_installed, Proving(folder).show_goes)
+    others += [*night.routes(), *helping.routes(), *update.routes()]
     others += certificate.routes(Path(settings.kept).parent)
     named = ("--box", settings.box["box"]) if "box" in settings.box else ()
     others += SensorChanges(guard, stage, named).routes()

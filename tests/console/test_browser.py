@@ -176,6 +176,21 @@ def test_nothing_comes_from_elsewhere_and_little_comes_at_all(
     assert 0 < transferred <= MOST_TRANSFER
 
 
+TRANSLATED = "async (said) => (await import('/words.js')).translated(said)"
+ANSWERS = [  # as the box gives them: with values, several in one answer, and one that no table has
+    (
+        "Sensor left-wrist is silent. Switch it on, and look at its battery.",
+        "Sensor left-wrist schweigt. Einschalten und den Akku ansehen.",
+    ),
+    (
+        "91 degrees C. It slows itself down now: frames come late.",
+        "91 Grad C. Sie bremst sich gerade: Bilder kommen verspätet.",
+    ),
+    ("The show goes on. A sentence of next year.", "Die Show läuft. A sentence of next year."),
+    ("sensor left-wrist", "Sensor left-wrist"),
+]
+
+
 def test_it_speaks_german_to_a_german_phone(browser: Browser, venue: tuple[Box, Page]) -> None:
     context = browser.new_context(**PHONE, locale="de-AT")
     context.set_default_timeout(PATIENCE_MS)
@@ -183,6 +198,8 @@ def test_it_speaks_german_to_a_german_phone(browser: Browser, venue: tuple[Box, 
     tab.goto(venue[1].origin)
     expect(tab.locator("#panic")).to_have_text("PANIK")
     expect(tab.locator("html")).to_have_attribute("lang", "de")
+    for said, german in ANSWERS:
+        assert tab.evaluate(TRANSLATED, said) == german
     tab.tap('[data-page="device"]')
     tab.tap("#languages >> text=English")
     expect(tab.locator("#panic")).to_have_text("PANIC")

@@ -68,7 +68,9 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     programs = (
         "/usr/sbin/nft",
         "/usr/bin/systemctl",
+        "/usr/bin/mv",
         "/usr/bin/rm",
+        "/usr/bin/systemd-run",
         "/usr/bin/systemd-tmpfiles",
         "/bin/bash",
         "/usr/local/sbin/bunraku-install",
@@ -169,8 +171,9 @@ def test_the_keeper_outlasts_an_orderly_end_of_all_others() -> None:
 
 def test_the_target_starts_everything_that_is_there_at_power_on() -> None:
     wanted = re.findall(r"^Wants=(.*)$", (UNITS / "bunraku.target").read_text(), re.MULTILINE)
-    started_by_others = {"bunraku-anew.service", "bunraku-prove.service", "bunraku-stick.service"}
-    assert set(wanted) == set(SERVICES) - started_by_others | {"bunraku-anew.path", "bunraku-prove.path"}
+    by_paths = {f"bunraku-{name}" for name in ("anew", "prove", "update")}
+    started_by_others = {f"{name}.service" for name in by_paths} | {"bunraku-stick.service"}
+    assert set(wanted) == set(SERVICES) - started_by_others | {f"{name}.path" for name in by_paths}
 
 
 @pytest.mark.parametrize("name", SERVICES)

@@ -23,10 +23,18 @@ export async function goOn() {
 
 export function showCues(value) {
   const cue = value.status?.cue ?? "";
-  if (cue !== current) standby = null;
+  const isNew = cue !== current;
+  if (isNew) standby = null;
   [cues, current] = [value.cues, cue];
   for (const id of ["cues-part", "go", "now"]) byId(id).hidden = cues.length === 0;
   draw();
+  if (isNew) showCurrent();
+}
+
+// In a list that is longer than its place, on a laptop.
+function showCurrent() {
+  const item = byId("cues").querySelector('[aria-current="true"]')?.parentElement;
+  if (item) byId("cues-part").scrollTop = item.offsetTop - byId("cues-part").clientHeight / 3;
 }
 
 function draw() {
@@ -40,7 +48,7 @@ function draw() {
       const item = document.createElement("li"), button = document.createElement("button");
       const number = document.createElement("span"), name = document.createElement("b"), state = document.createElement("small");
       button.type = "button";
-      number.textContent = place + 1;
+      number.textContent = String(place + 1);
       name.textContent = one.name;
       button.append(number, name, state);
       button.addEventListener("click", () => {

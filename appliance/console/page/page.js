@@ -16,6 +16,7 @@ import { initRehearsal, leaveRehearsal, showRehearsal } from "./rehearsal.js";
 import { initRig, showRig } from "./rig.js";
 import { initSensorChanges, showSensorChanges } from "./sensor_changes.js";
 import { showSensors } from "./sensors.js";
+import { initUpdate, readUpdate } from "./update.js";
 import { initVenue } from "./venue.js";
 import { clock, hasWords, loadWords, number, translated, words } from "./words.js";
 
@@ -37,6 +38,7 @@ function show(page) {
   if (known === "box") {
     readAbout();
     readNight();
+    readUpdate();
   }
   if (known === "prove") showProve();
   else leaveProve();
@@ -168,6 +170,7 @@ initSensorChanges();
 initLogs();
 initVenue();
 initHelp();
+initUpdate();
 initRehearsal(me, box);
 for (const button of every("nav button")) button.addEventListener("click", () => show(button.dataset.page));
 for (const id of ["show-dance", "show-ghost"]) byId(id).addEventListener("change", () => show("dance"));

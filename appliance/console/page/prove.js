@@ -41,7 +41,7 @@ export function leaveProve() {
 async function measure() {
   if (goes && !await command("/stop")) return;
   for (let waited = 0; goes && waited < FADED_MS; waited += LOOK_MS) {
-    await new Promise((over) => setTimeout(over, LOOK_MS));
+    await new Promise((done) => setTimeout(done, LOOK_MS));
     goes = (await request("/api/prove")).value?.show_goes ?? true;
   }
   byId("prove-begin").textContent = words("prove_begin");

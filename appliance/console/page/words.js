@@ -42,10 +42,10 @@ function matched(said) {
   return null;
 }
 
-function compiled(table) {
-  return Object.entries(table).map(([english, sentence]) => {
-    const names = [...english.matchAll(/\{(\w+)\}/g)].map((one) => one[1]);
-    const escaped = english.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{\w+\}/g, "([^]+?)");
+function compiled(sentences) {
+  return Object.entries(sentences).map(([said, sentence]) => {
+    const names = [...said.matchAll(/\{(\w+)\}/g)].map((one) => one[1]);
+    const escaped = said.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{\w+\}/g, "([^]+?)");
     return [new RegExp(`^${escaped}$`), names, sentence, escaped.length];
   }).sort((one, other) => other[3] - one[3]); // the one that says most first
 }
