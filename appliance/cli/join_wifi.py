@@ -1,0 +1,157 @@
+"""Joins the Wi-Fi that bunraku-wifi.yaml names, or makes it; `bunraku-wifi.service` runs this as root.
+
+    python -m appliance.cli.join_wifi
+
+Looks on the stick, then on the boot partition. A new file is kept in /data/network, with NetworkManager's
+profile of it, and takes effect at once. A file with a fault changes nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from appliance.box.durable import write_whole
+from appliance.release.choice import RUN
+from appliance.release.wifi import NAME, PROFILE, WifiFile, is_filled_in, profile, read_wifi
+from appliance.show.config_error import ConfigError
+
+WORDS = "wifi.txt"  # in the run folder: what went wrong, for the test card and the doctor
+_ACCESS_POINT_PROFILE = "sensors.nmconnection"  # by bunraku-access-point
+_CARD_S, _JOINED_S = 20.0, 40.0
+_RETRY_S = 0.5
+
+
+class Places(NamedTuple):
+    """arrivals: folders that may bring a file, the first that has one counts; kept: over power-off; run:
+    where words are left; profiles: NetworkManager's own folder in memory."""
+
+    arrivals: tuple[Path, ...] = (Path("/media/bunraku"), Path("/boot"), Path("/boot/firmware"))
+    kept: Path = Path("/data/network")
+    run: Path = RUN
+    profiles: Path = Path("/run/NetworkManager/system-connections")
+    cards: Path = Path("/sys/class/net")
+
+
+Run = Callable[[Sequence[str]], "subprocess.CompletedProcess[str]"]
+Wait = Callable[[float], None]
+NameBox = Callable[[str], None]
+
+
+def join_wifi(places: Places, run: Run, wait: Wait, name_box: NameBox) -> int:
+    """Apply the newest file; 0, or 1 with words in the run folder."""
+    words = _applied(places, run, wait, name_box)
+    left = places.run / WORDS
+    with contextlib.suppress(OSError):
+        if words:
+            write_whole(left, f"{words}\n".encode())
+        else:
+            left.unlink(missing_ok=True)
+    if words:
+        print(words, flush=True)
+    return 1 if words else 0
+
+
+def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
+    """What went wrong, for people; nothing where all is well or no Wi-Fi is asked for."""
+    arrived = next((path for path in (one / NAME for one in places.arrivals) if _asks(path)), None)
+    kept = places.kept / NAME
+    path = arrived or kept
+    if not _asks(path):
+        return ""
+    try:
+        wifi = read_wifi(path)
+    except ConfigError as error:
+        return f"{error}\nThe box keeps the network from before."
+    name_box(wifi.hostname)
+    is_new = not kept.is_file() or kept.read_bytes() != path.read_bytes()
+    try:
+        if is_new:
+            write_whole(places.kept / "country", f"COUNTRY={wifi.country}\n".encode())
+    except OSError as error:
+        return (
+            f"{places.kept} cannot be written ({error.strerror}): the box is in no Wi-Fi. Look at its disk."
+        )
+    card = _card(places.cards, wait)
+    if not card:
+        return "The box has no Wi-Fi card that works. Plug an adapter in, or a network cable."
+    run(("iw", "reg", "set", wifi.country))
+    words = (
+        _made(places, wifi, card, is_new, run) if wifi.access_point else _joined(places, wifi, is_new, run)
+    )
+    if is_new and not (words and wifi.access_point):
+        write_whole(kept, path.read_bytes(), private=True)
+    return words
+
+
+def _asks(path: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return is_filled_in(path.read_text("utf-8", "replace"))
+    return False
+
+
+def _card(cards: Path, wait: Wait) -> str:
+    """The first Wi-Fi card; a Pi's own takes seconds to appear."""
+    for _ in range(int(_CARD_S / _RETRY_S)):
+        for one in sorted(cards.glob("*/phy80211")):
+            return one.parent.name
+        wait(_RETRY_S)
+    return ""
+
+
+def _joined(places: Places, wifi: WifiFile, is_new: bool, run: Run) -> str:
+    text = profile(wifi).encode()
+    if is_new:
+        with contextlib.suppress(FileNotFoundError):
+            (places.kept / _ACCESS_POINT_PROFILE).unlink()
+            (places.profiles / _ACCESS_POINT_PROFILE).unlink()
+        write_whole(places.kept / PROFILE, text, private=True)
+    places.profiles.mkdir(parents=True, exist_ok=True)
+    write_whole(places.profiles / PROFILE, text, private=True)
+    run(("nmcli", "connection", "reload"))
+    done = run(("nmcli", "--wait", f"{_JOINED_S:.0f}", "connection", "up", "id", "wifi"))
+    if done.returncode == 0:
+        return ""
+    why = done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "NetworkManager does not say why"
+    return (
+        f"The box is not in the Wi-Fi '{wifi.name}' ({why}). It tries again by itself. "
+        f"Look at name and password in {NAME}, and whether the router is on."
+    )
+
+
+def _made(places: Places, wifi: WifiFile, card: str, is_new: bool, run: Run) -> str:
+    if not is_new:
+        return ""  # NetworkManager has started it
+    for folder in (places.kept, places.profiles):
+        (folder / PROFILE).unlink(missing_ok=True)
+    given = {"card": card, "country": wifi.country, "name": wifi.name, "password": wifi.password}
+    options = [word for option, value in given.items() for word in (f"--{option}", value)]
+    done = run(("bunraku-access-point", *options, "--channel", str(wifi.channel)))
+    return "" if done.returncode == 0 else done.stderr.strip() or "The access point did not start."
+
+
+def _run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        return subprocess.CompletedProcess(command, 1, "", f"{command[0]}: {error.strerror}")
+
+
+def main() -> int:
+    """For the unit; the exit status."""
+    return join_wifi(Places(), _run, time.sleep, _name_box)
+
+
+def _name_box(name: str) -> None:
+    with contextlib.suppress(OSError):
+        socket.sethostname(name)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,154 @@
+"""The Wi-Fi of a new box: what is read, kept, applied and said, without a radio."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from appliance.cli.join_wifi import WORDS, Places, join_wifi
+from appliance.release.wifi import NAME, PROFILE
+
+GOOD = "country: DE\nname: hall\npassword: correct horse\nhostname: puppet\n"
+AP = GOOD + "access_point: yes\nchannel: 11\n"
+
+
+@dataclass
+class Box:
+    """A box of folders; `fails`: programs that end with 1 and these words."""
+
+    folder: Path
+    fails: dict[str, str] = field(default_factory=dict)
+    ran: list[tuple[str, ...]] = field(default_factory=list)
+    named: str = ""
+    waited_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("stick", "boot", "kept", "run", "cards/wlan7/phy80211"):
+            (self.folder / name).mkdir(parents=True)
+        self.places = Places(
+            (self.folder / "stick", self.folder / "boot"),
+            self.folder / "kept",
+            self.folder / "run",
+            self.folder / "profiles",
+            self.folder / "cards",
+        )
+
+    def power_on(self) -> int:
+        self.ran.clear()
+        return join_wifi(self.places, self._run, self._wait, self._name)
+
+    @property
+    def words(self) -> str:
+        path = self.folder / "run" / WORDS
+        return path.read_text() if path.exists() else ""
+
+    def _run(self, command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+        self.ran.append(tuple(command))
+        words = self.fails.get(command[0])
+        return subprocess.CompletedProcess(command, words is not None, "", words or "")
+
+    def _wait(self, seconds: float) -> None:
+        self.waited_s += seconds
+
+    def _name(self, name: str) -> None:
+        self.named = name
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Box:
+    return Box(tmp_path)
+
+
+def test_without_a_file_nothing_is_done(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text("# country: DE\n\n")
+    assert box.power_on() == 0
+    assert not box.ran
+    assert not list((box.folder / "kept").iterdir())
+
+
+def test_the_network_on_the_card_is_joined_and_kept(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(GOOD)
+    assert box.power_on() == 0
+    for folder in ("kept", "profiles"):
+        path = box.folder / folder / PROFILE
+        assert "psk=correct horse" in path.read_text()
+        assert path.stat().st_mode & 0o077 == 0, "nobody else reads the password"
+    assert (box.folder / "kept" / "country").read_text() == "COUNTRY=DE\n"
+    assert (box.folder / "kept" / NAME).stat().st_mode & 0o077 == 0
+    assert ("iw", "reg", "set", "DE") in box.ran
+    assert box.named == "puppet"
+    assert box.words == ""
+
+
+def test_the_stick_counts_before_the_card_and_outlives_being_pulled(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(GOOD)
+    (box.folder / "stick" / NAME).write_text(GOOD.replace("puppet", "other"))
+    box.power_on()
+    assert box.named == "other"
+    (box.folder / "stick" / NAME).unlink()
+    (box.folder / "boot" / NAME).unlink()
+    box.power_on()
+    assert box.named == "other"
+
+
+def test_a_fault_is_said_with_its_line_and_the_network_before_stays(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(GOOD)
+    box.power_on()
+    before = (box.folder / "kept" / PROFILE).read_bytes()
+    (box.folder / "boot" / NAME).write_text(GOOD.replace("password", "pasword"))
+    assert box.power_on() == 1
+    assert f"{NAME}:3: Unknown key 'pasword'." in box.words
+    assert "keeps the network from before" in box.words
+    assert not box.ran
+    assert (box.folder / "kept" / PROFILE).read_bytes() == before
+
+
+def test_a_network_that_is_not_joined_is_said_and_tried_again(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(GOOD)
+    box.fails["nmcli"] = "Error: Connection activation failed: Secrets were required\n"
+    assert box.power_on() == 1
+    assert "not in the Wi-Fi 'hall' (Error: Connection activation failed: Secrets were required)" in box.words
+    assert (box.folder / "kept" / PROFILE).exists(), "NetworkManager goes on trying"
+    box.fails.clear()
+    assert box.power_on() == 0
+    assert box.words == ""
+
+
+def test_the_box_makes_the_network_itself(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(GOOD)
+    box.power_on()
+    (box.folder / "boot" / NAME).write_text(AP)
+    assert box.power_on() == 0
+    options = ["--card", "wlan7", "--country", "DE", "--name", "hall", "--password"]
+    assert box.ran[-1] == ("bunraku-access-point", *options, "correct horse", "--channel", "11")
+    assert not (box.folder / "kept" / PROFILE).exists(), "it does not look for it as well"
+    box.power_on()
+    assert "bunraku-access-point" not in [command[0] for command in box.ran], "it is kept over power-off"
+
+
+def test_an_access_point_that_fails_is_said_and_tried_at_the_next_power_on(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(AP)
+    box.fails["bunraku-access-point"] = "the radio of wlan7 cannot be an access point."
+    assert box.power_on() == 1
+    assert box.words == "the radio of wlan7 cannot be an access point.\n"
+    box.fails.clear()
+    assert box.power_on() == 0
+
+
+def test_a_box_without_a_card_waits_for_one_and_says_so(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(GOOD)
+    (box.folder / "cards/wlan7/phy80211").rmdir()
+    assert box.power_on() == 1
+    assert "no Wi-Fi card" in box.words
+    assert box.waited_s >= 10
+
+
+def test_a_disk_that_cannot_be_written_is_said(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(GOOD)
+    (box.folder / "kept").rmdir()
+    assert box.power_on() == 1
+    assert "cannot be written" in box.words
