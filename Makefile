@@ -7,6 +7,8 @@ PICTURE := out/dance.png
 DISTRIBUTIONS := . distributions/sim distributions/studio
 ARGS ?= --seconds 30
 TEST_ARGS ?=
+# The box's processor: amd64 (a NUC) or arm64 (a Raspberry Pi).
+ARCH ?= amd64
 # Empty, or --long: every count of the tests at its full length.
 LENGTH ?=
 # Test files run beside each other: they own their ports, folders and boxes. One more than there are cores, for many
@@ -33,20 +35,26 @@ DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump 
 DEBIAN_FOR_BOOT := mmdebstrap:mmdebstrap systemd-container:systemd-nspawn squashfs-tools:mksquashfs \
     e2fsprogs:mke2fs openssh-client:ssh-keygen
 # Its disk image, and a whole machine in software that starts it.
-DEBIAN_FOR_IMAGE := $(DEBIAN_FOR_BOOT) mtools:mcopy dosfstools:mkfs.vfat fdisk:sfdisk grub-common:grub-mkimage \
-    grub-pc-bin:/usr/lib/grub/i386-pc/boot.img grub-efi-amd64-bin:/usr/lib/grub/x86_64-efi/linux.mod
-DEBIAN_FOR_VM := $(DEBIAN_FOR_IMAGE) qemu-system-x86:qemu-system-x86_64 ovmf:/usr/share/ovmf/OVMF.fd
+DEBIAN_FOR_IMAGE := $(DEBIAN_FOR_BOOT) mtools:mcopy dosfstools:mkfs.vfat fdisk:sfdisk \
+    $(if $(filter arm64,$(ARCH)),kmod:depmod cpio:cpio xz-utils:xz zstd:zstd qemu-user-static:qemu-aarch64-static \
+        gcc-aarch64-linux-gnu:aarch64-linux-gnu-gcc g++-aarch64-linux-gnu:aarch64-linux-gnu-g++, \
+        grub-common:grub-mkimage grub-pc-bin:/usr/lib/grub/i386-pc/boot.img \
+        grub-efi-amd64-bin:/usr/lib/grub/x86_64-efi/linux.mod)
+DEBIAN_FOR_VM := $(DEBIAN_FOR_IMAGE) $(if $(filter arm64,$(ARCH)),qemu-system-arm:qemu-system-aarch64, \
+    qemu-system-x86:qemu-system-x86_64 ovmf:/usr/share/ovmf/OVMF.fd)
 DEBIAN_FOR_SOAK := $(DEBIAN_FOR_GL) stress-ng:stress-ng rt-tests:cyclictest
 
 FUZZ_SECONDS ?= $(if $(LENGTH),30,5)
 MINUTES ?= 60
 # The key that signs releases, and the one after it: docs/releases.md.
 VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
+# All that is built gets the time of the last commit, so that the same commit gives the same bytes.
+deb image wheels dist sbom downloads: export SOURCE_DATE_EPOCH := $(or $(SOURCE_DATE_EPOCH),$(shell git log -1 --format=%ct))
 SIGNING = $(if $(KEY),--key '$(KEY)') $(if $(NEXT_KEY),--next-key '$(NEXT_KEY)')
 
 .DEFAULT_GOAL := help
-.PHONY: help run release studio firmware firmware-bin test test-quick test-long pytest beside firmware-test \
-    firmware-check fuzz fuzz-corpus lint lint-js bench lock clean soak boot-figures image dist sbom downloads test-vm \
+.PHONY: help run deb studio firmware firmware-bin test test-quick test-long pytest beside firmware-test \
+    firmware-check fuzz fuzz-corpus lint lint-js bench lock clean soak boot-figures image wheels dist sbom downloads test-vm \
     debian-for-image debian-for-vm debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
 
 help: ## show this list
@@ -132,17 +140,13 @@ endef
 boot-figures: $(VENV)/.ready-to-test debian-for-boot ## boot the box, harm it, cut its power; times in out/boot (root)
 	@BUNRAKU_FIGURES=out/boot $(BIN)/pytest tests/boot --long -rs $(TEST_ARGS)
 
-image: debian-for-image ## the box's disk image, out/bunraku-amd64.img (ARCH=arm64: a Pi's root as a tar; KEY=FILE; root)
-ifeq ($(ARCH),arm64)
-	@deploy/image/mkroot.sh --arch arm64 $(SIGNING) out/bunraku-arm64.tar
-else
-	@rm -rf build/image && deploy/image/mkroot.sh $(SIGNING) build/image
-	@deploy/image/mkimage.sh build/image out/bunraku-amd64.img
-endif
+image: debian-for-image deb ## the box's disk image, out/bunraku-amd64.img (ARCH=arm64: a Raspberry Pi's card; root)
+	@rm -rf build/image-$(ARCH) && deploy/image/mkroot.sh --arch $(ARCH) --deb out/bunraku_$(VERSION)_$(ARCH).deb build/image-$(ARCH)
+	@deploy/image/mkimage.sh build/image-$(ARCH) out/bunraku-$(ARCH).img
 
 test-vm: $(VENV)/.ready-to-test debian-for-vm ## start the image in a machine in software, harm it, cut its power (an hour)
-	@[ -f out/bunraku-amd64.img ] || $(MAKE) image
-	@BUNRAKU_IMAGE=out/bunraku-amd64.img $(BIN)/pytest tests/vm -rs -s $(TEST_ARGS)
+	@[ -f out/bunraku-$(ARCH).img ] || $(MAKE) image ARCH=$(ARCH)
+	@BUNRAKU_IMAGE=out/bunraku-$(ARCH).img $(BIN)/pytest tests/vm -rs -s $(TEST_ARGS)
 
 soak: $(VENV)/.ready-to-run debian-for-soak ## the whole box under load and trouble for MINUTES; figures and picture in out/soak
 	@exec $(BIN)/python -m hw_sim.soak --minutes $(MINUTES) --out out/soak
@@ -225,24 +229,38 @@ if [ -n "$$missing" ]; then \
 fi
 endef
 
-release: ## everything for a box, on a stick: out/bunraku-VERSION-ARCH (ARCH=arm64: Pi; KEY=FILE signs it)
-	@deploy/release/make-release --arch $(or $(ARCH),amd64) $(SIGNING)
+deb: ## the box's Debian package: out/bunraku_VERSION_ARCH.deb (ARCH=arm64: Pi; KEY=FILE signs it for sticks)
+	@deploy/release/make-deb --arch $(ARCH) $(SIGNING)
 
-dist: $(VENV)/.ready-to-run ## wheels and source distributions of the last commit: box, simulation, studio; out/dist
+wheels: $(VENV)/.ready-to-run ## wheels and source distributions of the last commit: box, simulation, studio; out/dist
 	@rm -rf out/dist build/dist && mkdir -p out/dist build/dist
 	@set -o pipefail; git archive HEAD | tar -C build/dist -xf -
-	@for each in $(DISTRIBUTIONS); do for kind in sdist wheel; do \
+	@umask 022; for each in $(DISTRIBUTIONS); do for kind in sdist wheel; do \
 	    (cd build/dist/$$each && $(CURDIR)/$(BIN)/python -c \
 	        "from setuptools import build_meta as b; b.build_$$kind('$(CURDIR)/out/dist')") \
 	        >build/dist.log 2>&1 || { cat build/dist.log; exit 1; }; done; done
+	@for sdist in out/dist/*.tar.gz; do rm -rf build/dist/again && mkdir build/dist/again && \
+	    tar -C build/dist/again -xf $$sdist && tar -C build/dist/again --sort=name --mtime=@$$SOURCE_DATE_EPOCH \
+	        --owner=0 --group=0 --numeric-owner -cf - $$(ls build/dist/again) | gzip -9n >$$sdist.part && \
+	    mv $$sdist.part $$sdist || exit 1; done
 	@ls out/dist/*
 
-sbom: $(VENV)/.ready-to-run ## bills of materials (CycloneDX) of the releases, and of the image that was built: out/*.cdx.json
-	@for arch in amd64 arm64; do $(BILL) --arch $$arch out/bunraku-$(VERSION)-$$arch.cdx.json || exit 1; done
-	@! [ -f $(IMAGE_PACKAGES) ] || $(BILL) --debian $(IMAGE_PACKAGES) out/bunraku-$(VERSION)-image.cdx.json
+dist: ## everything that a release has, signed, in out/downloads (KEY=FILE; root); the same commit gives the same bytes
+	@$(MAKE) --no-print-directory wheels
+	@for arch in $(ARCHITECTURES); do $(MAKE) --no-print-directory image ARCH=$$arch || exit 1; done
+	@if command -v arduino-cli >/dev/null; then $(MAKE) --no-print-directory firmware-bin; \
+	    else echo "arduino-cli is missing: out/firmware stays as it is (docs/firmware.md)."; fi
+	@$(MAKE) --no-print-directory sbom downloads
+
+ARCHITECTURES ?= amd64 arm64
+
+sbom: $(VENV)/.ready-to-run ## bills of materials (SPDX) of the packages and images in out/: out/*.spdx.json
+	@for deb in out/bunraku_$(VERSION)_*.deb; do arch=$${deb##*_}; [ ! -f $$deb ] || \
+	    $(BILL) --arch $${arch%.deb} --of $$deb $$deb.spdx.json || exit 1; done
+	@for image in out/bunraku-*.img; do arch=$${image##*-}; [ ! -f $$image ] || \
+	    $(BILL) --arch $${arch%.img} --of $$image --debian $${image%.img}.packages $$image.spdx.json || exit 1; done
 
 BILL = $(BIN)/python -m tools.sbom
-IMAGE_PACKAGES := build/image/etc/bunraku-packages
 
 downloads: ## pack what was built into out/downloads, with signed sums (KEY=FILE)
 	@deploy/release/pack-downloads $(SIGNING)

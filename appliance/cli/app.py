@@ -49,6 +49,7 @@ _MODULES = {  # in each a function or a group of the command's name
     "lights": "appliance.cli.lights_commands",
     "sound": "appliance.cli.sound",
     "preflight": _HERE,
+    "release": "appliance.cli.release",
     "firewall": "appliance.cli.firewall",
     "version": _HERE,
 }
@@ -70,7 +71,10 @@ def command_line(name: str | None = None) -> typer.Typer:
             found = getattr(import_module(module), command)
             if isinstance(found, typer.Typer):
                 app.add_typer(found, name=command)
-            elif command == "preflight":  # it parses its own options: at power-on it runs without this parser
+            elif command in (
+                "preflight",
+                "release",
+            ):  # both read their options themselves
                 settings = {"allow_extra_args": True, "ignore_unknown_options": True}
                 app.command(command, add_help_option=False, context_settings=settings)(_ending(found))
             else:

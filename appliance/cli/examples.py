@@ -34,6 +34,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     "journal timeline": ("bunraku journal timeline --journal out/tonight",),
     "replay": ("bunraku replay out/tonight", "bunraku replay tonight.bunraku --show my_show --from 60"),
     "preflight": ("bunraku preflight --stick /media/bunraku",),
+    "release": ("bunraku release list", "bunraku release install", "bunraku release back"),
     "firewall": ("bunraku firewall --box box.yaml > bunraku.nft",),
     "pack": ("bunraku pack my_show",),
     "provision": ("bunraku provision --name left-wrist --network bunraku",),
@@ -110,6 +111,7 @@ OTHER_WORDS: dict[str, tuple[str, ...]] = {
     "journal": ("log", "logs", "history", "recorder", "list"),
     "replay": ("repeat", "playback", "again"),
     "preflight": ("choose", "boot", "stick"),
+    "release": ("update", "upgrade", "install", "rollback", "back"),
     "firewall": ("nft", "ports", "iptables"),
     "pack": ("checksum", "checksums", "sign", "bundle", "package", "seal"),
     "provision": ("pair", "register", "enrol", "wifi", "key", "keys", "setup"),
@@ -132,5 +134,5 @@ OTHER_WORDS: dict[str, tuple[str, ...]] = {
     "vary": ("variation", "variations", "mutate", "mix"),
     "map": ("space", "pca", "umap", "embed"),
     "path": ("wobble", "line", "trace"),
-    "version": ("about", "release"),
+    "version": ("about",),
 }

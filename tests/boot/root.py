@@ -13,7 +13,7 @@ from tests.conftest import ROOT
 from tests.deploy.small_release import make_key
 
 MKROOT = ROOT / "deploy" / "image" / "mkroot.sh"
-MAKE_RELEASE = ROOT / "deploy" / "release" / "make-release"
+MAKE_DEB = ROOT / "deploy" / "release" / "make-deb"
 BUILT = ROOT / "build" / "boot"
 MAKER = BUILT / "maker"  # the key of the release's maker, made here, thrown away with `build`
 _INPUTS = ("appliance", "hw_sim", "deploy", "distributions", "pyproject.toml")
@@ -35,8 +35,8 @@ def root_image() -> Path:
 
 
 def release(root: Path) -> Path:
-    """The release that is installed in this root, as `make release` lays it on a stick."""
-    return root.parent / "release"
+    """The package that is installed in this root, as `make deb` makes it; signed by MAKER."""
+    return next(root.parent.glob("bunraku_*.deb"))
 
 
 def _build(folder: Path, image: Path) -> None:
@@ -46,8 +46,8 @@ def _build(folder: Path, image: Path) -> None:
             old.unlink()
     if not MAKER.exists():
         make_key(MAKER.parent, MAKER.name)
-    _run(str(MAKE_RELEASE), "--out", str(folder / "release"), "--key", str(MAKER))
-    made = [str(MKROOT), "--without-kernel", "--release", str(folder / "release"), "--debian", str(debian)]
+    _run(str(MAKE_DEB), "--quick", "--out", str(folder), "--key", str(MAKER))
+    made = [str(MKROOT), "--without-kernel", "--deb", str(release(image)), "--debian", str(debian)]
     _run(*made, str(folder / "root"))
     _run("mksquashfs", str(folder / "root"), str(part), *_FAST)
     shutil.rmtree(folder / "root")

@@ -6,14 +6,15 @@ import os
 import shutil
 import subprocess
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.deploy.cut import cut_off
-from tests.deploy.small_release import INSTALL
 
 _SIZE_MB = 64
 _ENDS_WITHIN_S = 5.0
+_PATH = "/usr/sbin:/usr/bin:/sbin:/bin"
+_DATABASE = "var/lib/dpkg"
 
 
 def why_not() -> str | None:
@@ -24,6 +25,7 @@ def why_not() -> str | None:
         ("mke2fs", "e2fsprogs"),
         ("unshare", "util-linux"),
         ("dpkg", "dpkg"),
+        ("cc", "gcc"),
         ("ssh-keygen", "openssh-client"),
     ):
         if shutil.which(command) is None:
@@ -50,6 +52,7 @@ class BoxRoot:
     """A root file system whose written half lies on a small ext4 disk in `folder`."""
 
     folder: Path
+    lent: set[Path] = field(default_factory=set, compare=False)
 
     @property
     def path(self) -> Path:
@@ -87,6 +90,7 @@ class BoxRoot:
         run("mount", "-o", "loop,noatime", str(self.disk), str(self.written))
         for name in ("upper", "work"):
             (self.written / name).mkdir(exist_ok=True)
+        prepare(self.written / "upper")
         above = f"lowerdir=/,upperdir={self.written}/upper,workdir={self.written}/work"
         run("mount", "-t", "overlay", "-o", above, "overlay", str(self.path))
 
@@ -123,12 +127,41 @@ class BoxRoot:
         """e2fsck, as the boot runs it; 0 and 1 (repaired) are sound."""
         return subprocess.run(["e2fsck", "-p", str(self.disk)], capture_output=True).returncode
 
-    def install(
+    def lend(self, path: Path) -> Path:
+        """The same path inside: what a test shares with programs of the box is mounted with the call."""
+        self.lent.add(path)
+        return path
+
+    def call(self, *words: str | Path, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+        """A command inside, as root, without a network."""
+        disk = os.open(self.written, os.O_RDONLY)
+        mounts = [f"mount --rbind /dev {self.path}/dev", f"mount -t proc proc {self.path}/proc"]
+        for path in self.lent | {
+            Path(word) for word in words if Path(word).is_absolute() and Path(word).exists()
+        }:
+            inside = Path(f"{self.path}{path}")
+            if path.is_dir():
+                mounts.append(f"mkdir -p {inside} && mount --bind {path} {inside}")
+            elif path.parent != Path("/usr/sbin"):
+                mounts.append(f"mkdir -p {inside.parent} && touch {inside} && mount --bind {path} {inside}")
+        entered = f'{" && ".join(mounts)} && exec chroot {self.path} env -i "$@"'
+        settings = {"PATH": _PATH, "CUT_FD": str(disk), **(env or {})}
+        inside_words = [*(f"{name}={value}" for name, value in settings.items()), *map(str, words)]
+        command = ["unshare", "--mount", "--net", "sh", "-c", entered, "sh", *inside_words]
+        try:
+            return subprocess.run(command, capture_output=True, text=True, pass_fds=(disk,))
+        finally:
+            os.close(disk)
+
+    def release(
         self, *words: str | Path, env: dict[str, str] | None = None
     ) -> subprocess.CompletedProcess[str]:
-        """install.sh, without a network."""
-        command = ["unshare", "--net", "bash", str(INSTALL), "--root", str(self.path), *map(str, words)]
-        return subprocess.run(command, capture_output=True, text=True, env={**os.environ, **(env or {})})
+        """bunraku-release."""
+        return self.call("/usr/sbin/bunraku-release", *words, env=env)
+
+    def dpkg(self, *words: str | Path, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+        """dpkg, with a database of the box's own."""
+        return self.call("dpkg", *words, env=env)
 
     def run(self, *words: str) -> str:
         """What a command in this root prints."""
@@ -137,10 +170,20 @@ class BoxRoot:
         )
 
 
+def prepare(upper: Path) -> None:
+    """A database of dpkg's own above this machine's: a directory that hides the one below."""
+    database = upper / _DATABASE
+    if not database.exists():
+        for name in ("info", "updates", "triggers"):
+            (database / name).mkdir(parents=True)
+        (database / "status").touch()
+        os.setxattr(database, "trusted.overlay.opaque", b"y")
+
+
 def refused(box: BoxRoot, *words: str | Path) -> str:
     """What is said; the box has what it had."""
     before = box.current, files_of(box)
-    done = box.install(*words)
+    done = box.release("install", *words)
     assert done.returncode == 1, done.stdout
     assert (box.current, files_of(box)) == before
     return done.stderr
@@ -151,9 +194,9 @@ def files_of(box: BoxRoot) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path != folder / "releases")
 
 
-def taken(box: BoxRoot, *words: str | Path) -> str:
-    done = box.install(*words)
-    assert done.returncode == 0, done.stderr
+def taken(box: BoxRoot, *words: str | Path, env: dict[str, str] | None = None) -> str:
+    done = box.release("install", *words, env=env)
+    assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.deploy import box_root
 from tests.deploy.box_root import BoxRoot
-from tests.deploy.small_release import make_key, write_release
+from tests.deploy.small_release import make_key, package_of, write_release
 
 MakeRelease = Callable[..., Path]
 
@@ -51,10 +51,10 @@ def with_first_release(make_release: MakeRelease, tmp_path_factory: pytest.TempP
     box = BoxRoot(tmp_path_factory.mktemp("first"))
     box.make()
     try:
-        done = box.install(make_release("1.0.0", extra_unit="bunraku-old.service"))
+        done = box.dpkg("--install", package_of(make_release("1.0.0", extra_unit="bunraku-old.service")))
     finally:
         box.switch_off()
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
     return box
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.deploy.box_root import BoxRoot, run, unmount
@@ -12,7 +12,7 @@ from tests.deploy.box_root import BoxRoot, run, unmount
 class ImageBox(BoxRoot):
     """`image`: a box that is off, whose disk is this one's root; it is only read."""
 
-    image: BoxRoot
+    image: BoxRoot = field(kw_only=True)
 
     @property
     def written(self) -> Path:
@@ -46,7 +46,7 @@ class ImageBox(BoxRoot):
         self.written.mkdir(exist_ok=True)
         run("mount", "-o", "loop,noatime,nosuid,nodev", str(self.disk), str(self.written))
         if (self.kept / "current").is_symlink():
-            done = self.install("--at-power-on")
+            done = self.release("at-power-on")
             assert done.returncode == 0, done.stderr
 
     def switch_off(self) -> None:

@@ -1,61 +1,97 @@
-"""A small whole release as `make release` lays it out: one tiny wheel, for roots that have no Debian 13."""
+"""A small package as `make deb` builds it: one tiny module, for roots that have no Debian 13."""
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import subprocess
-import zipfile
 from pathlib import Path
 
 from tests.conftest import ROOT
 
-INSTALL = ROOT / "deploy" / "install.sh"
-SIGN = ROOT / "deploy" / "release" / "sign"
-TARGET = """[Unit]
-Description=The box, version {version}
-
-[Install]
-WantedBy=multi-user.target
+RELEASE = ROOT / "deploy" / "bunraku-release"
+SCRIPTS = ROOT / "deploy" / "release" / "debian"
+UNITS = "usr/lib/systemd/system"
+CLOCK = "etc/chrony/conf.d/bunraku.conf"
+CONTROL = """Package: bunraku
+Version: {version}
+Architecture: {arch}
+Maintainer: a test
+Description: a small bunraku
 """
+FACTS = "version {version}\narchitecture {arch}\npython {python}\nbuild {build}\n"
+TARGET = "[Unit]\nDescription=The box, version {version}\n"
 
 
 def write_release(
-    folder: Path, version: str, *, key: Path, python: str, extra_unit: str = "", broken: bool = False
+    folder: Path,
+    version: str,
+    *,
+    key: Path | None,
+    python: str,
+    arch: str = "",
+    extra_unit: str = "",
+    next_key: Path | None = None,
 ) -> Path:
-    """A release whose command prints its version; broken: one of its modules cannot be imported.
-
-    key: with which it is signed.
-    """
+    """The folder of a stick with a package whose command prints its version; key: None leaves it unsigned."""
+    arch = arch or machine()
+    top = folder / "top"
     if folder.exists():
         shutil.rmtree(folder)
-    wheels = folder / "wheels"
-    wheels.mkdir(parents=True)
-    _write_wheel(wheels, version, "raise ImportError('a part is missing')" if broken else "")
-    (folder / "unneeded.txt").write_text("# nothing\nappliance/unneeded\n")
-    shutil.copy(INSTALL, folder / "install.sh")
-    units = folder / "system/usr/lib/systemd/system"
-    units.mkdir(parents=True)
-    (units / "bunraku.target").write_text(TARGET.format(version=version))
+    tree = top / "opt/bunraku/unpacked"
+    files = {
+        tree / f"lib/python{python}/site-packages/appliance/start.py": f"print('bunraku {version}')\n",
+        tree / "bin/bunraku": f"#!/bin/sh\necho bunraku {version}\n",
+        tree / "system" / UNITS / "bunraku.target": TARGET.format(version=version),
+        top / CLOCK: f"# of {version}\n",
+        top / "DEBIAN/control": CONTROL.format(version=version, arch=arch),
+        top / "DEBIAN/conffiles": f"/{CLOCK}\n",
+        tree / "release": FACTS.format(version=version, arch=arch, python=python, build=extra_unit or "one"),
+    }
     if extra_unit:
-        (units / extra_unit).write_text("[Unit]\nDescription=Only in this release\n")
-    clock = folder / "system/etc/chrony/conf.d"
-    clock.mkdir(parents=True)
-    (clock / "bunraku.conf").write_text(f"# of {version}\n")
-    write_facts(folder, version=version, python=python)
-    sign(folder, key)
+        files[tree / "system" / UNITS / extra_unit] = "[Unit]\nDescription=Only in this release\n"
+    if key is not None:
+        files[tree / "keys"] = named(key, *([next_key] if next_key else []))
+    for path, text in files.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    (tree / "bin/bunraku").chmod(0o755)
+    (tree / "bin/python").symlink_to("/bin/true")
+    shutil.copy(RELEASE, tree)
+    links = {
+        UNITS + "/" + path.name: f"system/{UNITS}/{path.name}" for path in (tree / "system" / UNITS).iterdir()
+    }
+    links |= {"usr/bin/bunraku": "bin/bunraku", "usr/sbin/bunraku-release": "bunraku-release"}
+    for where, to in links.items():
+        (top / where).parent.mkdir(parents=True, exist_ok=True)
+        (top / where).symlink_to(f"/opt/bunraku/current/{to}")
+    for script in ("postinst", "prerm", "postrm"):
+        shutil.copy(SCRIPTS / script, top / "DEBIAN")
+        (top / "DEBIAN" / script).chmod(0o755)
+    package = folder / f"bunraku_{version}_{arch}.deb"
+    build = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", top, package]
+    subprocess.run(build, check=True, stdout=subprocess.DEVNULL)
+    shutil.rmtree(top)
+    if key is not None:
+        sign(package, key)
     return folder
 
 
-def write_facts(folder: Path, *, version: str, python: str, arch: str = "", needs_mb: int = 1) -> None:
-    """What the release says of itself; it has to be signed anew."""
-    lines = (
-        f"version {version}",
-        f"architecture {arch or machine()}",
-        f"python {python}",
-        f"needs-mb {needs_mb}",
-    )
-    (folder / "release").write_text("\n".join(lines) + "\n")
+def named(*keys: Path) -> str:
+    """The file `keys` of a release: whose releases are taken after it."""
+    public = (key.with_suffix(".pub").read_text().split() for key in keys)
+    return "".join(f'release namespaces="bunraku-release" {kind} {text}\n' for kind, text, _ in public)
+
+
+def package_of(stick: Path) -> Path:
+    """The one package in a stick's folder."""
+    return next(stick.glob("*.deb"))
+
+
+def sign(package: Path, key: Path, purpose: str = "bunraku-release") -> None:
+    """As the release's maker does it."""
+    package.with_name(package.name + ".sig").unlink(missing_ok=True)
+    command = ["ssh-keygen", "-q", "-Y", "sign", "-f", key, "-n", purpose, package]
+    subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
 
 
 def make_key(folder: Path, name: str = "maker") -> Path:
@@ -71,35 +107,6 @@ def fingerprint(key: Path) -> str:
     return subprocess.check_output(["ssh-keygen", "-l", "-f", str(key)], text=True).split()[1]
 
 
-def sign(folder: Path, key: Path, *next_keys: Path) -> None:
-    """As the release's maker does it: keys, sums of all files, signature."""
-    wanted = [word for one in next_keys for word in ("--next-key", f"{one}.pub")]
-    subprocess.run([SIGN, "--key", key, *wanted, folder], check=True, stdout=subprocess.DEVNULL)
-
-
-def write_sums(folder: Path) -> None:
-    """The sums of all files, unsigned, as anybody can write them."""
-    files = sorted(one for one in folder.rglob("*") if one.is_file() and "SHA256SUMS" not in one.name)
-    sums = "".join(f"{_digest(one)}  ./{one.relative_to(folder)}\n" for one in files)
-    (folder / "SHA256SUMS").write_text(sums)
-
-
 def machine() -> str:
     """This machine's processor as Debian calls it."""
     return subprocess.check_output(["dpkg", "--print-architecture"], text=True).strip()
-
-
-def _write_wheel(folder: Path, version: str, part: str) -> None:
-    files = {
-        "appliance/__init__.py": "",
-        "appliance/part.py": f"{part}\n",
-        "appliance/start.py": f"def main() -> int:\n    print('bunraku {version}')\n    return 0\n",
-        "appliance/unneeded/__init__.py": "",
-    }
-    with zipfile.ZipFile(folder / f"bunraku-{version}-py3-none-any.whl", "w") as wheel:
-        for name, text in files.items():
-            wheel.writestr(name, text)
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import tarfile
 from pathlib import Path
 
 import pytest
@@ -18,11 +17,9 @@ PACK = ROOT / "deploy" / "release" / "pack-downloads"
 def built(tmp_path: Path) -> Path:
     """The folder out/ after all builds, in small."""
     out = tmp_path / "out"
-    release = out / "bunraku-0.2.0-amd64"
     for file in (
-        release / "release",
-        release / "SHA256SUMS.sig",
-        release / "wheels" / "bunraku.whl",
+        out / "bunraku_0.2.0_amd64.deb",
+        out / "bunraku_0.2.0_amd64.deb.sig",
         out / "bunraku-amd64.img",
         out / "bunraku-0.2.0-amd64.cdx.json",
         out / "dist" / "bunraku-0.2.0.tar.gz",
@@ -49,12 +46,11 @@ def test_all_downloads_are_in_the_signed_sums(built: Path, tmp_path: Path) -> No
     folder = built / "downloads"
     named = {line.split()[1] for line in (folder / "SHA256SUMS").read_text().splitlines()}
     assert named == {
-        *("bunraku-0.2.0-amd64.tar", "bunraku-amd64.img.xz", "bunraku-0.2.0-amd64.cdx.json"),
-        *("bunraku-0.2.0.tar.gz", "wearable.ino.bin", "brought.whl", "release-key"),
+        *("bunraku_0.2.0_amd64.deb", "bunraku_0.2.0_amd64.deb.sig", "bunraku-amd64.img.xz"),
+        *("bunraku-0.2.0-amd64.cdx.json", "bunraku-0.2.0.tar.gz"),
+        *("wearable.ino.bin", "brought.whl", "release-key"),
     }
     assert {path.name for path in folder.iterdir()} == named | {"SHA256SUMS", "SHA256SUMS.sig"}
-    with tarfile.open(folder / "bunraku-0.2.0-amd64.tar") as packed:
-        assert "bunraku-0.2.0-amd64/wheels/bunraku.whl" in packed.getnames()
     for command in (
         "ssh-keygen -Y verify -f release-key -I release -n bunraku-download -s SHA256SUMS.sig <SHA256SUMS",
         "sha256sum --check --strict SHA256SUMS",
@@ -73,7 +69,7 @@ def test_packing_again_gives_the_same_sums(built: Path, tmp_path: Path) -> None:
 
 def test_an_unsigned_release_or_no_key_is_refused(built: Path, tmp_path: Path) -> None:
     assert "name the key with --key" in pack(built, tmp_path / "missing").stderr
-    (built / "bunraku-0.2.0-amd64" / "SHA256SUMS.sig").unlink()
+    (built / "bunraku_0.2.0_amd64.deb.sig").unlink()
     refused = pack(built, make_key(tmp_path / "keys"))
     assert refused.returncode == 1 and "is not signed" in refused.stderr
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
+import os
 import re
 import subprocess
 import sys
@@ -17,6 +17,7 @@ from tests.deploy.small_release import make_key
 
 RELEASE = ROOT / "deploy" / "release"
 LINE = re.compile(r"(?P<name>[A-Za-z0-9_.]+)==(?P<version>[0-9][0-9A-Za-z.]*) --hash=sha256:[0-9a-f]{64}")
+TREE = "opt/bunraku/unpacked"
 ELF_MACHINES = {"amd64": 62, "arm64": 183}
 
 
@@ -48,7 +49,7 @@ def test_a_box_has_the_same_packages_on_every_processor() -> None:
 
 
 def test_no_lock_and_no_script_names_a_host() -> None:
-    for path in RELEASE.iterdir():
+    for path in (path for path in RELEASE.rglob("*") if path.is_file()):
         assert "://" not in path.read_text(), path.name
 
 
@@ -76,7 +77,7 @@ def test_what_is_left_out_of_an_installation_is_never_loaded() -> None:
 def test_the_cross_built_wheels_are_for_the_processor_that_they_name() -> None:
     wheels = sorted((ROOT / "build/release/built-arm64").glob("*.whl"))
     if not wheels:
-        pytest.skip("No wheel was cross-built here: make release ARCH=arm64 does it.")
+        pytest.skip("No wheel was cross-built here: make deb ARCH=arm64 does it.")
     assert {path.name.split("-")[0] for path in wheels} == set(_pins("sources-arm64.lock"))
     for wheel in wheels:
         with zipfile.ZipFile(wheel) as content:
@@ -90,7 +91,8 @@ def test_the_cross_built_wheels_are_for_the_processor_that_they_name() -> None:
 
 
 @pytest.mark.parametrize(
-    "script", ["install.sh", "release/make-release", "release/sign", "release/lock", "release/cross-build"]
+    "script",
+    ["bunraku-release", "release/make-deb", "release/lock", "release/cross-build", "release/pack-downloads"],
 )
 def test_every_script_teaches_its_use(script: str) -> None:
     done = subprocess.run([ROOT / "deploy" / script, "--help"], capture_output=True, text=True)
@@ -100,54 +102,69 @@ def test_every_script_teaches_its_use(script: str) -> None:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A release of this working tree; its packages come from build/release, or from the network once."""
-    folder = tmp_path_factory.mktemp("made") / "release"
-    key = make_key(folder.parent)
-    command = [RELEASE / "make-release", "--out", folder, "--key", key]
+    """A package of this working tree; what is in it comes from build/release, or from the network once."""
+    folder = tmp_path_factory.mktemp("made")
+    command = [RELEASE / "make-deb", "--quick", "--out", folder, "--key", make_key(folder / "keys")]
     done = subprocess.run(command, capture_output=True, text=True)
     if "Is there a network" in done.stderr:
-        pytest.skip(f"No release can be made here: {done.stderr.strip().splitlines()[-1]}")
+        pytest.skip(f"No package can be made here: {done.stderr.strip().splitlines()[-1]}")
     assert done.returncode == 0, done.stderr
-    return folder
+    return next(folder.glob("*.deb"))
 
 
-def test_a_release_names_each_of_its_files_with_its_sum(made: Path) -> None:
-    lines = (made / "SHA256SUMS").read_text().splitlines()
-    sums = {name: digest for digest, name in (line.split("  ./", 1) for line in lines)}
-    files = {str(path.relative_to(made)) for path in made.rglob("*") if path.is_file()}
-    assert {name: _sum(made / name) for name in files - {"SHA256SUMS", "SHA256SUMS.sig"}} == sums
+@pytest.fixture(scope="module")
+def unpacked(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What it lays onto a root."""
+    root = tmp_path_factory.mktemp("unpacked")
+    subprocess.run(["dpkg-deb", "--extract", made, root], check=True)
+    return root
 
 
-def test_a_release_is_signed_with_the_key_that_it_names(made: Path) -> None:
-    with (made / "SHA256SUMS").open() as sums:
+def test_a_package_is_signed_with_the_key_that_it_names(made: Path, unpacked: Path) -> None:
+    keys = unpacked / TREE / "keys"
+    with made.open("rb") as package:
         subprocess.run(
             [
-                *("ssh-keygen", "-Y", "verify", "-f", made / "keys", "-I", "release"),
-                *("-n", "bunraku-release", "-s", made / "SHA256SUMS.sig"),
+                *("ssh-keygen", "-Y", "verify", "-f", keys, "-I", "release"),
+                *("-n", "bunraku-release", "-s", f"{made}.sig"),
             ],
-            stdin=sums,
+            stdin=package,
             check=True,
         )
-    assert (made / "keys").read_text().split()[2:] == (made.parent / "maker.pub").read_text().split()[:2]
-    assert not [path for path in made.rglob("*") if path.is_file() and b"PRIVATE KEY" in path.read_bytes()]
+    assert keys.read_text().split()[2:] == (made.parent / "keys/maker.pub").read_text().split()[:2]
+    private = (made.parent / "keys/maker").read_bytes().splitlines()[2]
+    assert not [path for path in unpacked.rglob("*") if path.is_file() and private in path.read_bytes()]
 
 
-def test_a_release_brings_exactly_what_is_pinned_and_the_box_itself(made: Path) -> None:
-    wheels = [path.name.split("-")[:2] for path in (made / "wheels").iterdir()]
-    brought = {name.lower().replace("_", "-"): version for name, version in wheels}
+def test_a_package_brings_exactly_what_is_pinned_and_the_box_itself(unpacked: Path) -> None:
+    found = [path.name.split("-")[:2] for path in _packages(unpacked).glob("*.dist-info")]
+    brought = {name.lower().replace("_", "-"): version.removesuffix(".dist") for name, version in found}
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert brought == _pins(*AMD64) | {"bunraku": version, "bunraku-sim": version}
-    assert (made / "release").read_text().startswith(f"version {version}\narchitecture amd64\npython 3.13\n")
+    facts = (unpacked / TREE / "release").read_text()
+    assert facts.startswith(f"version {version}\narchitecture amd64\npython 3.13\n")
 
 
-def test_the_boxs_wheel_has_everything_that_is_no_python(made: Path) -> None:
-    with zipfile.ZipFile(next((made / "wheels").glob("bunraku-*.whl"))) as wheel:
-        inside = set(wheel.namelist())
+def test_a_package_has_everything_of_the_box_that_is_no_python(unpacked: Path) -> None:
+    packages = _packages(unpacked)
     kinds = {".yaml", ".onnx", ".bvh", ".glsl", ".json", ".png", ".npz"}
-    there = {str(path.relative_to(ROOT)) for path in (ROOT / "appliance").rglob("*") if path.suffix in kinds}
-    assert {file for file in there - inside if not file.startswith("appliance/studio/")} == set()
-    assert not [file for file in inside if file.startswith("appliance/studio/")]
+    there = {path.relative_to(ROOT) for path in (ROOT / "appliance").rglob("*") if path.suffix in kinds}
+    assert {file for file in there if "studio" not in file.parts and not (packages / file).exists()} == set()
+    assert not (packages / "appliance/studio").exists()
 
 
-def _sum(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def test_every_module_has_bytecode_and_every_link_of_the_package_leads_to_a_file_of_it(
+    unpacked: Path,
+) -> None:
+    compiled = "__pycache__/{}.cpython-313.pyc"
+    modules = list(_packages(unpacked).rglob("*.py"))
+    assert [one for one in modules if not (one.parent / compiled.format(one.stem)).exists()] == []
+    links = [path for path in (unpacked / "usr").rglob("*") if path.is_symlink()]
+    assert len(links) > 30
+    for link in links:
+        inside = str(link.readlink()).replace("/opt/bunraku/current", f"{unpacked}/{TREE}")
+        assert os.path.lexists(link.parent / inside), link
+
+
+def _packages(unpacked: Path) -> Path:
+    return unpacked / TREE / "lib/python3.13/site-packages"

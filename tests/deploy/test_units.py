@@ -73,7 +73,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "/usr/bin/systemd-run",
         "/usr/bin/systemd-tmpfiles",
         "/bin/bash",
-        "/usr/local/sbin/bunraku-install",
+        "/usr/sbin/bunraku-release",
     )
     for program in (f"{BIN}/bunraku", f"{BIN}/python", *programs):
         path = root / program.lstrip("/")

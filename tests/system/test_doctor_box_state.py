@@ -41,7 +41,7 @@ def test_a_release_put_aside_is_reported(tmp_path: Path) -> None:
     found = only(storage.releases(HostView(tmp_path)))
     assert found.verdict == "better"
     assert "0.2.0 is put aside: its stage did not dance. The release" in found.words
-    assert "bunraku-install --use 0.2.0" in found.cure
+    assert "bunraku release use 0.2.0" in found.cure
 
 
 def test_the_health_of_the_dance() -> None:

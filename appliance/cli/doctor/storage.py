@@ -221,11 +221,11 @@ def _name_of(show: Path) -> str:
 
 
 def releases(host: HostView) -> Iterator[Finding]:
-    """Installed releases that did not dance at a power-on; bunraku-install leaves a note."""
+    """Installed releases that did not dance at a power-on; bunraku-release leaves a note."""
     for note in sorted(host.at(RELEASES).glob("*.aside")):
         version, reason = note.stem, note.read_text(errors="replace").strip()
         yield better(
             "release",
             f"{version} is put aside: {reason}. The release that came with the image dances.",
-            f"Install it again from a stick, or try it again: sudo bunraku-install --use {version}",
+            f"Install it again from a stick, or try it again: sudo bunraku release use {version}",
         )
