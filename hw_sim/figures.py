@@ -12,12 +12,10 @@ from hw_sim.latency import (
     Floats,
     Restart,
     Transport,
-    light_ms,
     missing_frames,
     percentiles,
     power_on_s,
     response_ms,
-    responses,
     steps,
     transport,
 )
@@ -84,9 +82,9 @@ def _light(run: Run | None) -> dict[str, Any]:
     if run is None:
         return {}
     standing = [moment for moment in steps(run.readings) if moment >= run.stood_from + 0.5]
-    seen = [one.seen_at for one in run.pictures]
+    seen = [one.arrived_at for one in run.pictures]
     rate = (len(seen) - 1) / (seen[-1] - seen[0]) if len(seen) > 1 else 0.0
-    found = light_ms(responses(standing, run.frames), run.pictures)
+    found = response_ms(standing, run.pictures)
     return {
         "hand_to_light_ms": percentiles(found, FEW),
         "pictures_a_second": round(rate, 1),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ Floats = NDArray[np.float64]
 
 BEFORE_STEP_S = 0.1  # the joint's orientation before a step is its mean over this long
 SETTLED_S = (0.3, 0.45)  # and after it over this part
-SAME_FRAME_S = 0.002  # a frame's datagram arrives so much later than the frame is shared, at most
 
 
 class SentReading(NamedTuple):
@@ -112,23 +111,25 @@ def steps(readings: Sequence[SentReading]) -> list[float]:
     ]
 
 
-class Response(NamedTuple):
-    """A step of the sensor and the frame that shows half of it; monotonic seconds."""
+class Shown(Protocol):
+    """Something that shows the held joint: a frame in a datagram, a picture on a screen."""
 
-    stepped_at: float
-    shown_at: float
+    @property
+    def arrived_at(self) -> float: ...
+    @property
+    def joint(self) -> Floats: ...
 
 
-def responses(step_times: Sequence[float], frames: Sequence[Frame]) -> list[Response]:
-    """From each step of the sensor to half of the step in the output joint; only steps that show.
+def response_ms(step_times: Sequence[float], shown: Sequence[Shown]) -> Floats:
+    """From each step of the sensor to half of the step in what is shown, ms; only steps that show.
 
     The way from the orientation before to that after is a line; each frame's place on it is the part of its
     rotation that lies along it. Between two frames the joint is taken to stand as in the earlier one.
     """
-    times = np.array([frame.arrived_at for frame in frames])
+    times = np.array([one.arrived_at for one in shown])
     if not len(times):
-        return []
-    joints = _continuous(np.array([frame.joint for frame in frames]))
+        return times
+    joints = _continuous(np.array([one.joint for one in shown]))
     found = []
     for moment in step_times:
         before = (times >= moment - BEFORE_STEP_S) & (times < moment)
@@ -144,26 +145,8 @@ def responses(step_times: Sequence[float], frames: Sequence[Frame]) -> list[Resp
         share = (joints[during] - start) @ way / (way @ way)
         beyond = np.flatnonzero(share >= 0.5)
         if len(beyond):
-            found.append(Response(moment, float(times[during][beyond[0]])))
-    return found
-
-
-def response_ms(step_times: Sequence[float], frames: Sequence[Frame]) -> Floats:
-    """How long each of `responses` took, ms."""
-    return np.array([1000.0 * (one.shown_at - one.stepped_at) for one in responses(step_times, frames)])
-
-
-def light_ms(found: Sequence[Response], pictures: Sequence[tuple[float, float]]) -> Floats:
-    """From each step of the sensor to the first picture on the screen that shows half of it, ms.
-
-    pictures: when each was first seen on the screen and when its dance left the stage, monotonic seconds.
-    """
-    late = []
-    for step in found:
-        shown = [seen for seen, left in pictures if left >= step.shown_at - SAME_FRAME_S]
-        if shown:
-            late.append(1000.0 * (min(shown) - step.stepped_at))
-    return np.array(late)
+            found.append(1000.0 * (times[during][beyond[0]] - moment))
+    return np.array(found)
 
 
 def percentiles(values: Floats, which: Mapping[str, float]) -> dict[str, float | None]:

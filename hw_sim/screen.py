@@ -1,4 +1,4 @@
-"""Reads an X11 screen: the time stamp that `project --stamp` draws into each picture.
+"""Reads an X11 screen: the stamp that `project --stamp` draws into each picture.
 
 Xlib by ctypes, as xwd reads a screen. Nothing of the projector is used here: the stamp is decoded anew.
 """
@@ -13,21 +13,26 @@ import time
 from ctypes import POINTER, Structure, byref, c_char_p, c_int, c_uint, c_ulong, c_void_p
 from typing import NamedTuple
 
+import numpy as np
+
+from hw_sim.latency import Floats
 from hw_sim.peers import ProbeError
 
 CELL = 8  # pixels
-CELLS = 36
-UNIT_S = 1e-4
-_PERIOD = 1 << 28  # period of the stamp's counter
+CELLS = 52
+_PART = (1 << 10) - 1  # steps of an orientation's part, from -1 to 1
 _ALL_PLANES, _Z_PIXMAP = c_ulong(-1), 2
 _EVERY_S = 0.001
 
 
 class Picture(NamedTuple):
-    """A picture on the screen, monotonic seconds: when it was first seen, when its dance left the stage."""
+    """A picture on the screen: when it was first seen (monotonic seconds), how it shows the held joint.
 
-    seen_at: float
-    left_stage: float
+    joint: its orientation in the world, (4,) w, x, y, z.
+    """
+
+    arrived_at: float
+    joint: Floats
 
 
 class _Image(Structure):
@@ -95,13 +100,14 @@ class Screen:
         return width.value, height.value
 
 
-def left_stage(cells: int, now: float) -> float | None:
-    """The time (monotonic seconds) in a stamp's cells, the newest one before `now`; None: no whole stamp."""
-    counter, check = cells >> 4 & _PERIOD - 1, cells & 15
-    if cells >> 32 != 0b1010 or sum(counter >> place & 15 for place in range(0, 28, 4)) % 16 != check:
+def held_joint(cells: int) -> Floats | None:
+    """The orientation (4,) in a stamp's cells; None: no whole stamp."""
+    check, word = cells & 15, cells >> 4
+    if cells >> 48 != 0b1010 or sum(word >> place & 15 for place in range(0, 44, 4)) % 16 != check:
         return None
-    behind = (int(now / UNIT_S) - counter) % _PERIOD
-    return now - UNIT_S * behind
+    parts = np.array([word >> place & _PART for place in (30, 20, 10, 0)])
+    orientation: Floats = 2.0 * parts / _PART - 1.0
+    return orientation
 
 
 class Watcher(threading.Thread):
@@ -119,8 +125,8 @@ class Watcher(threading.Thread):
             cells = self._screen.cells()
             if cells != before:
                 before, now = cells, time.monotonic()
-                if (left := left_stage(cells, now)) is not None:
-                    self.pictures.append(Picture(now, left))
+                if (joint := held_joint(cells)) is not None:
+                    self.pictures.append(Picture(now, joint))
 
     def stop(self) -> list[Picture]:
         """End it; the pictures that it saw."""

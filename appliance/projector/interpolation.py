@@ -1,4 +1,4 @@
-"""Poses between the ticks: what the display shows at its own rate, exactly one tick behind the stage."""
+"""Poses between the ticks: what the display shows at its own rate, of frames that are carried on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.joint_frame import JointFrame
 from appliance.pose import quaternion
-from appliance.projector.moment import TRAIL_S, Floats, Moment, PuppetMoment
+from appliance.projector.moment import TRAIL_S, Moment, PuppetMoment
+from appliance.projector.prediction import SPAN, Figure, Prediction
 
 TICK_S = 0.02
 _KEPT = 64  # frames: the ring of the shared frame, a little more than the trail
@@ -19,27 +20,25 @@ _LONGEST_GAP_S = 0.1  # a longer one is not bridged: the later pose simply follo
 _SLEW = 0.1  # how much faster or slower the dance may seem while the delay is corrected
 
 
-class _Figure(NamedTuple):
-    positions: Floats
-    world: Floats
-    holds: Floats
-
-
 class _Seen(NamedTuple):
+    tick: int
     time: float
     left: float  # when it left the stage
-    figures: tuple[_Figure, ...]  # one for each puppet
+    figures: tuple[Figure, ...]  # one for each puppet
+    ahead: tuple[Figure, ...]  # predicted for `prediction_s` after `time`
 
 
 class Interpolation:
     """Follows one stage's frames. Between two, positions and holds are linear, world rotations slerped.
 
-    The dance is shown one tick behind its newest possible frame, so that the frame after the wanted time is
-    usually there; if not, the newest one is held. Nothing is ever extrapolated.
+    The wall is one tick behind the newest possible frame, so that the frame after the wanted one is usually
+    there; if not, the newest one is held. Each frame is carried on by prediction_s, which makes up for that
+    tick: the frames are predicted, then interpolated. So a wrong prediction never shows as a jump.
     """
 
-    def __init__(self, reader: FrameReader) -> None:
-        self._reader = reader
+    def __init__(self, reader: FrameReader, prediction_s: float = 0.0) -> None:
+        self._reader, self._prediction_s = reader, prediction_s
+        self._predict: Prediction | None = None
         self._seen: deque[_Seen] = deque(maxlen=_KEPT)
         self._tick = -1
         self._latency_s: float | None = None  # from a frame's time to its leaving the stage
@@ -63,14 +62,14 @@ class Interpolation:
         """The moment to draw at `now` (monotonic seconds); None before the first frame."""
         if not self._seen:
             return None
-        time_s = max(now - self.delay_s, self._seen[0].time)
-        after = next((k for k, seen in enumerate(self._seen) if seen.time > time_s), len(self._seen))
-        trail = [seen for seen in list(self._seen)[:after] if seen.time >= time_s - TRAIL_S]
+        danced_s = max(now - TICK_S - (self._latency_s or 0.0), self._seen[0].time)
+        time_s = danced_s + self._prediction_s
+        after = next((k for k, seen in enumerate(self._seen) if seen.time > danced_s), len(self._seen))
         before = self._seen[after - 1]
-        figures = before.figures
+        figures = before.ahead
         if after < len(self._seen):
-            figures = _between(before, self._seen[after], time_s)
-        trail = trail or [before]
+            figures = _between(before, self._seen[after], danced_s)
+        trail = [seen for seen in self._seen if time_s - TRAIL_S <= seen.time <= time_s] or [before]
         trails = zip(*(seen.figures for seen in trail), strict=True)
         puppets = (
             PuppetMoment(now.positions, now.world, [(one.positions, one.world) for one in before], now.holds)
@@ -78,21 +77,29 @@ class Interpolation:
         )
         return Moment(time_s, [seen.time for seen in trail], tuple(puppets))
 
-    @property
-    def delay_s(self) -> float:
-        """How far behind the clock the dance is shown: the latency of the stage, and one tick."""
-        return TICK_S + (self._latency_s or 0.0)
-
     def left_stage(self, moment: Moment) -> float:
         """When what this moment shows left the stage, monotonic seconds."""
-        return min(moment.time_s, self._seen[-1].time) + (self._latency_s or 0.0)
+        return min(moment.time_s - self._prediction_s, self._seen[-1].time) + (self._latency_s or 0.0)
 
     def _note(self, frame: JointFrame) -> None:
         if frame.tick <= self._tick or (self._seen and frame.frame_time <= self._seen[-1].time):
             return
         self._tick = frame.tick
-        figures = tuple(_Figure(one.positions, one.world, one.holds) for one in frame.puppets)
-        self._seen.append(_Seen(frame.frame_time, frame.left, figures))
+        figures = tuple(Figure(one.positions, one.world, one.holds) for one in frame.puppets)
+        ahead = self._ahead(frame.tick, figures)
+        self._seen.append(_Seen(frame.tick, frame.frame_time, frame.left, figures, ahead))
+
+    def _ahead(self, tick: int, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
+        """The figures as predicted; as they are after a gap, or where nothing is to be predicted."""
+        if not self._prediction_s or self._reader.facts is None or len(self._seen) < 2 * SPAN:
+            return figures
+        before, earlier = self._seen[-SPAN], self._seen[-2 * SPAN]
+        if (before.tick, earlier.tick) != (tick - SPAN, tick - 2 * SPAN):
+            return figures
+        if self._predict is None:
+            self._predict = Prediction(self._reader.facts.skeleton)
+        past = zip(figures, before.figures, earlier.figures, strict=True)
+        return tuple(self._predict(*three, self._prediction_s / TICK_S) for three in past)
 
     def _follow_latency(self, now: float) -> None:
         """Follow the latency of nine in ten frames, so slowly that it does not show."""
@@ -108,17 +115,17 @@ class Interpolation:
         self._before = now
 
 
-def _between(before: _Seen, after: _Seen, time_s: float) -> tuple[_Figure, ...]:
-    """Positions (J, 3), world rotations (J, 4) and holds (J,) of each figure at a time between two frames."""
+def _between(before: _Seen, after: _Seen, time_s: float) -> tuple[Figure, ...]:
+    """The predicted figures, interpolated to a time between two frames."""
     gap_s = after.time - before.time
     if gap_s > _LONGEST_GAP_S:
-        return before.figures
+        return before.ahead
     share = np.float32((time_s - before.time) / gap_s)
     return tuple(
-        _Figure(
+        Figure(
             (one.positions + share * (next_one.positions - one.positions)).astype(np.float32),
             quaternion.slerp(one.world, next_one.world, share).astype(np.float32),
             (one.holds + share * (next_one.holds - one.holds)).astype(np.float32),
         )
-        for one, next_one in zip(before.figures, after.figures, strict=True)
+        for one, next_one in zip(before.ahead, after.ahead, strict=True)
     )

@@ -86,6 +86,7 @@ class Projector:
         self._is_black = False  # since that show waits
         self.shown: str | None = None  # the look of the last picture; None: none, or two that cross-fade
         self.is_preparing = False  # no watchdog counts meanwhile
+        self.held: list[float] | None = None  # rotation in the world (w, x, y, z) of the held joint
 
     @property
     def sees_stage(self) -> bool:
@@ -108,6 +109,7 @@ class Projector:
         self.shown = None
         self._follow_stage(now)
         moment = self._moment(now)
+        self.held = _held(moment) if moment is not None else None
         if self._to_draw is not None and moment is not None:
             self._prepare(self._to_draw, moment, screen, display, share)
         newest = self._poses.newest if self._poses is not None and self._drawn is not None else None
@@ -210,7 +212,7 @@ class Projector:
         return affordable_detail(partial(drawn, dearest), 1.0 / (self._config.rate or USUAL_RATE))
 
     def _switch_to(self, facts: Facts) -> None:
-        self._poses = Interpolation(self._reader)
+        self._poses = Interpolation(self._reader, self._config.prediction_ms / 1000.0)
         show = self._shown_show(facts)
         if self._drawn is not None and self._drawn.is_like(show):
             return
@@ -281,6 +283,14 @@ class ShownShow:
             and self.cards == other.cards
             and self.changed_at == other.changed_at
         )
+
+
+def _held(moment: Moment) -> list[float]:
+    """World rotation of the joint that a hand holds most firmly; of the root where none is held."""
+    puppet = moment.puppets[0]
+    joint = 0 if puppet.holds is None else int(np.argmax(puppet.holds))
+    rotation: list[float] = puppet.world[joint].tolist()
+    return rotation
 
 
 def _changed_at(path: Path) -> int:

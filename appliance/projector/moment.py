@@ -30,7 +30,7 @@ class PuppetMoment:
 class Moment:
     """The input of a look: all puppets, interpolated to one time.
 
-    time_s: the dance's time of this picture, monotonic seconds (at least a tick behind the clock);
+    time_s: the dance's time of this picture, monotonic seconds;
     trail_times: the ticks of the last TRAIL_S, seconds, same clock, ascending, none later than time_s, never
     empty.
 

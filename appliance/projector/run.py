@@ -53,7 +53,7 @@ _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 class Options:
     """The options of the command line. kind None: as the box file says; frames: a folder for PNGs.
 
-    stamps: draw when the dance left the stage into each picture's corner; raw: a descriptor for raw pictures;
+    stamps: draw the held joint's rotation into each picture's corner; raw: a descriptor for raw pictures;
     is_keyed: pictures that are written have alpha, as much as they shine;
     card: lines for the test card besides the projector's own figures, asked for once a second while it shows.
     """
@@ -174,7 +174,7 @@ class Run:
         lines = self._lines if self._controls.shows_info else ()
         left_stage = self.projector.draw(now, screen, size, lines, self._resolution.share)
         if self._options.stamps:
-            stamp(screen, left_stage)
+            stamp(screen, self._meter.pictures, self.projector.held if left_stage is not None else None)
         if self._options.frames is not None:
             pixels = screen.read(viewport=(0, 0, *size), components=4)
             pixels = keyed(pixels) if self._options.is_keyed else pixels

@@ -58,6 +58,12 @@ class ProjectorConfig(Section):
         None,
         within=(1, 240),
     )
+    prediction_ms: float = key(
+        "How far ahead the dance is predicted, so that the wall lags less behind the hand. 20 makes up for "
+        "the interpolation between frames, more for the display's delay too, but rougher; 0: smoothest.",
+        20.0,
+        within=(0, 50),
+    )
     mirror: bool = key("Left and right swapped, for rear projection.", False)
     upside_down: bool = key("Turned by 180 degrees, for a projector that hangs from the ceiling.", False)
     brightness: float = key("Factor on the brightness of the picture.", 1.0, within=(0.0, 2.0))

@@ -11,9 +11,9 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from hw_sim.latency import Response, light_ms
+from hw_sim.latency import response_ms
 from hw_sim.peers import ProbeError
-from hw_sim.screen import Picture, Screen, Watcher, left_stage
+from hw_sim.screen import Picture, Screen, Watcher, held_joint
 from tests.virtual_display import virtual_display
 
 PROJECTOR = """
@@ -25,13 +25,16 @@ from appliance.show.projector import ProjectorConfig
 
 window = Window(ProjectorConfig(size=(640, 480)), "window")
 context = GlContext(window)
-for line in sys.stdin:
+for number, line in enumerate(sys.stdin):
     context.gl.screen.clear(0.3, 0.3, 0.3)
-    stamp(context.gl.screen, float(line) if line.strip() else None)
+    stamp(context.gl.screen, number, [float(part) for part in line.split()] or None)
     context.finish()
     window.show()
     print(flush=True)
 """
+
+
+ORIENTATIONS = [(1.0, 0.0, 0.0, 0.0), (0.5, -0.5, 0.5, -0.5), (0.6, 0.0, -0.8, 0.0)]
 
 
 def wait_for(holds: Callable[[], bool]) -> None:
@@ -51,33 +54,26 @@ def test_what_the_projector_stamps_is_read_from_the_screen(monkeypatch: pytest.M
         with drawer, closing(Screen()) as screen:
             watcher = Watcher(screen)
             watcher.start()
-            now = time.monotonic()
-            for count, stamped in enumerate((now - 2.0, now - 1.0, now - 0.5), 1):
-                for drawn in (stamped, ""):  # then a picture that shows no dance
-                    drawer.stdin.write(f"{drawn}\n")
+            began = time.monotonic()
+            for count, stamped in enumerate(ORIENTATIONS, 1):
+                for drawn in (stamped, ()):  # then a picture that shows no dance
+                    drawer.stdin.write(" ".join(map(str, drawn)) + "\n")
                     drawer.stdin.flush()
                     drawer.stdout.readline()
                     wait_for(lambda wanted=count: len(watcher.pictures) == wanted)
             drawer.stdin.close()
             pictures = watcher.stop()
-    np.testing.assert_allclose(
-        [one.left_stage for one in pictures], [now - 2.0, now - 1.0, now - 0.5], atol=2e-4
-    )
-    assert all(one.seen_at > now for one in pictures)
+    np.testing.assert_allclose([one.joint for one in pictures], ORIENTATIONS, atol=1.1e-3)
+    assert all(one.arrived_at > began for one in pictures)
 
 
-@pytest.mark.parametrize("damage", [1 << 35, 1 << 34, 1 << 20, 1 << 2])
+@pytest.mark.parametrize("damage", [1 << 51, 1 << 50, 1 << 45, 1 << 20, 1 << 2])
 def test_a_stamp_that_is_half_drawn_is_no_stamp(damage: int) -> None:
-    whole = 0b1010 << 32 | 0x1234567 << 4 | sum(range(1, 8)) % 16
-    assert left_stage(whole, 3000.0) == pytest.approx(0x1234567 * 1e-4, abs=2e-4)
-    assert left_stage(whole ^ damage, 3000.0) is None
-
-
-def test_a_stamp_is_the_newest_time_before_now_with_these_digits() -> None:
-    whole = 0b1010 << 32 | 7 << 4 | 7
-    assert left_stage(whole, 3 * (1 << 28) * 1e-4 + 1.0) == pytest.approx(
-        3 * (1 << 28) * 1e-4 + 7e-4, abs=2e-4
-    )
+    whole = 0b1010 << 48 | 0x12345678901 << 4 | sum(range(10)) + 1 & 15
+    found = held_joint(whole)
+    assert found is not None
+    assert found[3] == pytest.approx(2 * (0x101) / 1023 - 1)
+    assert held_joint(whole ^ damage) is None
 
 
 def test_without_a_screen_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,6 +83,12 @@ def test_without_a_screen_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_light_of_a_step_is_the_first_picture_that_shows_half_of_it() -> None:
-    pictures = [Picture(10.0 + 0.02 * n + 0.03, 10.0 + 0.02 * n) for n in range(50)]
-    found = light_ms([Response(10.1, 10.13), Response(10.5, 10.53), Response(12.0, 12.03)], pictures)
-    np.testing.assert_allclose(found, [1000 * (10.17 - 10.1), 1000 * (10.57 - 10.5)])
+    """Pictures at 50 Hz; a joint that turns by 0.4 radians within four of them, 50 ms after the step."""
+    at_s = 10.0 + 0.02 * np.arange(100)
+    half = 0.2 * np.clip((at_s - 10.55) / 0.08, 0.0, 1.0)
+    pictures = [
+        Picture(float(now), np.array([np.cos(turn), 0.0, np.sin(turn), 0.0]))
+        for now, turn in zip(at_s, half, strict=True)
+    ]
+    assert response_ms([10.5], pictures) == pytest.approx([100.0])
+    assert len(response_ms([11.4], pictures)) == 0  # nothing moves any more

@@ -1,15 +1,18 @@
-"""Between ticks poses are interpolated, one tick behind the stage; over gaps nothing is made up."""
+"""Between ticks poses are interpolated, one tick behind the stage or predicted; gaps are not filled."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.pose import quaternion
+from appliance.pose.skeleton import Skeleton
 from appliance.projector.interpolation import TICK_S, TRAIL_S, Interpolation
+from appliance.projector.prediction import CONFIDENCE
 
 WAY_S = 0.004  # from a frame's time to its leaving the stage
 TURN = 2.0  # radians a second
@@ -30,6 +33,7 @@ class Ring:
     """What a reader would read: frames that have left the stage by now, the newest 64 of them."""
 
     frames_to_come: list[JointFrame] = field(default_factory=list)
+    facts = SimpleNamespace(skeleton=Skeleton(("hip", "neck"), (-1, 0), np.zeros((2, 3))))
 
     def frames(self, count: int, now: float) -> list[JointFrame]:
         there = [one for one in self.frames_to_come if one.left <= now]
@@ -40,8 +44,8 @@ def stage(ticks: range | list[int], way_s: float = WAY_S, start: float = 10.0) -
     return Ring([frame(tick, start + tick * TICK_S, start + tick * TICK_S + way_s) for tick in ticks])
 
 
-def following(ring: Ring) -> Interpolation:
-    return Interpolation(ring)  # type: ignore[arg-type]
+def following(ring: Ring, prediction_s: float = 0.0) -> Interpolation:
+    return Interpolation(ring, prediction_s)  # type: ignore[arg-type]
 
 
 def shown_times(poses: Interpolation, times: np.ndarray) -> np.ndarray:
@@ -65,6 +69,24 @@ def test_motion_is_even_and_exactly_one_tick_behind_what_has_left_the_stage(rate
     times = np.arange(11.0, 13.0, 1 / rate)
     shown = shown_times(following(stage(range(200))), times)
     assert shown == pytest.approx(times - TICK_S - WAY_S, abs=2e-5)
+
+
+@pytest.mark.parametrize("prediction_s", [0.005, 0.01, 0.02])
+def test_predicted_motion_is_even_and_further_on(prediction_s: float) -> None:
+    times = np.arange(11.0, 13.0, 1 / 60)
+    shown = shown_times(following(stage(range(200)), prediction_s), times)
+    wanted = times - TICK_S - WAY_S + CONFIDENCE * prediction_s
+    assert shown == pytest.approx(wanted, abs=1e-4)
+
+
+def test_frames_after_a_gap_are_shown_as_they_are() -> None:
+    ring = stage([*range(100), *range(110, 114)])
+    poses = following(ring, 0.02)
+    for now in 10.5 + np.arange(0.0, 2.0, 0.01):
+        poses.take(now)
+    moment = poses.moment(12.5)
+    assert moment is not None
+    assert moment.puppets[0].positions[0, 0] == ring.frames_to_come[-1].puppets[0].positions[0, 0]
 
 
 def test_nothing_before_the_first_frame_and_the_first_one_alone() -> None:
