@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import socket
+import zipfile
 from importlib.metadata import version
 
 import pytest
@@ -11,7 +12,7 @@ from playwright.sync_api import Page as Tab
 from playwright.sync_api import expect
 
 from appliance.show.box import UdpConfig, load_box
-from tests.console.browser import ON_A_LAPTOP, ON_BOTH, press, unlock
+from tests.console.browser import ON_A_LAPTOP, ON_BOTH, PATIENCE_MS, press, unlock
 from tests.console.page import Page
 from tests.system.box import Box
 
@@ -98,3 +99,74 @@ def test_the_last_lines_are_for_a_device_that_gave_the_pin(tab: Tab, venue: tupl
     expect(tab.locator("#logs")).to_contain_text("The dance goes to")
     expect(tab.locator("#logs li", has_text=re.compile("Hz +tick"))).to_have_count(1)
     assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+@ON_BOTH
+def test_a_receiver_is_added_and_removed_and_comments_elsewhere_stay(
+    tab: Tab, venue: tuple[Box, Page]
+) -> None:
+    box, page = venue
+    path = box.box_file
+    before = path.read_text()
+    path.write_text(f"# the box of this venue\n{before}")
+    unlock(tab, page)
+    press(tab, '[data-page="box"]')
+    try:
+        press(tab, "#file-read")
+        fields = tab.locator("#file-receivers fieldset")
+        expect(tab.locator("#file-add")).to_be_visible()
+        count = fields.count()
+        press(tab, "#file-add")
+        expect(fields).to_have_count(count + 1)
+        host, port = (fields.nth(count).locator("input").nth(place) for place in (0, 1))
+        host.fill("300.0.0.1")
+        port.fill("9123")
+        press(tab, "#file-check")
+        expect(host).to_have_attribute("aria-invalid", "true")
+        expect(tab.locator("#file-problems")).to_contain_text("is not an IPv4 address")
+        host.fill("192.168.0.20")
+        press(tab, "#file-check")
+        expect(tab.locator("#file-said")).to_contain_text("counts from the next start")
+        receivers = load_box(path).outputs.osc
+        assert (receivers[-1].host, receivers[-1].port, len(receivers)) == ("192.168.0.20", 9123, count + 1)
+        assert path.read_text().startswith("# the box of this venue\n")
+        press(tab, f"#file-receivers fieldset:nth-child({count + 1}) button")
+        expect(fields.nth(count)).to_contain_text("Removed when saved")
+        press(tab, "#file-check")
+        expect(tab.locator("#file-said")).to_contain_text("counts from the next start")
+        assert len(load_box(path).outputs.osc) == count
+    finally:
+        path.write_text(before)
+
+
+@ON_A_LAPTOP
+def test_one_button_makes_one_file_for_somebody_who_can_help(tab: Tab, venue: tuple[Box, Page]) -> None:
+    _, page = venue
+    assert page.get("/api/help.zip", Cookie="none").status == 401
+    assert page.post("/api/help", {"journal": True}, Cookie="none").status == 401
+    unlock(tab, page)
+    press(tab, '[data-page="box"]')
+    with tab.expect_download(timeout=5 * PATIENCE_MS) as download:
+        press(tab, "#help-make")
+    expect(tab.locator("#help-said")).to_contain_text(download.value.suggested_filename)
+    with zipfile.ZipFile(download.value.path()) as whole:
+        parts = {name: whole.read(name) for name in whole.namelist()}
+    assert "journal.bunraku" in parts, parts["README.txt"].decode()
+    assert b"stage" in parts["doctor.txt"] and b"The dance goes to" in parts["log.txt"]
+    assert not [name for name, content in parts.items() if page.pin.encode() in content]
+
+
+def test_a_picture_of_now_is_drawn_for_somebody_far_away(tab: Tab, venue: tuple[Box, Page]) -> None:
+    _, page = venue
+    answer = page.get("/api/now.svg")
+    assert answer.status == 200 and answer.headers["Content-Type"].startswith("image/svg+xml")
+    assert answer.text.count("<path") > 4, "a figure"
+    assert page.get("/api/night").status == 200
+    assert [page.get(f"/api/night/{name}.svg").status for name in ("7", "..", "%2e%2e")] == [404, 404, 404]
+    drawn = """() => new Promise((over) => {
+      const picture = new Image();
+      picture.onload = () => over(picture.naturalWidth > 0);
+      picture.onerror = () => over(false);
+      picture.src = "/api/now.svg";
+    })"""
+    assert tab.evaluate(drawn)

@@ -52,7 +52,8 @@ def stage(host: HostView) -> Iterator[Finding]:
     for process, fallback in host.stage.fallbacks:
         if fallback.active and process != "preflight":  # its refusals are shown with the show
             judged = wrong if fallback.name in _SEEN or fallback.name.endswith("-died") else better
-            yield judged(f"{process}: {fallback.name}", *_halves(fallback.words, process))
+            about = f" ({fallback.about})" if fallback.about else ""
+            yield judged(f"{process}: {fallback.name}{about}", *_halves(fallback.words, process))
 
 
 def _halves(sentences: str, process: str) -> tuple[str, str]:

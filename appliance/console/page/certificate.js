@@ -1,6 +1,6 @@
 // A proof as a document: one sheet of paper, to be printed or sent as a picture.
 import { drawPlots, PAPER } from "./plots.js";
-import { locale, number, translated, words } from "./words.js";
+import { hasWords, locale, number, translated, words } from "./words.js";
 
 const WIDTH = 1240, HEIGHT = 1754, MARGIN = 90; // A4 at 150 dots an inch
 
@@ -12,6 +12,14 @@ export function limitWords(limit) {
   const key = `limit_${limit.words.toLowerCase().replace(/[^a-z0-9]+/g, "_")}`;
   const said = words(key);
   return said === key ? limit.words : said;
+}
+
+// A finding about a fallback is named like `stage: receiver-gone (10.0.0.9:9004)`; its sentence has its translation.
+export function findingWords(finding) {
+  const [, , name, about] = /^(\w+): ([a-z-]+)(?: \((.*)\))?$/.exec(finding.what) ?? [];
+  const key = about && hasWords(`named_${name}`) ? `named_${name}` : `fallback_${name}`;
+  if (name && hasWords(key)) return `${about && key.startsWith("fallback_") ? `${about}: ` : ""}${words(key, { about })}`;
+  return `${translated(finding.what)}: ${translated(finding.words)}`;
 }
 
 export const valueOf = (limit) => limit.value === null ? words("prove_nothing_came") : `${number(limit.value, 2)} ${limit.unit}`;
@@ -84,7 +92,7 @@ function doctor(context, proof, y) {
   for (const finding of proof.findings) {
     const colour = finding.verdict === "wrong" ? PAPER.fault : finding.verdict === "ok" ? PAPER.well : PAPER.ink;
     text(context, words(`finding_${finding.verdict}`), MARGIN, y + 10, 20, colour, "700");
-    y = text(context, `${translated(finding.what)}: ${translated(finding.words)}`, MARGIN + 230, y + 10, 20, PAPER.ink, "400");
+    y = text(context, findingWords(finding), MARGIN + 230, y + 10, 20, PAPER.ink, "400");
     if (finding.cure) y = text(context, `→ ${translated(finding.cure)}`, MARGIN + 230, y, 20, PAPER.quiet, "400");
   }
   return y;

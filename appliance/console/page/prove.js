@@ -1,6 +1,6 @@
 // Prove it: a measurement begins here, grows while it is looked at, and stays as a document.
 import { request } from "./box.js";
-import { drawCertificate, limitWords, madeAt, mostOf, valueOf, verdictOf } from "./certificate.js";
+import { drawCertificate, findingWords, limitWords, madeAt, mostOf, valueOf, verdictOf } from "./certificate.js";
 import { ask, command, say } from "./device.js";
 import { byId } from "./elements.js";
 import { twice } from "./hold.js";
@@ -158,8 +158,7 @@ function limitItem(limit) {
 }
 
 function findingItem(finding) {
-  const said = `${words(`finding_${finding.verdict}`)} · ${translated(finding.what)}: ${translated(finding.words)}`;
-  return line(said, translated(finding.cure), finding.verdict);
+  return line(`${words(`finding_${finding.verdict}`)} · ${findingWords(finding)}`, translated(finding.cure), finding.verdict);
 }
 
 function line(said, below, kind) {

@@ -28,7 +28,13 @@ export function translated(said) {
   if (!said || patterns.length === 0) return said;
   const whole = matched(said);
   if (whole !== null) return whole;
-  return said.split(/(?<=[.?!:;]) (?=\S)/).map((one) => matched(one) ?? one).join(" ");
+  return said.split(/(?<=[.?!:;]) (?=\S)/).map(piece).join(" ");
+}
+
+// A part of an answer, whose sentence may have lost or gained its full stop.
+function piece(said) {
+  const bare = said.replace(/\.$/, ""), end = said.slice(bare.length);
+  return matched(said) ?? (end ? matched(bare)?.concat(end) : matched(`${said}.`)?.replace(/\.$/, "")) ?? said;
 }
 
 function matched(said) {
