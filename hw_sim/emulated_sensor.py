@@ -1,6 +1,6 @@
 """A wearable in Python: power, the IMU's start-up, its own clock, pairing, signed readings at 50 Hz.
 
-Linked, it takes 1.1 ms of processor time a second where the compiled firmware takes 9.9, and needs no compiler.
+Linked, it takes 1.1 ms of processor time a second; the compiled firmware takes 9.9, and needs a compiler.
 """
 
 from __future__ import annotations
