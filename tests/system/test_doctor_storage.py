@@ -85,6 +85,15 @@ def test_a_disk_that_forgets_what_is_written_is_wrong(
     assert found.verdict == "wrong" and "came back changed" in found.words
 
 
+def test_a_data_folder_without_a_journal_of_its_own_can_be_damaged_by_a_power_cut(tmp_path: Path) -> None:
+    (tmp_path / "data/bunraku").mkdir(parents=True)
+    lay(tmp_path, "/proc/mounts", "/dev/sda1 / ext4 rw 0 0\n/dev/sdb1 /data vfat rw 0 0\n")
+    found = only(storage.data_folders(HostView(tmp_path)))
+    assert found.verdict == "better" and "It is on vfat" in found.words
+    lay(tmp_path, "/proc/mounts", "/dev/sda1 / ext4 rw 0 0\n/dev/sdb1 /data ext4 rw 0 0\n")
+    assert only(storage.data_folders(HostView(tmp_path))).verdict == "ok"
+
+
 def test_a_missing_data_partition(tmp_path: Path) -> None:
     lay(tmp_path, "/etc/fstab", "# a comment\nLABEL=data /data ext4 nofail 0 2\n")
     lay(tmp_path, "/proc/mounts", "overlay / overlay rw 0 0\n/dev/sdb1 /media/bunraku vfat ro 0 0\n")

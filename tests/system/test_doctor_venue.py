@@ -107,3 +107,30 @@ def test_a_port_that_another_process_holds_is_wrong_and_it_is_named(tmp_path: Pa
         name = Path(f"/proc/{os.getpid()}/comm").read_text().strip()
         assert (found.verdict, f"{name} (process {os.getpid()})" in found.words) == ("wrong", True)
     assert next(iter(venue.ports(HostView(box=box)))).verdict == "ok"
+
+
+@pytest.fixture
+def radio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> HostView:
+    """This machine, whose loopback plays the access point's card; stand-ins say what `tmp_path` has."""
+    for name in ("iw", "ip"):
+        (tmp_path / name).write_text(f'#!/bin/sh\ncat "{tmp_path}/{name} $*"\n')
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    monkeypatch.setattr(venue, "_access_point_card", lambda _: "lo")
+    (tmp_path / "iw reg get").write_text("global\ncountry DE: DFS-ETSI\n")
+    (tmp_path / "iw dev lo station dump").write_text("Station 1 (on lo)\n\tx: 2\nStation 2 (on lo)\n")
+    (tmp_path / "ip -brief address show dev lo").write_text("lo UP 10.77.0.1/24\n")
+    return HostView()
+
+
+def test_what_the_access_point_really_does_is_said(radio: HostView, tmp_path: Path) -> None:
+    told = tmp_path / "iw dev lo info"
+    told.write_text("Interface lo\n\tssid stage net\n\ttype AP\n\tchannel 6 (2437 MHz), width: 20 MHz\n")
+    found = only(venue.access_point(radio))
+    assert found.verdict == "ok"
+    assert "lo is on the air as 'stage net', channel 6 (2437 MHz), country DE; 2 joined." in found.words
+    (tmp_path / "ip -brief address show dev lo").write_text("lo DOWN\n")
+    assert "no address" in only(venue.access_point(radio)).words
+    told.write_text("Interface lo\n\ttype managed\n")
+    found = only(venue.access_point(radio))
+    assert found.verdict == "wrong" and "not on the air (it is 'managed')" in found.words

@@ -42,6 +42,7 @@ CHECKS = (
     venue.ports,
     venue.network,
     venue.radios,
+    venue.access_point,
     venue.cables,
     venue.adapters,
     venue.display,
@@ -68,7 +69,7 @@ def doctor(box: ThisBoxFile = None, chosen: ChosenFile = None, as_json: AsJson =
 
 
 def findings(host: HostView) -> Iterator[Finding]:
-    """The findings of all checks; some of them measure for a second."""
+    """The findings of all checks; some of them measure for five seconds."""
     for check in CHECKS:
         yield from check(host)
     if host.is_here:
@@ -78,7 +79,7 @@ def findings(host: HostView) -> Iterator[Finding]:
 
 
 def _sampled(host: HostView) -> Sample:
-    """A sample of one second, without the box's own processes."""
+    """A sample, without the box's own processes."""
     ours = {os.getpid()}
     ours |= {int(folder.name) for folder in host.found("/proc/[0-9]*") if host.is_bunraku(folder)}
     return sample(host.box.realtime.priority, frozenset(ours))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
+import subprocess
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +17,8 @@ from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.outputs.frame_reader import FrameReader
 from appliance.release.choice import RUN
 from appliance.show.box import BoxConfig
+
+_ASK_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -108,3 +112,14 @@ def running_stage(box: BoxConfig) -> RunningStage | None:
             told = [("stage", one) for one in fallen(health.get("fallbacks"))] + shared.fallbacks(now)
             members = tuple(shared.members(now))
         return RunningStage(reader.facts.pid, health, tuple(told), members, reader.facts.show_directory)
+
+
+def output_of(*command: str) -> str:
+    """What a program of this machine prints; "" where it is missing or does not answer."""
+    if shutil.which(command[0]) is None:
+        return ""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_ASK_S, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout

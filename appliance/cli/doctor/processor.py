@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 from appliance.box.realtime import borrowed_priority
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
-from appliance.cli.doctor.host_view import HostView
-from appliance.cli.doctor.sample import Sample
+from appliance.cli.doctor.host_view import HostView, output_of
+from appliance.cli.doctor.sample import SECONDS, Sample
 
 LATE_MS, VERY_LATE_MS = 5.0, 15.0
 WARM_C, HOT_C = 70.0, 80.0
@@ -73,7 +73,11 @@ def wakeup_latency(seen: Sample) -> Iterator[Finding]:
     """How late a thread like the stage's wakes: no software can be more punctual than that."""
     what, late = "wake-ups", seen.late_ms
     worst = late[-1]
-    words = f"The latest of {len(late)} in a second came {worst:.1f} ms after its time."
+    of = "with real-time priority" if seen.real_time else "without the real-time priority of the stage"
+    words = (
+        f"Of {len(late)} in {SECONDS:g} s, {of}, half came within {late[len(late) // 2]:.2f} ms, 99 % within "
+        f"{late[len(late) * 99 // 100]:.2f} ms, the latest {worst:.1f} ms after its time."
+    )
     very_late = sum(one > VERY_LATE_MS for one in late)
     cure = (
         "Look at what else runs here (below), at power saving in the firmware, at a virtual "
@@ -165,6 +169,9 @@ def power(host: HostView) -> Iterator[Finding]:
     """A Raspberry Pi says whether its supply is too weak (bits of `vcgencmd get_throttled`)."""
     files = host.found("/sys/devices/platform/soc*/soc*firmware/get_throttled")
     bits = next((int(text, 16) for file in files if (text := host.text(file))), None)
+    if bits is None and host.is_here:  # Raspberry Pi OS has the program, other kernels have no such file
+        told = output_of("vcgencmd", "get_throttled").strip().partition("throttled=")[2]
+        bits = int(told, 16) if told else None
     alarms = [
         host.number(chip.with_name("in0_lcrit_alarm"))
         for chip in host.found("/sys/class/hwmon/hwmon*/name")

@@ -19,6 +19,7 @@ LEAST_FREE_BYTES, LEAST_FREE_SHARE = 256 << 20, 0.10
 LEAST_MEMORY_KB = 200 << 10
 RELEASES = Path("/data/bunraku-releases")  # folder of a box made from the image
 WORN = 8  # used, of ten steps of an eMMC's life
+_WITHOUT_JOURNAL = ("vfat", "msdos", "exfat", "ext2", "fuseblk", "ntfs3")
 _LOST = "sensors' keys, neutral poses, shows from sticks and the journal"
 _KEPT = "the journal, the place of the dance, what the box knows about sensors"
 
@@ -82,6 +83,12 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
             what,
             f"{folder} does not keep what is written there ({why}): {_KEPT} are lost at a power cut.",
             "`dmesg | tail` says why; then a new card or disk.",
+        )
+    if disk is not None and disk.kind in _WITHOUT_JOURNAL:
+        return better(
+            what,
+            f"{words} It is on {disk.kind}, which a power cut can damage: {_KEPT} may be lost with it.",
+            "`sudo mkfs.ext4 -L data /dev/sdX1` on an empty one, `sudo bunraku release data /dev/sdX1`.",
         )
     if free < min(LEAST_FREE_BYTES, LEAST_FREE_SHARE * whole):
         return better(

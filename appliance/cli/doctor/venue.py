@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
-import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from serial.tools.list_ports_common import ListPortInfo
 
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
-from appliance.cli.doctor.host_view import HostView
+from appliance.cli.doctor.host_view import HostView, output_of
 from appliance.outputs.dmx.adapter_wire import AdapterError
 from appliance.outputs.dmx.serial_port import (
     adapters_here,
@@ -25,7 +23,6 @@ from appliance.show.dmx import IN_WORDS, DmxConfig
 
 _KINDS: dict[str, Callable[[ListPortInfo], bool]] = {"usb-pro": is_usb_pro, "open-dmx": is_bare_ftdi}
 _UDMX = ("16c0", "05dc")
-_ASK_S = 2.0
 
 
 def ports(host: HostView) -> Iterator[Finding]:
@@ -127,7 +124,7 @@ def radios(host: HostView) -> Iterator[Finding]:
                 f"{card.name} is the access point, on a Pi's own radio: it loses clients after hours.",
                 "A router for 2.4 GHz on Ethernet.",
             )
-        if host.is_here and "on" in _output_of("iw", "dev", card.name, "get", "power_save").split()[-1:]:
+        if host.is_here and "on" in output_of("iw", "dev", card.name, "get", "power_save").split()[-1:]:
             yield better(
                 "wi-fi",
                 f"{card.name} saves power: readings wait for up to 100 ms.",
@@ -146,14 +143,39 @@ def _access_point_card(host: HostView) -> str:
     return next((line.partition("=")[2] for line in lines if line.startswith("interface-name=")), "")
 
 
-def _output_of(*command: str) -> str:
-    if shutil.which(command[0]) is None:
-        return ""
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_ASK_S, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return done.stdout
+def access_point(host: HostView) -> Iterator[Finding]:
+    """What the card does that `bunraku-access-point` has set: the kernel is asked, not the settings."""
+    card = _access_point_card(host)
+    if not card or not host.is_here or not host.at(f"/sys/class/net/{card}").exists():
+        return
+    what, told = "access point", output_of("iw", "dev", card, "info")
+    lines = [line.split() for line in told.splitlines()]
+    facts = {words[0]: " ".join(words[1:]) for words in lines if len(words) > 1}
+    if not told:
+        yield better(what, "Nobody says what the radio does: `iw` is missing.", "`sudo apt-get install iw`")
+    elif facts.get("type") != "AP":
+        yield wrong(
+            what,
+            f"{card} is not on the air (it is '{facts.get('type', 'nothing')}'): no sensor joins.",
+            "`journalctl -u NetworkManager` says why; `sudo bunraku-access-point` sets it again.",
+        )
+    else:
+        channel = facts.get("channel", "?").partition(",")[0]
+        here = "10.77.0.1/" in output_of("ip", "-brief", "address", "show", "dev", card)
+        joined = output_of("iw", "dev", card, "station", "dump").count("Station ")
+        country = output_of("iw", "reg", "get").partition("country ")[2][:2] or "unknown"
+        words = (
+            f"{card} is on the air as '{facts.get('ssid', '')}', channel {channel}, country {country}; "
+            f"{joined} joined."
+        )
+        if here:
+            yield ok(what, words)
+        else:
+            yield wrong(
+                what,
+                f"{words} It has no address: sensors find no box.",
+                "`sudo systemctl restart NetworkManager`, then look again.",
+            )
 
 
 def cables(host: HostView) -> Iterator[Finding]:
