@@ -1,0 +1,66 @@
+"""The pictures of the documents: what they must show, whatever the dancer and the measurement are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+from appliance.pose import quaternion
+from appliance.pose.bvh import read_bvh
+from appliance.show.bundle import default_show_path
+from tools import certificate_picture
+from tools.certificate_picture import NOTES, note_of
+from tools.joints_picture import FINGERS, draw_joints
+from tools.loop_picture import HANG, SECONDS, arm_at
+
+
+def test_the_arm_of_the_loop_hangs_at_its_start_and_comes_round() -> None:
+    hanging = quaternion.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.radians(HANG))
+    assert abs(float(arm_at(0.0) @ hanging)) == pytest.approx(1.0)
+    assert abs(float(arm_at(SECONDS) @ arm_at(0.0))) == pytest.approx(1.0)
+    assert abs(float(arm_at(SECONDS / 4) @ hanging)) < 0.7  # it has gone far away
+
+
+def test_every_joint_but_fingers_and_eyes_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[str] = []
+    text = ImageDraw.ImageDraw.text
+
+    def noted(pen: ImageDraw.ImageDraw, at: tuple[float, float], words: str, **style: object) -> None:
+        written.append(words)
+        text(pen, at, words, **style)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ImageDraw.ImageDraw, "text", noted)
+    assert Image.open(draw_joints(tmp_path / "joints.png")).size == (960, 760)
+    names = read_bvh(default_show_path() / "skeleton.bvh").skeleton.names
+    assert set(names) & set(written) == {name for name in names if not any(one in name for one in FINGERS)}
+
+
+def test_each_limit_of_a_measurement_has_its_own_note() -> None:
+    page = certificate_picture.verdict(_figures())
+    notes = [note_of(limit.words) for limit in page]
+    assert len(set(notes)) == len(page)
+    assert set(notes) == set(NOTES.values())
+
+
+def test_a_limit_without_a_note_is_an_error() -> None:
+    with pytest.raises(KeyError):
+        note_of("brightness")
+
+
+def _figures() -> dict[str, object]:
+    """A measurement with every figure that has a limit."""
+    percentiles = {"p50": 1.0, "p99": 1.0, "p999": 1.0, "max": 1.0}
+    ways = ("transport_ms", "free_running_transport_ms", "response_ms", "tick_ms", "hand_to_light_ms")
+    soon = ("power_on_to_reading_s", "restart_to_reading_s", "kill_to_reading_s")
+    return {
+        **dict.fromkeys((*ways, *soon), percentiles),
+        "ticks": 100,
+        "late_ticks": 0,
+        "missing_frames": 0,
+        "rss_mb": 90.0,
+        "start_to_first_frame_s": 1.0,
+        "firmware": False,
+    }
