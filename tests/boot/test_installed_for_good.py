@@ -11,9 +11,8 @@ from tests.boot.box import STAGE, Box, standing
 from tests.boot.disk import DataDisk
 from tests.boot.figures import Figures
 from tests.boot.hall import Hall
-from tests.boot.root import MAKER, release
+from tests.boot.root import release
 from tests.boot.trial import changed_release
-from tests.deploy.small_release import sign
 
 KEPT = "/data/bunraku-releases"
 _STAGE = "appliance/stage/run.py"
@@ -29,11 +28,8 @@ pytestmark = pytest.mark.boot
 def on_the_stick(image: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Release 9.9.4: one of its units is another one, and its stage can be told to fail."""
     folder = tmp_path_factory.mktemp("stick") / "release"
-    made = changed_release(release(image), folder, "9.9.4", _STAGE, _FAILS_WHEN_TOLD)
-    unit = made / "system/usr/lib/systemd/system/bunraku-console.service"
-    unit.write_text(unit.read_text().replace("TasksMax=48", "TasksMax=49"))
-    sign(made, MAKER)
-    return made
+    unit = "[Service]\nTasksMax=47\n"
+    return changed_release(release(image), folder, "9.9.4", _STAGE, _FAILS_WHEN_TOLD, unit)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +42,7 @@ def with_release(
         box.disk.grown(1024)
         box.power_on(binds=((box.boot, "/boot/bunraku"), (on_the_stick, "/media/bunraku/bunraku/release")))
         box.await_frames(50)
-        said = _bash(box, "bunraku-install 2>&1; echo status $?", 240.0)
+        said = _bash(box, "bunraku release install 2>&1; echo status $?", 240.0)
         assert "status 0" in said, said
         box.machine.cut_power()
         yield box.disk
@@ -67,14 +63,14 @@ def test_it_dances_after_a_power_cut_and_goes_back_for_good(installed: Box, figu
         "power-on to first frame with a release on the data partition", first.at - box.machine.powered_at
     )
     assert "9.9.4" in box.machine.run("readlink", "/opt/bunraku/current")
-    assert box.machine.show("bunraku-console", "TasksMax") == "49", "systemd has read this release's units"
+    assert box.machine.show("bunraku-console", "TasksMax") == "47", "systemd has read this release's units"
     box.machine.await_that(lambda: _watch_is_over(box), "the watch does not end: it dances")
     assert box.machine.show(_WATCH, "Result") == "success"
     assert not box.machine.path(f"{KEPT}/tries").exists()
     assert box.machine.run("systemctl", "--failed", "--plain", "--no-legend") == ""
     assert box.machine.show(STAGE, "NRestarts") == "0"
     _the_services_cannot_touch_it(box)
-    said = _bash(box, "bunraku-install --rollback; bunraku-install --list", 60.0)
+    said = _bash(box, "bunraku release back; bunraku release list", 60.0)
     assert said.splitlines()[-1] == "  9.9.4", said
     box.machine.cut_power()
     box.power_on()
@@ -93,7 +89,7 @@ def test_one_whose_stage_does_not_start_any_more_gives_way(installed: Box, figur
         "a release that fails at power-on: until what came before dances", first.at - box.machine.powered_at
     )
     box.machine.await_that(lambda: _watch_is_over(box), "the watch does not end: it does not dance")
-    assert "9.9.4  put aside: its stage did not dance" in _bash(box, "bunraku-install --list")
+    assert "9.9.4  put aside: its stage did not dance" in _bash(box, "bunraku release list")
     box.machine.cut_power()
     box.power_on()
     box.await_frames(50)
@@ -107,7 +103,7 @@ def test_a_damaged_one_never_dances(installed: Box) -> None:
     box.power_on()
     box.await_frames(50)
     assert "9.9.4" not in box.machine.run("readlink", "/opt/bunraku/current")
-    assert "9.9.4  put aside: files of it are missing or damaged" in _bash(box, "bunraku-install --list")
+    assert "9.9.4  put aside: files of it are missing or damaged" in _bash(box, "bunraku release list")
 
 
 def test_without_a_data_partition_what_came_with_the_box_dances(
@@ -122,7 +118,7 @@ def test_without_a_data_partition_what_came_with_the_box_dances(
     figures.note("SIGKILL to next frame, no data partition", after.at - killed, limit=1.0)
     box.await_frames(50, after.at)
     assert "9.9.4" not in box.machine.run("readlink", "/opt/bunraku/current")
-    said = _bash(box, "bunraku-install /media/release 2>&1; echo status $?")
+    said = _bash(box, "bunraku release install /media/release 2>&1; echo status $?")
     assert "status 1" in said and "where releases are kept, is not there" in said, said
 
 

@@ -49,7 +49,7 @@ def _install(box: Box, image: Path, stick: Path, version: str, last_lines: str) 
     box.hall.audience.forget()
     box.await_frames(50)
     return box.machine.run(
-        "sh", "-c", "bunraku-install --until-power-off 2>&1; echo status $?", patience_s=240.0
+        "sh", "-c", "bunraku release install --until-power-off 2>&1; echo status $?", patience_s=240.0
     )
 
 
@@ -60,7 +60,7 @@ def test_a_release_that_fails_its_preflight_never_dances(image: Path, touring: B
     seen = box.await_frames(50, time.time())
     assert lives(box.hall.audience.frames) == 1 and lives(seen) == 1, "the dance was interrupted"
     assert box.machine.show(STAGE, "NRestarts") == "0"
-    assert "9.9.1" not in box.machine.run("bash", "/opt/bunraku/current/install.sh", "--list")
+    assert "9.9.1" not in box.machine.run("bunraku", "release", "list")
 
 
 def test_a_release_that_does_not_start_gives_way_to_the_old_one(

@@ -1,37 +1,41 @@
-"""Releases that are wrong in a chosen way, made from a sound one as it lies on a stick."""
+"""Packages that are wrong in a chosen way, made from a sound one as it lies on a stick."""
 
 from __future__ import annotations
 
-import shutil
-import zipfile
+import subprocess
 from pathlib import Path
 
 from tests.boot.root import MAKER
 from tests.deploy.small_release import sign
 
+TREE = "opt/bunraku/unpacked"
 
-def changed_release(sound: Path, folder: Path, version: str, module: str, last_lines: str) -> Path:
-    """The same release as another version, with `last_lines` at the end of one of bunraku's modules.
 
-    All its hashes are right, and its maker has signed it: what is wrong shows only when it runs.
+def changed_release(
+    sound: Path, folder: Path, version: str, module: str, last_lines: str, unit: str = ""
+) -> Path:
+    """A stick's folder with the same release as another version; `last_lines` end one of bunraku's modules.
+
+    Its maker has signed it: what is wrong shows only when it runs. unit: more lines of the console's unit.
     """
-    shutil.copytree(sound, folder)
-    wheel = next((folder / "wheels").glob("bunraku-*.whl"))
-    _rewrite(wheel, module, last_lines)
-    facts = [
-        line for line in (folder / "release").read_text().splitlines() if not line.startswith("version ")
-    ]
-    (folder / "release").write_text("\n".join([f"version {version}", *facts]) + "\n")
-    sign(folder, MAKER)
+    folder.mkdir(parents=True)
+    top = folder.with_name(folder.name + ".top")
+    subprocess.run(["dpkg-deb", "--raw-extract", sound, top], check=True)
+    tree = top / TREE
+    [changed] = tree.glob(f"lib/python3*/site-packages/{module}")
+    with changed.open("a") as end:
+        end.write(last_lines)
+    for compiled in (changed.parent / "__pycache__").glob(f"{changed.stem}.*.pyc"):
+        compiled.unlink()
+    with (tree / "system/usr/lib/systemd/system/bunraku-console.service").open("a") as end:
+        end.write(unit)
+    for facts, name in ((tree / "release", "version "), (top / "DEBIAN/control", "Version: ")):
+        lines = facts.read_text().splitlines()
+        facts.write_text(
+            "".join(f"{name}{version}\n" if one.startswith(name) else f"{one}\n" for one in lines)
+        )
+    package = folder / sound.name.replace(sound.name.split("_")[1], version)
+    subprocess.run(["dpkg-deb", "--root-owner-group", "-Zzstd", "-z1", "--build", top, package], check=True)
+    subprocess.run(["rm", "-r", top], check=True)
+    sign(package, MAKER)
     return folder
-
-
-def _rewrite(wheel: Path, module: str, last_lines: str) -> None:
-    part = wheel.with_suffix(".part")
-    with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(part, "w") as new:
-        assert module in old.namelist()
-        for info in old.infolist():
-            data = old.read(info)
-            changed = data + last_lines.encode() if info.filename == module else data
-            new.writestr(info, changed, zipfile.ZIP_STORED)
-    part.replace(wheel)
