@@ -9,7 +9,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-
 from appliance.body.mesh_file import MESH_FILE, read_mesh, write_mesh
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import SHOW_OR_NAME, BoxFile
@@ -39,6 +38,7 @@ from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.admission import Admission
 from appliance.stage.open_sensors import reach
 from appliance.stage.stage_error import StageError
+
 from appliance.stage.stage_parts import StageParts, admission, assemble
 
 _PATIENCE_S = 60.0  # a user can wait longer than a box at power-on
@@ -104,7 +104,7 @@ def verified_parts(directory: Path, box_file: Path | None) -> tuple[StageParts, 
     show = load_show(directory)
     _refuse_misfits(show, box)
     parts = assemble(show, without_ports(box))
-    verdict = admission(parts, show, box)
+    verdict = admission(parts, box)
     parts.close()
     return parts, verdict
 

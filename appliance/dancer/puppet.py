@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import onnxruntime
-from numpy.typing import NDArray
-
 from appliance.dancer.slerp import FloatArray
 from appliance.pose.foreign_file import content
 from appliance.pose.skeleton import Skeleton, UnknownJointError
 from appliance.show.bundle import LARGEST_FILE
 from appliance.show.network import WINDOW, latent_size, network_inputs, rest_pose, resting_feed
+from numpy.typing import NDArray
 
 _OUTPUT = "poses"
 _CURE = "Export the show again, or copy the bundle again."
@@ -27,7 +26,7 @@ class PuppetError(ValueError):
 
 
 class PuppetNetwork:
-    """One onnxruntime session on one network file, and the puppets that it dances, all in one run.
+    """One onnxruntime session on one network file, `path`, and the puppets that it dances, all in one run.
 
     joints: names of the M moving joints; moving (M,): their places in the skeleton; window: poses a window;
     latent: Z numbers that a window is coded in; rest (M, 4).
@@ -38,6 +37,7 @@ class PuppetNetwork:
 
     def __init__(self, path: Path, skeleton: Skeleton, puppets: int = 1) -> None:
         """Raises PuppetError if bunraku did not export the file or it does not fit the skeleton."""
+        self.path = path
         self._session, facts = _session(path)
         self.joints, self.latent, self.rest = _read_facts(path, facts)
         self.window = WINDOW

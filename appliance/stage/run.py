@@ -19,7 +19,6 @@ from appliance.sensor.battery_life import BatteryLives
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.admission import Admission, SecondLook
-from appliance.stage.admission_cache import admitted
 from appliance.stage.carry_out import carry_out
 from appliance.stage.health import Health
 from appliance.stage.made_motions import open_made_motions
@@ -32,9 +31,11 @@ from appliance.stage.sensor_lines import roster_lines
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
-from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
+
+from appliance.stage.admission_cache import admitted
+from appliance.stage.stage_parts import StageParts, assemble
 
 _ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5
@@ -89,7 +90,7 @@ class Stage:
             show_state = ShowStateReader(self.sharing.folder)
             opened.callback(show_state.close)
             self.admission: Admission = admitted(
-                self.sharing.folder, self.parts, show, box, self.resuming.comes_back
+                self.sharing.folder, self.parts, box, self.resuming.comes_back
             )
             self._closing = opened.pop_all()
         self.parts.run_with(self.admission)

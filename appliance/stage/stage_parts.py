@@ -8,7 +8,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-
 from appliance.box.clock import TICK_S
 from appliance.box.live_pose import LivePose, LivePoseReader
 from appliance.box.realtime import borrowed_priority
@@ -20,7 +19,6 @@ from appliance.dancer.loop import Loop
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.phrase_cache import PhraseCache
-from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 from appliance.dancer.puppeteers import WornSensor
 from appliance.dancer.springs import Springs
 from appliance.levers.sources import LIVE, MAIN
@@ -43,6 +41,8 @@ from appliance.stage.open_sensors import open_sensors
 from appliance.stage.puppeteers_of_show import mounting_of, puppeteers_of
 from appliance.stage.stage_error import StageError
 from appliance.stage.stage_puppet import StagePosition, StagePuppet
+
+from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 
 
 @dataclass(slots=True)
@@ -184,33 +184,32 @@ def assemble(
     )
 
 
-def admission(parts: StageParts, show: Show, box: BoxConfig) -> Admission:
+def admission(parts: StageParts, box: BoxConfig) -> Admission:
     """Measure the show's iterations on this machine with the first window and all hands of all puppets.
 
     Raises StageError where the network fails.
     """
-    dance = _dance(parts, show)
-    asked = max(puppet.iterations for puppet in show.config.cast)
+    dance, asked = _dance(parts), max(one.iterations.wished for one in parts.puppets)
     with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
         return replace(admit(dance, *asked, box.limits.tick_budget_ms), puppets=len(parts.puppets))
 
 
-def warm_up(parts: StageParts, show: Show, admitted: Admission) -> None:
+def warm_up(parts: StageParts, admitted: Admission) -> None:
     """Let the network run once as the first tick will: its first run takes several times as long."""
-    _dance(parts, show)(admitted.coding, admitted.interaction)
+    _dance(parts)(admitted.coding, admitted.interaction)
 
 
-def _dance(parts: StageParts, show: Show) -> Callable[[int, int], object]:
+def _dance(parts: StageParts) -> Callable[[int, int], object]:
     """Runs all puppets with their first windows and all hands; their poses go nowhere. None of them runs
     with more iterations than the show gives it, but where there is one puppet.
     """
     held = []
-    for one, start in zip(parts.puppets, show.config.cast, strict=True):
+    for one in parts.puppets:
         mask = one.hands.mask.copy()
         for place, is_by_place in zip(one.hand_places, one.hands.by_place, strict=True):
             (one.puppet.place_weights if is_by_place else mask)[place] = 1
         one.puppet.select(one.motion.window())
-        held.append((one.puppet, start.iterations, (mask, one.hands.targets, one.hands.weights)))
+        held.append((one.puppet, one.iterations.wished, (mask, one.hands.targets, one.hands.weights)))
 
     def dance(coding: int, interaction: int) -> object:
         try:
@@ -220,8 +219,8 @@ def _dance(parts: StageParts, show: Show) -> Callable[[int, int], object]:
             parts.network.dance()
         except Exception as error:  # onnxruntime has a separate class for every kind of failure
             raise StageError(
-                f"{show.network}: the network fails at {coding} coding iterations ({str(error)[:200]}). "
-                "Nothing is danced. Export the show again."
+                f"{parts.network.path}: the network fails at {coding} coding iterations "
+                f"({str(error)[:200]}). Nothing is danced. Export the show again."
             ) from None
         return None
 
