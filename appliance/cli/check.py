@@ -9,6 +9,7 @@ from typing import Annotated
 
 import numpy as np
 import typer
+
 from appliance.body.mesh_file import MESH_FILE, read_mesh, write_mesh
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import SHOW_OR_NAME, BoxFile
@@ -38,7 +39,6 @@ from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.admission import Admission
 from appliance.stage.open_sensors import reach
 from appliance.stage.stage_error import StageError
-
 from appliance.stage.stage_parts import StageParts, admission, assemble
 
 _PATIENCE_S = 60.0  # a user can wait longer than a box at power-on

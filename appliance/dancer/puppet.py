@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import onnxruntime
+from numpy.typing import NDArray
+
 from appliance.dancer.slerp import FloatArray
 from appliance.pose.foreign_file import content
 from appliance.pose.skeleton import Skeleton, UnknownJointError
 from appliance.show.bundle import LARGEST_FILE
 from appliance.show.network import WINDOW, latent_size, network_inputs, rest_pose, resting_feed
-from numpy.typing import NDArray
 
 _OUTPUT = "poses"
 _CURE = "Export the show again, or copy the bundle again."

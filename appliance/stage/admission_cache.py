@@ -11,7 +11,6 @@ from appliance.box.record import Record
 from appliance.pose.foreign_file import plain_json
 from appliance.show.box import BoxConfig
 from appliance.stage.admission import Admission
-
 from appliance.stage.stage_parts import StageParts, admission, warm_up
 
 _LARGEST = 4096

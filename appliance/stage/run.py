@@ -19,6 +19,7 @@ from appliance.sensor.battery_life import BatteryLives
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.admission import Admission, SecondLook
+from appliance.stage.admission_cache import admitted
 from appliance.stage.carry_out import carry_out
 from appliance.stage.health import Health
 from appliance.stage.made_motions import open_made_motions
@@ -31,11 +32,9 @@ from appliance.stage.sensor_lines import roster_lines
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
+from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
-
-from appliance.stage.admission_cache import admitted
-from appliance.stage.stage_parts import StageParts, assemble
 
 _ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+
 from appliance.box.clock import TICK_S
 from appliance.box.live_pose import LivePose, LivePoseReader
 from appliance.box.realtime import borrowed_priority
@@ -19,6 +20,7 @@ from appliance.dancer.loop import Loop
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.phrase_cache import PhraseCache
+from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 from appliance.dancer.puppeteers import WornSensor
 from appliance.dancer.springs import Springs
 from appliance.levers.sources import LIVE, MAIN
@@ -41,8 +43,6 @@ from appliance.stage.open_sensors import open_sensors
 from appliance.stage.puppeteers_of_show import mounting_of, puppeteers_of
 from appliance.stage.stage_error import StageError
 from appliance.stage.stage_puppet import StagePosition, StagePuppet
-
-from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 
 
 @dataclass(slots=True)

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 import yaml
+
 from appliance.show.box import BoxConfig, LimitsConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.admission import Admission
-from tests.bundles import write_show
-
 from appliance.stage import admission_cache as module
+from appliance.stage.admission import Admission
 from appliance.stage.admission_cache import admission_record, admitted
 from appliance.stage.stage_parts import StageParts, assemble
+from tests.bundles import write_show
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
 

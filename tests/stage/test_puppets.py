@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from appliance.box.checkpoint import Checkpoint, packed, unpacked
 from appliance.cli.pictures import load_dance
 from appliance.outputs.frame_reader import FrameReader
@@ -22,10 +23,9 @@ from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from appliance.stage.sharing import facts_of
 from appliance.stage.stage_error import StageError
+from appliance.stage.stage_parts import admission, assemble
 from tests.bundles import swaying_phrase, write_show
 from tests.recorder.night import BOX, Night, reading
-
-from appliance.stage.stage_parts import admission, assemble
 
 SENSOR = {"sensor": "left-wrist", "joint": "lShldr"}
 STILL, TURNED = (1.0, 0.0, 0.0, 0.0), (0.8, 0.6, 0.0, 0.0)
