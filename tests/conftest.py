@@ -20,7 +20,14 @@ from tests.command import Command
 ROOT = Path(__file__).resolve().parents[1]
 # The longest files start first when files run in parallel: started last, one would run alone.
 LONGEST_FIRST = ("tests/boot/", "tests/test_readme.py", "tests/system/", "tests/studio/")
+PAGES = "tests/test_readme.py::test_every_command_of_a_page_works"
 _folders = itertools.count()
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # Files already run in parallel: threads of numerical libraries would only wait for each other. Set here:
+    # other conftest.py load the libraries, which read this once, before any hook is called.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -41,9 +48,6 @@ def pytest_configure(config: pytest.Config) -> None:
     worker = os.environ.get("PYTEST_XDIST_WORKER")
     if worker:
         gc.disable()  # until all tests are collected: what is loaded by then stays
-        # Files already run in parallel: what they start would only wait for its own threads.
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-            os.environ.setdefault(name, "1")
         # Its own share of the ports, so that no other worker takes one between choice and use.
         first, step = int(worker.removeprefix("gw")), int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
         hw_sim.peers.PORTS = hw_sim.peers.PORTS[first::step]
@@ -59,6 +63,8 @@ class OneBoxAtATime(LoadFileScheduling):
     """Files run in parallel, but no two machines boot at once: each takes a whole processor."""
 
     def _split_scope(self, nodeid: str) -> str:
+        if nodeid.startswith(PAGES):
+            return nodeid  # each page has its own checkout and network
         return "tests/boot" if nodeid.startswith("tests/boot/") else str(super()._split_scope(nodeid))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import functools
 import os
 import re
@@ -12,8 +13,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib.util import cache_from_source
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ PAGES_OF_USERS = (
 PAGES = ("README.md", *(f"docs/{page}.md" for page in PAGES_OF_USERS))
 WATCHDOG_S = 900.0  # for one block: the slowest one takes a minute on a free machine
 RECURSIVE = re.compile(r"^make (test|bench|lock|clean)\b")  # these would run this test again
+BRIEF = re.compile(r"^((?:bunraku play|make run) .*--seconds) [3-9](?!.*&$)")  # two seconds show the same
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,8 @@ BLOCKS = different_blocks()
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Future[None]]]:
-    """All pages, two at a time, each with its own checkout, network and runtime folder."""
+def files() -> list[str]:
+    """The files of this checkout."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
         cwd=ROOT,
@@ -92,19 +94,17 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Future
     )
     if listed.returncode != 0:
         pytest.skip("this is no git checkout")
-    files = [name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
-    with ThreadPoolExecutor(2 if own_network() else 1) as lanes:
-        yield {
-            page: lanes.submit(run_page, page, files, tmp_path_factory.mktemp("checkout"))
-            for page in sorted(PAGES, key=lambda page: len(BLOCKS[page]), reverse=True)
-        }
+    return [name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
 
 
 def fill(copy: Path, files: Sequence[str]) -> None:
-    """Copy the checkout to `copy`, with this environment as its .venv."""
-    for name in files:
+    """Copy the checkout to `copy`, with this environment as its .venv, and modules as they were compiled."""
+    compiled = [
+        cache_from_source(name) for name in files if name.startswith("appliance/") and name.endswith(".py")
+    ]
+    for name in (*files, *(name for name in compiled if (ROOT / name).is_file())):
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / name, copy / name)
+        shutil.copy2(ROOT / name, copy / name)
     (copy / ".venv").mkdir()
     (copy / ".venv" / "bin").symlink_to(Path(sys.executable).parent)
     for stamp in (".ready-to-run", ".ready-to-test"):  # after the copies: nothing is installed again
@@ -123,17 +123,11 @@ def environment_of(checkout: Path) -> dict[str, str]:
     return environment
 
 
-def run_page(page: str, files: Sequence[str], checkout: Path) -> None:
-    """Run the blocks in the order of the page; AssertionError for the first that fails."""
-    fill(checkout, files)
-    environment = environment_of(checkout)
-    for block in BLOCKS[page]:
-        run_block(block, checkout, environment)
-
-
 def run_block(block: Block, checkout: Path, environment: Mapping[str, str]) -> None:
     """Run one block. Its output goes to a file: a process that outlives the shell would hold a pipe open."""
-    script = "\n".join(RECURSIVE.sub(r"make --dry-run \1", line) for line in block.text.splitlines())
+    script = "\n".join(
+        BRIEF.sub(r"\1 2", RECURSIVE.sub(r"make --dry-run \1", line)) for line in block.text.splitlines()
+    )
     with tempfile.TemporaryFile() as output:
         shell = subprocess.Popen(
             [*own_network(), "bash", "-euo", "pipefail", "-c", script],
@@ -169,7 +163,20 @@ def run_block(block: Block, checkout: Path, environment: Mapping[str, str]) -> N
         assert "Traceback" not in said, said
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_every_command_of_a_page_works(page: str, pages: dict[str, Future[None]]) -> None:
+# Each page has its own checkout, network and runtime folder: xdist runs them in parallel, the longest first.
+@pytest.mark.parametrize("page", sorted(PAGES, key=lambda page: len(BLOCKS[page]), reverse=True))
+def test_every_command_of_a_page_works(page: str, files: list[str], tmp_path: Path) -> None:
     assert blocks_of(page), f"{page} shows no command"
-    pages[page].result()
+    fill(checkout := tmp_path / "checkout", files)
+    environment = environment_of(checkout)
+    with contextlib.nullcontext() if own_network() else one_at_a_time():
+        for block in BLOCKS[page]:
+            run_block(block, checkout, environment)
+
+
+@contextlib.contextmanager
+def one_at_a_time() -> Iterator[None]:
+    """Until the page of another worker has ended: they would use the same ports."""
+    with (Path(tempfile.gettempdir()) / "bunraku-pages.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield

@@ -14,8 +14,11 @@ import pytest
 import torch
 from typer.testing import CliRunner, Result
 
+from appliance.body import mesh_file
+from appliance.body.body_mesh import BodyMesh, body_mesh
 from appliance.pictures import figure
 from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
 from appliance.studio import dance_files, standing_dance
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
@@ -57,6 +60,22 @@ def _small_answers() -> Iterator[None]:
         patch.setattr(sweep, "WINDOWS", 3)
         patch.setattr(own_output, "SECONDS", 2.0)
         patch.setattr(own_output, "DANCES", 1)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_surface_a_figure() -> Iterator[None]:
+    """Shows of one figure share its surface, which takes half a second to work out. tests/body tests it."""
+    known: dict[str, BodyMesh] = {}
+
+    def surface(skeleton: Skeleton) -> BodyMesh:
+        key = mesh_file.mesh_key(skeleton)
+        if key not in known:
+            known[key] = body_mesh(skeleton)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mesh_file, "body_mesh", surface)
         yield
 
 

@@ -20,7 +20,7 @@ from tests.studio.dancers import ARM, danced, motions
 from tests.studio.puppets import NAMES, Pasting
 from tests.studio.tiny import moving
 
-PLACES, SECONDS, PAIRS = list(moving()), 10.0, 3
+PLACES, SECONDS, PAIRS = list(moving()), 10.0, 2
 HELD = NAMES.index(ARM)
 
 
@@ -65,7 +65,7 @@ def rows(comparison: Comparison, training: list[Take]) -> dict[str, Row]:
             if name != "copies":
                 shown[:, HELD] = hand
             found.setdefault(name, []).append(one.stood(ARM, shown, hand))
-    before, critics.STEPS = critics.STEPS, 80
+    before, critics.STEPS = critics.STEPS, 60
     try:
         return {name: comparison.row(ARM, dances) for name, dances in found.items()}
     finally:
