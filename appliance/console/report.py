@@ -23,7 +23,7 @@ Send = Callable[[Mapping[str, Any], Mapping[str, Any]], None]
 class Reports:
     """Which changes are due. settings: as `after_s` and `every_s` in the box file; times in Unix seconds.
 
-    A fallback counts by its name and subject. What began and ended before it was due is never told.
+    A fallback counts by its name and subject. A fallback that is over before it was due is never reported.
     """
 
     def __init__(self, after_s: float, every_s: float) -> None:

@@ -124,7 +124,7 @@ class Update:
         return web.json_response({"ready": self._ready()})
 
     async def _begin(self, request: web.Request) -> web.Response:
-        """Make the code, which the wall shows: whoever installs is in the hall, and knows the PIN."""
+        """Make the code, which the wall shows: the PIN alone does not install from outside of the hall."""
         self._require(request)
         await said(request)
         if self._ready() is None:

@@ -14,12 +14,13 @@ export function limitWords(limit) {
   return said === key ? limit.words : said;
 }
 
-// A finding about a fallback is named like `stage: receiver-gone (10.0.0.9:9004)`; its sentence has its translation.
+// A finding in the reader's language: [account, cure]. One about a fallback is named like `stage: receiver-gone
+// (10.0.0.9:9004)`, and the sentence of the fallback ends with its cure.
 export function findingWords(finding) {
   const [, , name, about] = /^(\w+): ([a-z-]+)(?: \((.*)\))?$/.exec(finding.what) ?? [];
   const key = about && hasWords(`named_${name}`) ? `named_${name}` : `fallback_${name}`;
-  if (name && hasWords(key)) return `${about && key.startsWith("fallback_") ? `${about}: ` : ""}${words(key, { about })}`;
-  return `${translated(finding.what)}: ${translated(finding.words)}`;
+  if (name && hasWords(key)) return [`${about && key.startsWith("fallback_") ? `${about}: ` : ""}${words(key, { about })}`, ""];
+  return [`${translated(finding.what)}: ${translated(finding.words)}`, translated(finding.cure)];
 }
 
 export const valueOf = (limit) => limit.value === null ? words("prove_nothing_came") : `${number(limit.value, 2)} ${limit.unit}`;
@@ -92,8 +93,9 @@ function doctor(context, proof, y) {
   for (const finding of proof.findings) {
     const colour = finding.verdict === "wrong" ? PAPER.fault : finding.verdict === "ok" ? PAPER.well : PAPER.ink;
     text(context, words(`finding_${finding.verdict}`), MARGIN, y + 10, 20, colour, "700");
-    y = text(context, findingWords(finding), MARGIN + 230, y + 10, 20, PAPER.ink, "400");
-    if (finding.cure) y = text(context, `→ ${translated(finding.cure)}`, MARGIN + 230, y, 20, PAPER.quiet, "400");
+    const [account, cure] = findingWords(finding);
+    y = text(context, account, MARGIN + 230, y + 10, 20, PAPER.ink, "400");
+    if (cure) y = text(context, `→ ${cure}`, MARGIN + 230, y, 20, PAPER.quiet, "400");
   }
   return y;
 }

@@ -3,7 +3,7 @@ import { words } from "./words.js";
 
 const HOLD_MS = 900, SURE_MS = 6000;
 
-// Acts once the button was held, by a finger, the mouse or a key. A tap tells that it has to be held.
+// Acts once the button was held, by a finger, the mouse or a key. A tap shows how.
 export function held(button, act, tell) {
   let timer = 0, isDone = false;
   const begin = () => {

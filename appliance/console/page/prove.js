@@ -158,7 +158,8 @@ function limitItem(limit) {
 }
 
 function findingItem(finding) {
-  return line(`${words(`finding_${finding.verdict}`)} · ${findingWords(finding)}`, translated(finding.cure), finding.verdict);
+  const [account, cure] = findingWords(finding);
+  return line(`${words(`finding_${finding.verdict}`)} · ${account}`, cure, finding.verdict);
 }
 
 function line(said, below, kind) {

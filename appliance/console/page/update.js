@@ -43,7 +43,7 @@ async function take(name) {
   else refuse(answer);
 }
 
-// One after the other; a browser tells how much has left only of this kind of request.
+// One after the other. XMLHttpRequest, because fetch does not report the progress of an upload.
 async function sendFiles() {
   byId("update-form").hidden = true;
   let ready = null;
