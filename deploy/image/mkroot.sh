@@ -8,13 +8,14 @@ repository=$(cd "$here/../.." && pwd)
 
 usage() {
     cat <<'END'
-usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--release FOLDER] [--key KEY] [--debian TAR] OUT
+usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--deb FILE] [--key KEY] [--debian TAR] OUT
 
 Builds the root file system of a box into OUT: a tar where OUT ends with .tar, else a folder.
 
-  --arch ARCH        amd64 (default) or arm64. A foreign one needs qemu-user-static, arch-test, binfmt_misc.
-  --without-kernel   no kernel, no firmware: for systemd-nspawn, or for a Raspberry Pi's own boot partition
-  --release FOLDER   what `make release` made; left out: one made now from the working tree
+  --arch ARCH        amd64 (default) or arm64. A foreign one's packages are unpacked, and what their own scripts
+                     would do is done from here: of that processor's programs only two run (qemu-user-static).
+  --without-kernel   no kernel, no firmware: for systemd-nspawn
+  --deb FILE         the package of a box that `make deb` made; left out: one made now from the working tree
   --key KEY          sign that one, so that the box knows whose releases it takes; --next-key KEY.pub as there
   --debian TAR       keeps Debian's part in TAR, and takes it from there the next time
 
@@ -28,12 +29,12 @@ fail() {
     exit 1
 }
 
-arch=amd64 kernel=yes release='' debian='' out='' signing=()
+arch=amd64 kernel=yes deb='' debian='' out='' signing=()
 while [ $# -gt 0 ]; do
     case $1 in
         --arch) arch=${2:?--arch needs amd64 or arm64}; shift 2 ;;
         --without-kernel) kernel=no; shift ;;
-        --release) release=${2:?--release needs a folder}; shift 2 ;;
+        --deb) deb=${2:?--deb needs a file}; shift 2 ;;
         --key | --next-key) signing+=("$1" "${2:?$1 needs a key file}"); shift 2 ;;
         --debian) debian=${2:?--debian needs a file}; shift 2 ;;
         --help | -h) usage; exit 0 ;;
@@ -45,14 +46,18 @@ done
 [ "$(id -u)" = 0 ] || fail "needs root: it makes device nodes and installs packages into a new root."
 command -v mmdebstrap >/dev/null || fail "mmdebstrap is missing. Install it: apt-get install mmdebstrap"
 case $arch in
-    amd64) machine=x86_64 ;;
-    arm64) machine=aarch64; kernel=no ;;
+    amd64) machine=x86_64 extra=pc ;;
+    arm64) machine=aarch64 extra=pi ;;
     *) fail "--arch $arch: a box is amd64 or arm64." ;;
 esac
-if [ "$arch" != "$(dpkg --print-architecture)" ] && ! ls /proc/sys/fs/binfmt_misc/qemu-"$machine" >/dev/null 2>&1; then
-    fail "this machine cannot run $arch programs. Install qemu-user-static, binfmt-support and arch-test, mount" \
-        "binfmt_misc on /proc/sys/fs/binfmt_misc, and run update-binfmts --enable; or build on such a machine."
-fi
+foreign=no
+[ "$arch" = "$(dpkg --print-architecture)" ] || foreign=yes
+[ $foreign = no ] || command -v "qemu-$machine-static" >/dev/null ||
+    fail "qemu-$machine-static is missing. Install it: apt-get install qemu-user-static"
+# shellcheck disable=SC2034 # where targets.sh keeps the target's Python
+checkout=$repository
+# shellcheck source=deploy/release/targets.sh
+source "$repository/deploy/release/targets.sh"
 
 # Names of a list of packages or paths, without its comments.
 listed() { sed -e 's/#.*//' "$here/$1" | tr -s ' \n' '\n' | sed '/^$/d'; }
@@ -68,6 +73,7 @@ sources() {
         sort -u | head -n 1)
     [ -n "$debian" ] || fail "no Debian mirror among this machine's apt sources. Name one: MIRROR='deb URL trixie main'"
     printf 'deb %s trixie main non-free-firmware\n' "$debian"
+    [ "$extra" != pi ] || printf 'deb %s trixie-backports main\n' "$debian"
     [ -z "$security" ] || printf 'deb %s trixie-security main non-free-firmware\n' "$security"
 }
 
@@ -77,7 +83,7 @@ mkdir -p "$(dirname "$out")"
 if [[ $out == *.tar ]]; then root=$work/root; else root=$out; fi
 
 debian() {
-    local options=() hooks=() pattern packages
+    local options=(--variant=apt) hooks=() pattern packages
     while read -r pattern; do
         case $pattern in
             +*) options+=(--dpkgopt="path-include=${pattern#+}") ;;
@@ -85,17 +91,45 @@ debian() {
         esac
     done < <(listed drop-files.txt)
     packages=$(listed packages-box.txt)
-    if [ "$kernel" = yes ]; then
-        packages+=$'\n'$(listed packages-pc.txt)
+    [ "$kernel" = no ] || packages+=$'\n'$(listed "packages-$extra.txt")
+    if [ $foreign = yes ]; then
+        options+=(--variant=extract --skip=cleanup/apt)
+        packages+=$'\n?essential'
+    elif [ "$kernel" = yes ]; then
         # Before the kernel comes: its start image is made from these files.
         hooks=(--essential-hook="cp -a --no-preserve=ownership '$here/tree/.' \"\$1/\"")
     fi
     echo "Debian 13 for $arch into $root"
-    sources | mmdebstrap --quiet --variant=apt --architectures="$arch" "${options[@]}" \
+    sources | mmdebstrap --quiet --architectures="$arch" "${options[@]}" \
         --aptopt='Acquire::Languages "none"' --aptopt='APT::Install-Recommends "false"' \
         --dpkgopt=force-confold --include="$(tr '\n' ',' <<<"$packages" | sed 's/,$//')" \
         "${hooks[@]}" trixie "$root" - >"$work/debian.log" 2>&1 ||
         { tail -n 30 "$work/debian.log" >&2; fail "Debian could not be installed; the lines above say why."; }
+    [ $foreign = no ] || settle_unpacked
+}
+
+# Does the work of the packages' own scripts, which would run for an hour in an emulated processor.
+settle_unpacked() {
+    local package name of=$root/var/lib/dpkg
+    cp -a --no-preserve=ownership "$here/tree/." "$here/tree-$extra/." "$root/"
+    for package in "$root"/var/cache/apt/archives/*.deb; do
+        name=$(dpkg-deb -f "$package" Package)
+        [ "$(dpkg-deb -f "$package" Multi-Arch)" != same ] || name+=:$arch
+        { dpkg-deb -f "$package" | sed '/^Package:/a Status: install ok installed' && echo; } >>"$of/status"
+        dpkg-deb --fsys-tarfile "$package" | tar -t | sed 's|^\./|/|; s|^/$|/.|; s|\(.\)/$|\1|' >"$of/info/$name.list"
+    done
+    users "$repository/deploy/system/usr/lib/sysusers.d/bunraku.conf" # first, because its number is fixed
+    cp "$root/usr/share/libc-bin/nsswitch.conf" "$root/usr/share/base-files/profile" "$root/etc/"
+    cp "$root"/usr/share/chrony/chrony.{conf,keys} "$root/etc/chrony/"
+    chmod 640 "$root/etc/chrony/chrony.keys"
+    ln -sf mawk "$root/usr/bin/awk"
+    ln -sf regulatory.db-debian "$root/usr/lib/firmware/regulatory.db"
+    ln -sf regulatory.db.p7s-debian "$root/usr/lib/firmware/regulatory.db.p7s"
+    rm -rf "$root/etc/init.d" # systemctl would ask a program of the root about it
+    for name in NetworkManager chrony wpa_supplicant; do
+        systemctl --root="$root" enable "$name.service" >/dev/null 2>&1 || fail "$name.service cannot be enabled."
+    done
+    target_python -m compileall -q -s "$root" -p / --invalidation-mode unchecked-hash "$root/usr/lib/python$PYTHON"
 }
 
 debian_kept() {
@@ -111,15 +145,22 @@ debian_kept() {
     fi
 }
 
-# The release as it would be installed from a stick, made now from the working tree unless one was named.
+# An older systemd than the box's does not know `u!`.
+users() { cat "$@" "$root"/usr/lib/sysusers.d/*.conf | sed 's/^u!/u/' | systemd-sysusers --root="$root" - 2>/dev/null; }
+
+# The package as on any box, made now from the working tree unless one was named.
 install_release() {
-    local unsigned=()
-    if [ -z "$release" ]; then
-        release=$work/release
-        "$repository/deploy/release/make-release" --arch "$arch" --out "$release" "${signing[@]}"
+    if [ -z "$deb" ]; then
+        "$repository/deploy/release/make-deb" --arch "$arch" --out "$work" "${signing[@]}"
+        deb=$(ls "$work"/bunraku_*.deb)
     fi
-    [ -f "$release/SHA256SUMS.sig" ] || unsigned=(--unsigned)
-    "$repository/deploy/install.sh" --root "$root" "${unsigned[@]}" "$release"
+    if [ $foreign = yes ]; then
+        dpkg --root="$root" --force-script-chrootless --force-architecture --no-triggers --install "$deb"
+    else
+        cp "$deb" "$root/bunraku.deb"
+        chroot "$root" dpkg --install /bunraku.deb
+        rm "$root/bunraku.deb"
+    fi >"$work/release.log" 2>&1 || { tail -n 20 "$work/release.log" >&2; fail "$deb could not be installed."; }
 }
 
 settle() {
@@ -135,19 +176,29 @@ settle() {
     systemctl --root="$root" mask getty@tty1.service systemd-random-seed.service apt-daily.timer \
         apt-daily-upgrade.timer dpkg-db-backup.timer e2scrub_all.timer fstrim.timer \
         NetworkManager-wait-online.service >/dev/null 2>&1
-    chroot "$root" dpkg-query --show --showformat '${Package} ${Version} ${Installed-Size}\n' >"$root/etc/bunraku-packages"
+    dpkg-query --admindir="$root/var/lib/dpkg" --show --showformat '${Package} ${Version} ${Installed-Size}\n' >"$root/etc/bunraku-packages"
     echo LANG=C.UTF-8 >"$root/etc/default/locale"
     rm -rf "$root"/var/lib/apt/lists/* "$root"/var/cache/* "$root"/var/log/* "$root"/tmp/*
     first_start_done
 }
 
+# A program of the root, in an emulated processor.
+emulated() { "qemu-$machine-static" -L "$root" "$(PATH=$root/usr/sbin:$root/usr/bin command -v "$1")" "${@:2}"; }
+
 # systemd's one-time work after a change of /usr takes a second; a root in memory would repeat it at each
 # start.
 first_start_done() {
-    chroot "$root" systemd-sysusers
-    chroot "$root" journalctl --quiet --update-catalog
-    chroot "$root" ldconfig
-    chroot "$root" /usr/lib/systemd/systemd-update-done
+    if [ $foreign = no ]; then
+        chroot "$root" systemd-sysusers
+        chroot "$root" journalctl --quiet --update-catalog
+        chroot "$root" ldconfig
+        chroot "$root" /usr/lib/systemd/systemd-update-done
+        return
+    fi
+    journalctl --quiet --root="$root" --update-catalog
+    emulated systemd-hwdb --root="$root" --usr update
+    emulated ldconfig -r "$root"
+    echo 'TIMESTAMP_NSEC=4102444800000000000' | tee "$root/etc/.updated" >"$root/var/.updated" # until the year 2100
 }
 
 debian_kept

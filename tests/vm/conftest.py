@@ -15,8 +15,8 @@ def image() -> Path:
     """The disk image that `make image` made; skips with the reason where there is none."""
     named = os.environ.get("BUNRAKU_IMAGE")
     if not named:
-        pytest.skip("a whole machine in software takes an hour: make test-vm starts it")
-    missing = missing_programs()
+        pytest.skip("a whole machine in software takes up to an hour: make test-vm starts it")
+    missing = missing_programs(Path(named))
     if missing:
         pytest.skip(f"no machine in software here: {', '.join(missing)} missing")
     return Path(named)

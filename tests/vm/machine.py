@@ -17,8 +17,8 @@ CONSOLE_PROMPT = "technician# "
 class Machine:
     """One box of this image; its disk belongs to it alone and outlives its power."""
 
-    def __init__(self, disk: Path, folder: Path, firmware: Path | None = None) -> None:
-        self.disk, self.folder, self.firmware = disk, folder, firmware
+    def __init__(self, disk: Path, folder: Path) -> None:
+        self.disk, self.folder, self.is_pi = disk, folder, _is_pi(disk)
         self.console = Console(folder / "console", folder / "console.log")
         self._qemu: subprocess.Popen[bytes] | None = None
         self._powered_on = 0.0
@@ -61,26 +61,32 @@ class Machine:
     def _command(self) -> list[str]:
         # -icount: the machine's own clock counts its instructions, 2 ns each: it is a slow but steady machine
         # however busy this one is; all times inside are its own, the clock of the day too.
-        command = (
-            "-machine q35 -accel tcg -icount shift=1 -cpu max -smp 2 -m 2048 -nodefaults -no-user-config"
-        )
-        command += " -rtc clock=vm"
+        command = "-accel tcg -icount shift=1 -smp 2 -m 2048 -nodefaults -no-user-config -rtc clock=vm"
         command += " -display none -device i6300esb -action watchdog=reset -device qemu-xhci,id=usb"
-        command += " -netdev user,id=net -device virtio-net-pci,netdev=net -device virtio-rng-pci"
+        command += " -netdev user,id=net -device virtio-net-pci,netdev=net,romfile= -device virtio-rng-pci"
         command += " -uuid 6c1f3c8e-6a55-4a0e-9a63-0b5a6c0b8d11 -chardev null,id=adapter"
-        words = ["qemu-system-x86_64", *command.split()]
+        words = ["qemu-system-aarch64" if self.is_pi else "qemu-system-x86_64", *command.split()]
+        words += self._loader() if self.is_pi else ["-machine", "q35", "-cpu", "max", *_uefi()]
         words += ["-drive", f"file={self.disk},format=raw,if=none,id=disk,discard=unmap"]
         words += ["-device", "virtio-blk-pci,drive=disk"]
-        words += [
-            "-chardev",
-            f"socket,id=tty,path={self.console.path},server=on,wait=off",
-            "-serial",
-            "chardev:tty",
-        ]
+        console = f"socket,id=tty,path={self.console.path},server=on,wait=off"
+        words += ["-chardev", console, "-serial", "chardev:tty"]
         words += ["-monitor", f"unix:{self.folder / 'monitor'},server=on,wait=off"]
-        if self.firmware is not None:
-            words += ["-drive", f"if=pflash,format=raw,readonly=on,file={self.firmware}"]
         return words
+
+    def _loader(self) -> list[str]:
+        """What a Pi's loader does: kernel, start image and command line from the boot partition.
+
+        The processor is a Pi 4's, the machine around it is no Pi.
+        """
+        for name in ("linux", "initrd", "cmdline.txt"):
+            subprocess.run(
+                ["mcopy", "-o", "-i", _boot(self.disk), f"::/{name}", self.folder / name], check=True
+            )
+        # Linux takes one number of a kind of serial port; a Pi 5's is 10.
+        options = (self.folder / "cmdline.txt").read_text().strip().replace("ttyAMA10,115200", "ttyAMA0")
+        words = ["-machine", "virt,gic-version=2", "-cpu", "cortex-a72", "-append", options]
+        return [*words, "-kernel", str(self.folder / "linux"), "-initrd", str(self.folder / "initrd")]
 
 
 class Console:
@@ -160,28 +166,41 @@ def disk_of(image: Path, folder: Path, size_mib: int, files: dict[str, bytes], o
     """
     disk = folder / "disk.img"
     subprocess.run(["cp", "--sparse=always", image, disk], check=True)
-    boot = f"{disk}@@2M"
-    for name, content in files.items():
-        (folder / "file").write_bytes(content)
-        subprocess.run(["mcopy", "-o", "-i", boot, folder / "file", f"::/bunraku/{name}"], check=True)
-    loader = subprocess.run(
-        ["mtype", "-i", boot, "::/grub/grub.cfg"], check=True, capture_output=True, text=True
+    command_line = "::/cmdline.txt" if _is_pi(disk) else "::/grub/grub.cfg"
+    kept = subprocess.run(
+        ["mtype", "-i", _boot(disk), command_line], check=True, capture_output=True, text=True
     )
-    (folder / "file").write_text(loader.stdout.replace("\r", "").replace(" panic=", f" {options} panic="))
-    subprocess.run(["mcopy", "-o", "-i", boot, folder / "file", "::/grub/grub.cfg"], check=True)
+    text = kept.stdout.replace("\r", "").replace(" panic=", f" {options} panic=")
+    for name, content in files.items():
+        _put(disk, folder, f"::/bunraku/{name}", content)
+    _put(disk, folder, command_line, text.encode())
     with disk.open("r+b") as grown:
         grown.truncate(size_mib * 1024 * 1024)
     return disk
 
 
-def firmware() -> Path | None:
-    """UEFI for the machine, or None: it starts by BIOS."""
-    found = [
-        path for path in (Path("/usr/share/ovmf/OVMF.fd"), Path("/usr/share/qemu/OVMF.fd")) if path.exists()
-    ]
-    return found[0] if found else None
-
-
-def missing_programs() -> list[str]:
+def missing_programs(image: Path) -> list[str]:
     """What this machine lacks to run another one."""
-    return [name for name in ("qemu-system-x86_64", "mcopy", "mtype") if shutil.which(name) is None]
+    qemu = "qemu-system-aarch64" if "arm64" in image.name else "qemu-system-x86_64"
+    return [name for name in (qemu, "mcopy", "mtype") if shutil.which(name) is None]
+
+
+def _put(disk: Path, folder: Path, name: str, content: bytes) -> None:
+    (folder / "file").write_bytes(content)
+    subprocess.run(["mcopy", "-o", "-i", _boot(disk), folder / "file", name], check=True)
+
+
+def _boot(disk: Path) -> str:
+    return f"{disk}@@2M"
+
+
+def _is_pi(disk: Path) -> bool:
+    listed = ["mdir", "-b", "-i", _boot(disk), "::/config.txt"]
+    return subprocess.run(listed, capture_output=True, check=False).returncode == 0
+
+
+def _uefi() -> list[str]:
+    """UEFI for a PC, where this machine has it; else it starts by BIOS."""
+    known = (Path("/usr/share/ovmf/OVMF.fd"), Path("/usr/share/qemu/OVMF.fd"))
+    found = next((path for path in known if path.exists()), None)
+    return ["-drive", f"if=pflash,format=raw,readonly=on,file={found}"] if found else []
