@@ -1,7 +1,8 @@
-"""Writes the bill of materials of a release as CycloneDX 1.6 (JSON); the same inputs give the same bytes.
+"""Writes the bill of materials of a download as SPDX 2.3 (JSON); the same inputs give the same bytes.
 
-    python -m tools.sbom --arch amd64 out/bunraku-0.2.0-amd64.cdx.json
-    python -m tools.sbom --arch amd64 --debian build/image/etc/bunraku-packages out/image.cdx.json
+    python -m tools.sbom --arch amd64 --of out/bunraku_0.2.0_amd64.deb out/bunraku_0.2.0_amd64.deb.spdx.json
+    python -m tools.sbom --arch arm64 --of out/bunraku-arm64.img.xz --debian out/bunraku-arm64.packages \\
+        out/bunraku-arm64.img.spdx.json
 
 It lists the Python packages of an installed box with the hashes of their files (deploy/release/*.lock) and
 the parts of the wearable's firmware (sketch.yaml). With --debian it adds the Debian packages of an image:
@@ -11,10 +12,13 @@ the parts of the wearable's firmware (sketch.yaml). With --debian it adds the De
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
+import os
 import re
 import tomllib
 import uuid
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -29,47 +33,56 @@ PIN = re.compile(r"(?P<name>[\w.-]+)==(?P<version>\S+) --hash=sha256:(?P<sha256>
 PLATFORM = re.compile(r"(?P<name>\S+) \((?P<version>[\d.]+)\)")
 
 Component = dict[str, Any]
-_OWN: Component = {"licenses": [{"license": {"id": "MIT"}}]}  # licence of everything that this checkout makes
+_LICENCE = "MIT"  # the licence of this checkout
+_NOT_SAID = "NOASSERTION"
 
 
 def main() -> None:
     """Write the file that the arguments name."""
-    parser = argparse.ArgumentParser(description="Write a bill of materials (CycloneDX, JSON).")
+    parser = argparse.ArgumentParser(description="Write a bill of materials (SPDX, JSON).")
     parser.add_argument("--arch", choices=ARCHITECTURES, default="amd64", help="processor of the box")
+    parser.add_argument("--of", type=Path, help="the download that it describes: its name and hash")
     parser.add_argument("--debian", type=Path, help="list of Debian packages: name, version, size a line")
     parser.add_argument("out", type=Path, help="file to write")
     given = parser.parse_args()
     debian = given.debian.read_text("utf-8") if given.debian else ""
     given.out.parent.mkdir(parents=True, exist_ok=True)
-    given.out.write_text(bill(given.arch, debian), "utf-8")
+    given.out.write_text(bill(given.arch, debian, of=given.of), "utf-8")
 
 
-def bill(arch: str, debian: str = "", root: Path = ROOT) -> str:
+def bill(arch: str, debian: str = "", root: Path = ROOT, of: Path | None = None) -> str:
     """The document as text. Raises ValueError for a line of a lock that is no pin."""
     project = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["project"]
+    version = project["version"]
     release = root / "deploy" / "release"
     locks = [release / f"requirements-{arch}.lock", release / f"sources-{arch}.lock"]
     components = [one for lock in locks if lock.is_file() for one in python_packages(lock.read_text("utf-8"))]
-    components.append(_component("bunraku-sim", project["version"], "pkg:pypi/bunraku-sim", **_OWN))
+    components.append(_component("bunraku-sim", version, "pkg:pypi/bunraku-sim", licence=_LICENCE))
     components += firmware_parts((root / "firmware" / "wearable" / "sketch.yaml").read_text("utf-8"))
     components += debian_packages(debian, arch)
-    components.sort(key=lambda one: str(one["purl"]))
-    own = {
-        "type": "application",
-        "bom-ref": f"pkg:pypi/{project['name']}@{project['version']}",
-        "name": project["name"],
-        "version": project["version"],
-        "purl": f"pkg:pypi/{project['name']}@{project['version']}",
-        **_OWN,
-    }
-    content = json.dumps([own, components], sort_keys=True)
+    components.sort(key=_purl)
+    own = _component("bunraku", version, "pkg:pypi/bunraku", licence=_LICENCE)
+    if of is not None:
+        with of.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        own |= {"packageFileName": of.name, "checksums": [_sha256(digest)]}
+    packages = [own, *components]
+    for number, one in enumerate(packages):
+        one["SPDXID"] = f"SPDXRef-{number}"
+    content = json.dumps([arch, packages], sort_keys=True)
+    created = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "0")), UTC)
     document = {
-        "bomFormat": "CycloneDX",
-        "specVersion": "1.6",
-        "serialNumber": f"urn:uuid:{uuid.uuid5(NAMESPACE, content)}",
-        "version": 1,
-        "metadata": {"component": own, "properties": [{"name": "bunraku:architecture", "value": arch}]},
-        "components": components,
+        "spdxVersion": "SPDX-2.3",
+        "SPDXID": "SPDXRef-DOCUMENT",
+        "dataLicense": "CC0-1.0",
+        "name": of.name if of is not None else f"bunraku-{version}-{arch}",
+        "documentNamespace": f"urn:uuid:{uuid.uuid5(NAMESPACE, content)}",
+        "creationInfo": {"created": f"{created:%Y-%m-%dT%H:%M:%SZ}", "creators": ["Tool: bunraku-sbom"]},
+        "packages": packages,
+        "relationships": [
+            _relationship("SPDXRef-DOCUMENT", "DESCRIBES", own),
+            *(_relationship(own["SPDXID"], "CONTAINS", one) for one in components),
+        ],
     }
     return json.dumps(document, indent=1) + "\n"
 
@@ -84,8 +97,8 @@ def python_packages(lock: str) -> list[Component]:
         if pin is None:
             raise ValueError(f"'{line}' is no pinned package with its hash.")
         name = re.sub(r"[-_.]+", "-", pin["name"]).lower()
-        hashes = [{"alg": "SHA-256", "content": pin["sha256"]}]
-        found.append(_component(name, pin["version"], f"pkg:pypi/{name}", hashes=hashes))
+        component = _component(name, pin["version"], f"pkg:pypi/{name}")
+        found.append(component | {"checksums": [_sha256(pin["sha256"])]})
     return found
 
 
@@ -112,16 +125,32 @@ def debian_packages(listed: str, arch: str) -> list[Component]:
     ]
 
 
-def _component(name: str, version: str, purl: str, query: str = "", **more: Any) -> Component:
-    reference = f"{purl}@{version}{query}"
+def _component(name: str, version: str, purl: str, query: str = "", licence: str = _NOT_SAID) -> Component:
+    locator = f"{purl}@{version}{query}"
     return {
-        "type": "library",
-        "bom-ref": reference,
         "name": name,
-        "version": version,
-        "purl": reference,
-        **more,
+        "versionInfo": version,
+        "downloadLocation": _NOT_SAID,
+        "filesAnalyzed": False,
+        "licenseConcluded": licence,
+        "licenseDeclared": licence,
+        "copyrightText": _NOT_SAID,
+        "externalRefs": [
+            {"referenceCategory": "PACKAGE-MANAGER", "referenceType": "purl", "referenceLocator": locator}
+        ],
     }
+
+
+def _purl(component: Component) -> str:
+    return str(component["externalRefs"][0]["referenceLocator"])
+
+
+def _sha256(digest: str) -> dict[str, str]:
+    return {"algorithm": "SHA256", "checksumValue": digest}
+
+
+def _relationship(of: str, kind: str, component: Component) -> dict[str, str]:
+    return {"spdxElementId": of, "relationshipType": kind, "relatedSpdxElement": component["SPDXID"]}
 
 
 if __name__ == "__main__":

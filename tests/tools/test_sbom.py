@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,9 +19,9 @@ HASH = "a" * 64
 def test_every_pin_of_the_box_is_in_the_bill_with_its_hash(arch: str) -> None:
     document = json.loads(sbom.bill(arch))
     hashes = {
-        one["hashes"][0]["content"]: one
-        for one in document["components"]
-        if one["purl"].startswith("pkg:pypi/") and one["name"] != "bunraku-sim"
+        one["checksums"][0]["checksumValue"]: one
+        for one in document["packages"]
+        if purl(one).startswith("pkg:pypi/") and not one["name"].startswith("bunraku")
     }
     locks = sorted((ROOT / "deploy/release").glob(f"*-{arch}.lock"))
     pinned = [
@@ -26,19 +29,33 @@ def test_every_pin_of_the_box_is_in_the_bill_with_its_hash(arch: str) -> None:
     ]
     assert sorted(hashes) == sorted(pinned)
     assert len(pinned) > 20
-    references = [one["bom-ref"] for one in document["components"]]
+    references = [one["SPDXID"] for one in document["packages"]]
     assert len(set(references)) == len(references)
+    assert {one["relatedSpdxElement"] for one in document["relationships"]} == set(references)
+
+
+def purl(package: dict[str, Any]) -> str:
+    return str(package["externalRefs"][0]["referenceLocator"])
+
+
+def test_the_bill_names_its_download_by_its_hash(tmp_path: Path) -> None:
+    deb = tmp_path / "bunraku_1_amd64.deb"
+    deb.write_bytes(b"a package")
+    document = json.loads(sbom.bill("amd64", of=deb))
+    own = document["packages"][0]
+    assert document["name"] == own["packageFileName"] == deb.name
+    assert own["checksums"][0]["checksumValue"] == hashlib.sha256(b"a package").hexdigest()
 
 
 def test_the_bill_names_the_project_the_firmware_and_debian_packages() -> None:
     document = json.loads(sbom.bill("amd64", "libc6 2.41-12 13000\nbash 5.2 7000\n"))
-    purls = {one["purl"] for one in document["components"]}
+    purls = {purl(one) for one in document["packages"]}
     assert {"pkg:deb/debian/bash@5.2?arch=amd64", "pkg:deb/debian/libc6@2.41-12?arch=amd64"} <= purls
     assert any(purl.startswith("pkg:generic/WiFi101@") for purl in purls)
-    own = document["metadata"]["component"]
+    own = document["packages"][0]
     assert own["name"] == "bunraku"
-    assert f"pkg:pypi/bunraku-sim@{own['version']}" in purls
-    assert document["bomFormat"] == "CycloneDX"
+    assert f"pkg:pypi/bunraku-sim@{own['versionInfo']}" in purls
+    assert document["spdxVersion"] == "SPDX-2.3"
 
 
 def test_the_same_inputs_give_the_same_bytes_and_no_host() -> None:
