@@ -21,6 +21,7 @@ from playwright.sync_api import Browser, Page, TimeoutError, sync_playwright
 
 CHROMIUM = "/usr/bin/chromium-headless-shell"  # without the windows of a desktop
 PAGES = ("tonight", "dance", "sensors", "rehearsal", "picture", "prove", "happened", "box", "device")
+PHONE = "sensors: {foreign: [{name: right-wrist, from: phone}]}\n"
 _FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 _CAPTIONS = {"dance": "#held", "rehearsal": "#figure-said"}  # they say when a frame is drawn
 _COLOURS = 64  # a third of the bytes, and nothing that is seen
@@ -60,6 +61,18 @@ def take_pictures(
     return taken
 
 
+def take_phone(browser: Browser, address: str, folder: Path) -> Path:
+    """A PNG of the page that makes a phone a sensor, before it begins."""
+    tab = browser.new_page(viewport={"width": 390, "height": 640}, locale="en-GB")
+    tab.goto(f"{address}/phone")
+    tab.wait_for_selector("#begin:enabled")
+    taken = folder / "page-phone.png"
+    tab.screenshot(path=taken)
+    tab.close()
+    Image.open(taken).quantize(_COLOURS).save(taken, optimize=True)
+    return taken
+
+
 def _prove(tab: Page, pin: str) -> None:
     """Stop the show, measure for a moment, go on."""
     tab.click('[data-page="device"]')
@@ -75,7 +88,7 @@ def _prove(tab: Page, pin: str) -> None:
     tab.click("#prove-begin")
     tab.wait_for_selector("#prove-document", timeout=_PROVEN_WITHIN_MS)
     tab.click('[data-page="tonight"]')
-    tab.click("#go")
+    tab.click("#resume")
     _await_well(tab)
     tab.wait_for_timeout(_FADED_MS)
 
@@ -91,7 +104,7 @@ def _dancing() -> Iterator[tuple[str, str]]:
     """Address and PIN of the page of a box that dances the show that comes with it, for no receiver."""
     with tempfile.TemporaryDirectory() as scratch:
         box = Path(scratch) / "box.yaml"
-        box.write_text("outputs: {osc: []}\nconsole: {port: 0}\ncontrol: {port: 0}\nruntime: run\n")
+        box.write_text("outputs: {osc: []}\nconsole: {port: 0}\ncontrol: {port: 0}\nruntime: run\n" + PHONE)
         command = [sys.executable, "-m", "appliance.cli", "play", "--emulate", "--box", str(box)]
         command += ["--journal", f"{scratch}/night"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
@@ -109,12 +122,13 @@ def main(
     address: Annotated[str | None, typer.Option(help="Of a page; left out: a box is started.")] = None,
     out: Annotated[Path, typer.Option(help="The folder.")] = _FOLDER,
 ) -> None:
-    """Take the pictures of docs/technician.md."""
+    """Take the pictures of docs/page.md."""
     box = contextlib.nullcontext((address, "")) if address else _dancing()
     with box as (found, pin), sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for path in take_pictures(browser, found, out, pin):
             print(path)
+        print(take_phone(browser, found, out))
         browser.close()
 
 
