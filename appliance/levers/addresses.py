@@ -173,7 +173,14 @@ PROJECTOR = (
         "projector",
         "info",
         "/projector/info",
-        "the test card, on the wall: figures for technicians, the page's address and its PIN",
+        "figures for technicians over the picture, the page's address and its PIN",
+        _ON,
+    ),
+    _once(
+        "projector",
+        "test_card",
+        "/projector/test_card",
+        "the test card in place of the dance: focus, edges, greys, colours, the page's address and its PIN",
         _ON,
     ),
 )

@@ -28,6 +28,7 @@ class Controls:
         self._chosen = 0
         self.has_grid = False
         self.shows_info = shows_info
+        self.shows_test_card = False
         self.is_over = False
         self.wants_fullscreen = False  # the owner of the window toggles it and resets this
 
@@ -108,10 +109,21 @@ class Controls:
         self.shows_info = info
         return "Figures are on the wall." if info else "No figures on the wall."
 
+    def set_test_card(self, shown: bool) -> str:
+        """Show the test card in place of the dance, or the dance."""
+        self.shows_test_card = shown
+        return "The test card is on the wall in place of the dance." if shown else "The dance is on the wall."
+
     def told(self) -> dict[str, Any]:
         """For the page: corners in shares of the display, brightness as a factor, grid and figures."""
         corners, brightness = self.alignment.corners, self.alignment.brightness
-        return {"corners": corners, "brightness": brightness, "grid": self.has_grid, "info": self.shows_info}
+        return {
+            "corners": corners,
+            "brightness": brightness,
+            "grid": self.has_grid,
+            "info": self.shows_info,
+            "test_card": self.shows_test_card,
+        }
 
     def carry_out(self, order: Order) -> tuple[bool, str]:
         """An order by OSC: whether it was done, and a sentence."""
@@ -132,6 +144,8 @@ class Controls:
                 return True, self.set_mirror(values[0] != 0)
             case "grid", 1:
                 return True, self.set_grid(values[0] != 0)
+            case "test_card", 1:
+                return True, self.set_test_card(values[0] != 0)
             case "info", 1:
                 return True, self.set_info(values[0] != 0)
         return False, f"The projector knows no order '{order.name}' with these values. Nothing has changed."

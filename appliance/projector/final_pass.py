@@ -21,6 +21,7 @@ from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 _NO_SIZE = (1, 1)  # size of an absent picture
 _MARKER_RADIUS = 28.0  # pixels
 _TEXT_ROWS = 160  # letters are as large as on a display of this many rows of pixels
+_TOE = {"projector": 0.06, "screen": 0.0}  # of white: a projector shows fainter air as a grey rectangle
 _DITHER_STEP = 0.618034  # pixels: no two neighbouring pictures have the same pattern
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 _CLIP_FROM_DISPLAY = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.0]])  # y down
@@ -87,16 +88,24 @@ class FinalPass:
         picture to memory and reading it back; else a texture.
         """
         scale, gamma = level * controls.alignment.brightness, self._config.gamma
+        toe = _TOE[self._config.wall]
         self._is_graded = self._config.edge_blend is None and not lines and not controls.shows_grid
         if self._is_graded and size == display:
             self.resize(_NO_SIZE)
             clip_from_picture = self._clip_from_part(controls) @ _Y_UP
-            return Wall(screen, display, size, clip_from_picture, scale, gamma, detail=detail)
+            return Wall(screen, display, size, clip_from_picture, scale, gamma, detail=detail, toe=toe)
         self.resize(size)
         if not self._is_graded:
-            return replace(flat(self.picture), detail=detail)
+            return replace(flat(self.picture), detail=detail, toe=toe)
         finer = 1.0 if self._config.picture else display[1] / size[1]
-        return Wall(self.picture, size, size, FLAT, scale, gamma, finer, detail)
+        return Wall(self.picture, size, size, FLAT, scale, gamma, finer, detail, toe)
+
+    def show_image(self, image: NDArray[np.uint8]) -> None:
+        """An image (height, width, 3), top row first, in place of a look's picture; `draw` does the rest."""
+        self._is_graded = False
+        self.resize((image.shape[1], image.shape[0]))
+        opaque = np.dstack([image, np.full(image.shape[:2], 255, np.uint8)])
+        self._texture.write(np.ascontiguousarray(opaque[::-1]).tobytes())
 
     def resize(self, size: Size) -> None:
         """The size in which the scene is drawn, pixels."""

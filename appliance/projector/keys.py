@@ -16,6 +16,7 @@ g            grid on or off
 m            mirror, for rear projection
 + -          brighter, darker
 i            figures on the wall on or off
+t            test card in place of the dance, or the dance
 f            fullscreen or window
 q            end"""
 
@@ -63,6 +64,8 @@ def _single_key(name: str, controls: Controls) -> str:
             return controls.set_mirror(not controls.alignment.mirror)
         case "I":
             return controls.set_info(not controls.shows_info)
+        case "T":
+            return controls.set_test_card(not controls.shows_test_card)
         case "H":
             return HELP
         case "F":

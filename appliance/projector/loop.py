@@ -27,6 +27,7 @@ from appliance.projector.picture.camera import NOT_CUED, CuedCamera
 from appliance.projector.picture.cards import Cards
 from appliance.projector.picture.image_file import read_image
 from appliance.projector.picture.renderer import Renderer
+from appliance.projector.picture.test_card import Image, test_card
 from appliance.projector.picture.wall import DETAILS, Detail, Wall
 from appliance.projector.presence import STALE_S, Presence
 from appliance.projector.resolution import SHARES
@@ -38,6 +39,7 @@ from appliance.show.projector import ProjectorConfig
 from appliance.show.show import load_show
 
 Looks = Mapping[str, LookConfig]
+PAGE = "page "  # begins the line of the test card that has the page's address
 
 
 class Painter(Protocol):
@@ -84,6 +86,8 @@ class Projector:
         self._to_draw: ShownShow | None = None  # a show that waits for its painter
         self._detail = DETAILS[0]
         self._is_black = False  # since that show waits
+        self._test_card: Image | None = None
+        self._test_card_of: tuple[object, ...] = ()
         self.shown: str | None = None  # the look of the last picture; None: none, or two that cross-fade
         self.is_preparing = False  # no watchdog counts meanwhile
         self.held: list[float] | None = None  # rotation in the world (w, x, y, z) of the held joint
@@ -115,6 +119,9 @@ class Projector:
         newest = self._poses.newest if self._poses is not None and self._drawn is not None else None
         presence = self._presence.step(newest, now)
         show_state = self._show_state.read()
+        if self._controls.shows_test_card and not (show_state.panic or show_state.blackout):
+            self._draw_test_card(screen, display, lines)
+            return None
         level = show_state.level(now) * presence
         is_drawn = self._painter is not None and moment is not None and level > 0.0
         size = picture_size(self._config, display, share)
@@ -139,6 +146,16 @@ class Projector:
         self._final.mask(screen, display, self._controls)
         is_fresh = newest is not None and now - newest < STALE_S
         return self._poses.left_stage(moment) if self._poses and moment and is_drawn and is_fresh else None
+
+    def _draw_test_card(self, screen: moderngl.Framebuffer, display: Size, lines: tuple[str, ...]) -> None:
+        """Made again where words or size have changed. The line that begins with PAGE is its address."""
+        size = picture_size(self._config, display)
+        if self._test_card is None or self._test_card_of != (size, lines):
+            address = next((line.removeprefix(PAGE) for line in lines if line.startswith(PAGE)), "")
+            self._test_card, self._test_card_of = test_card(size, lines, address), (size, lines)
+        self._final.show_image(self._test_card)
+        self._final.draw(screen, display, self._controls, 1.0, ())
+        self._final.mask(screen, display, self._controls)
 
     def release(self) -> None:
         """Give the GPU's memory back."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -114,6 +115,7 @@ class Run:
         self._meter = Meter()
         self._patience = Patience(PATIENCE_S)
         self._lines: tuple[str, ...] = ()
+        self._card: tuple[str, ...] = ()
         self._warned = not self.context.is_software
 
     def introduction(self) -> list[str]:
@@ -172,6 +174,7 @@ class Run:
     def _show(self, now: float) -> None:
         screen, size, begun = self.context.gl.screen, self._window.size, time.monotonic()
         lines = self._lines if self._controls.shows_info else ()
+        lines = self._card if self._controls.shows_test_card else lines
         left_stage = self.projector.draw(now, screen, size, lines, self._resolution.share)
         if self._options.stamps:
             stamp(screen, self._meter.pictures, self.projector.held if left_stage is not None else None)
@@ -241,6 +244,8 @@ class Run:
         width, height = self._window.size
         share = self._resolution.share
         self._publish_health(now, state, share)
+        has_words = self._controls.shows_info or self._controls.shows_test_card
+        where = self._options.card() if has_words else ()
         drawn_at = "" if share == 1.0 else f" at {share:.0%}"
         age = "-" if figures.age_p50_ms is None else f"{figures.age_p50_ms:.0f} / {figures.age_p99_ms:.0f} ms"
         self._lines = (
@@ -249,8 +254,9 @@ class Run:
             f"stage {state}",
             f"look {self._show_state.read()[LOOK].value or 'of the show'}",
             f"{width}x{height}{drawn_at} {'software' if self.context.is_software else self._window.driver}",
-            *(self._options.card() if self._controls.shows_info else ()),
+            *(where if self._controls.shows_info else ()),
         )
+        self._card = (socket.gethostname(), *where, f"{width}x{height} {self._window.driver}")
         if self._options.shows_info:
             self._say(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")
         if not self._warned and figures.dances >= _JUDGED_AFTER:

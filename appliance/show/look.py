@@ -11,7 +11,7 @@ from pydantic import model_validator
 from appliance.show.picture_file import Colour, PictureFile
 from appliance.show.section import BundleFile, Section, key, part, refusal
 
-Style = Literal["plaster", "lines", "ink", "cloud", "veil"]
+Style = Literal["plaster", "lines", "ink", "cloud", "veil", "strings"]
 STYLES: tuple[Style, ...] = get_args(Style)
 Move = Literal["still", "drift", "orbit"]
 
@@ -79,7 +79,8 @@ class LookConfig(Section):
     name: str = key("Name for cues and /look.", length=(1, 64))
     style: Style = key(
         "plaster: a sculpture in stage light; lines: strands of light; ink: brush and paper; "
-        "cloud: thousands of points; veil: glass and its echoes.",
+        "cloud: thousands of points; veil: glass and its echoes; "
+        "strings: which limbs follow the held joint.",
         "plaster",
     )
     figure: Colour = key("The figure: plaster, strands, ink, points.", None)

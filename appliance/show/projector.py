@@ -68,6 +68,11 @@ class ProjectorConfig(Section):
     upside_down: bool = key("Turned by 180 degrees, for a projector that hangs from the ceiling.", False)
     brightness: float = key("Factor on the brightness of the picture.", 1.0, within=(0.0, 2.0))
     gamma: float = key("Above 1 lifts the dark tones, below 1 deepens them.", 1.0, within=(0.3, 3.0))
+    wall: Literal["projector", "screen"] = key(
+        "projector: haze that is nearly black is black, else the picture is a grey rectangle on the wall; "
+        "screen: LED walls and monitors show all of it.",
+        "projector",
+    )
     edge_blend: EdgeBlendConfig | None = key(
         str(EdgeBlendConfig.__doc__) + " null: only one projector.", None
     )

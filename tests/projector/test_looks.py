@@ -167,7 +167,7 @@ def test_first_picture_of_a_show_has_no_past(
     dance: Recording, drawing: tuple[moderngl.Context, Renderer]
 ) -> None:
     moment = moment_of(dance, 0.0)
-    assert len(moment.trail) == 1
+    assert len(moment.trail_times) == 1
     for style in STYLES:
         assert draw_still(*drawing, moment, style, SIZE).max() > 100
 

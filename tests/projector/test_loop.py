@@ -286,3 +286,13 @@ def test_the_window_may_change_its_size(evening: Evening) -> None:
 def test_text_appears_on_demand_alone(evening: Evening) -> None:
     assert not evening.picture().any()
     assert evening.picture(lines=("60 pictures/s",)).any()
+
+
+def test_the_test_card_needs_no_stage_and_gives_way_to_panic(evening: Evening) -> None:
+    evening.controls.set_test_card(True)
+    shown = evening.picture(lines=("box", "page http://10.0.0.1:80"))
+    assert shown[0].min() >= 254 and np.ptp(shown) >= 254
+    evening.begin()
+    assert (evening.picture(lines=("box", "page http://10.0.0.1:80")) == shown).all()
+    evening.declare(replace(evening.show_state, panic=True))
+    assert evening.picture().max() == 0

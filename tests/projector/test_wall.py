@@ -38,7 +38,8 @@ MOST_PASSES = 3.0  # the looks take 0.9 to 1.5 known passes of Mesa's llvmpipe
 def test_laid_by_the_look_and_by_the_last_step_alike(
     name: str, upside_down: bool, gl: moderngl.Context, dance: Recording, looks: Renderer
 ) -> None:
-    final, whole = (FinalPass(gl, ProjectorConfig(upside_down=upside_down, gamma=1.3)) for _ in range(2))
+    config = ProjectorConfig(upside_down=upside_down, gamma=1.3, wall="screen")
+    final, whole = (FinalPass(gl, config) for _ in range(2))
     whole.resize(SIZE)
     controls = Controls(ALIGNMENTS[name], lambda _: None)
     moment = moment_of(dance, AT_S)

@@ -32,7 +32,7 @@ from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of
 from tests.studio.conftest import bunraku as studio
 from tests.studio.test_commands import said
 
-LOOKS = ("plaster", "lines", "ink", "cloud", "veil")
+LOOKS = ("plaster", "lines", "ink", "cloud", "veil", "strings")
 NO_PORTS = {"control": None, "console": None, "sensors": {"udp": None}}
 BEAM_M = 0.1
 HELD_RED = 60  # of 255: how much redder than green and blue

@@ -7,14 +7,13 @@ import numpy as np
 
 from appliance.projector.picture.looks.palette import Palette
 from appliance.projector.picture.scene import Easel, Scene
-from appliance.projector.picture.shadow import Shadow
+from appliance.projector.picture.shadow import OVERHEAD, Shadow
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 NEAR, FAR = 180, 60  # lines of the glow's pictures
 FAR_GAIN = 2.0  # the far glow is faint
-OVERHEAD = np.array([0.0, 1.0, 0.0])  # straight below it the figure lights the floor
 
 
 class Glow:
@@ -70,6 +69,7 @@ class Glow:
             "fog": look.fog,
             "glow": look.glow,
             "vignette": look.vignette,
+            "toe": wall.toe,
             "exposure": look.exposure,
         }
         air.start()

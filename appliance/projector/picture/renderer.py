@@ -15,6 +15,7 @@ from appliance.projector.picture.looks.cloud import Cloud
 from appliance.projector.picture.looks.ink import Ink
 from appliance.projector.picture.looks.lines import Lines
 from appliance.projector.picture.looks.plaster import Plaster
+from appliance.projector.picture.looks.strings import Strings
 from appliance.projector.picture.looks.veil import Veil
 from appliance.projector.picture.poses import poses_of, together
 from appliance.projector.picture.scene import Easel, Scene
@@ -34,6 +35,7 @@ _LOOKS: dict[Style, Callable[[Easel], _Look]] = {
     "ink": Ink,
     "cloud": Cloud,
     "veil": Veil,
+    "strings": Strings,
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +21,7 @@ from appliance.projector.picture.body_buffers import BodyBuffers
 from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import read_image, texture_of
+from appliance.projector.picture.led import led_by
 from appliance.projector.picture.noise import SIDE, noise_pixels
 from appliance.projector.picture.poses import Floats, HoldTexture, Poses, PoseTexture
 from appliance.projector.picture.targets import Target
@@ -34,6 +35,8 @@ BACKDROP = "BACKDROP"  # the part of a look's last step that has an image behind
 Box = tuple[float, float, float, float]
 WHOLE: Box = (0.0, 0.0, 1.0, 1.0)
 WIDER, SPREAD_STEP, MOST_SPREAD = 1.2, 0.5, 5.0  # in a figure height from the middle; of `spread`
+SHUTTER = 0.5  # rows of poses for which the shutter is open: 12 ms
+MOST_MOMENTS, BLUR_STEP = 4, 5.0  # pixels from one moment to the next
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
 
 
@@ -86,6 +89,16 @@ class Scene:
         """Share of the picture's height that a figure height takes where the dancer is."""
         return 0.5 / (self.view.slopes[1] * self.distance)
 
+    def shutter(self, wall: Wall) -> list[float]:
+        """`back` of the moments that make one picture: more where a joint moves by many pixels, and where the
+        machine draws several samples anyway."""
+        if not wall.detail.samples:
+            return [0.0]
+        way = np.linalg.norm(self.poses.positions[1] - self.poses.positions[0], axis=1).max()
+        pixels = SHUTTER * float(way) * self.share_of_picture * wall.picture[1]
+        count = min(MOST_MOMENTS, max(1, round(pixels / BLUR_STEP)))
+        return [SHUTTER * moment / count for moment in range(count)]
+
     def box(self, rows: int = 1, margin: float = 0.0) -> Box:
         """Where the figure is in the picture, or has been in the last `rows` of its poses: left, lower, right
         and upper edge, 0..1; margin: around it, of the picture's height."""
@@ -104,12 +117,14 @@ class _FigureTextures:
     """The pose of one figure, on the GPU."""
 
     def __init__(self, ctx: moderngl.Context, mesh: BodyMesh, joints: int) -> None:
-        self.poses, self.holds = PoseTexture(ctx, mesh, joints), HoldTexture(ctx, joints)
-        self.inputs = {"poses": self.poses.texture, "holds": self.holds.texture}
+        self.poses = PoseTexture(ctx, mesh, joints)
+        self.holds, self.led = HoldTexture(ctx, joints), HoldTexture(ctx, joints)
+        self.inputs = {"poses": self.poses.texture, "holds": self.holds.texture, "led": self.led.texture}
 
     def release(self) -> None:
         self.poses.release()
         self.holds.release()
+        self.led.release()
 
 
 class Easel:
@@ -127,6 +142,8 @@ class Easel:
         self.body = BodyBuffers(ctx, mesh)
         self._figures = [_FigureTextures(ctx, mesh, len(skeleton))]
         self._mesh, self._shown = mesh, 1
+        self._poses: Sequence[Poses] = ()
+        self._holds: Sequence[Floats | None] = ()
         self.noise = ctx.texture((SIDE, SIDE), 4, noise_pixels())
         self.noise.build_mipmaps()
         self.noise.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
@@ -136,20 +153,49 @@ class Easel:
         self._buffers: list[moderngl.Buffer] = []
         self._drawings: list[Drawing] = []
         self._sheets: dict[tuple[str, ...], Drawing] = {}
+        self._expose = self.drawing("screen", "expose")
 
     def show(self, poses: Sequence[Poses], holds: Sequence[Floats | None]) -> None:
         """The poses of the next picture's figures, at least one."""
-        self._shown = len(poses)
+        self._shown, self._poses, self._holds = len(poses), poses, holds
         while len(self._figures) < self._shown:
             self._figures.append(_FigureTextures(self.ctx, self._mesh, len(self.skeleton)))
         for textures, one, held in zip(self._figures, poses, holds, strict=False):
             textures.poses.write(one)
             textures.holds.write(held)
 
+    def lead(self) -> list[int | None]:
+        """Bring onto the GPU how far joints follow the held one; returns the joint that leads each figure."""
+        leaders = []
+        for textures, one, held in zip(self._figures, self._poses, self._holds, strict=False):
+            leader, led = led_by(one, held)
+            textures.led.write(led)
+            leaders.append(leader)
+        return leaders
+
+    def draw_figure(self, figure: int, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
+        """Draw what belongs to one of the figures. drawn: as Drawing takes it."""
+        drawing.draw({"back": 0.0} | inputs | self._figures[figure].inputs, *drawn)
+
     def draw_figures(self, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
         """Draw what belongs to a figure once for each. drawn: as Drawing takes it."""
-        for textures in self._figures[: self._shown]:
-            drawing.draw(inputs | textures.inputs, *drawn)
+        for figure in range(self._shown):
+            self.draw_figure(figure, drawing, inputs, *drawn)
+
+    def expose(self, picture: Target, moments: Sequence[float], draw: Callable[[float], None]) -> Target:
+        """What `draw` draws into the picture at each moment, averaged; draw: takes `back`."""
+        if len(moments) == 1:
+            draw(moments[0])
+            return picture
+        exposed = self.canvas("exposed", picture.size)
+        exposed.start()
+        for back in moments:
+            draw(back)
+            exposed.use()
+            self.ctx.enable_only(moderngl.BLEND)
+            self.ctx.blend_func = moderngl.ONE, moderngl.ONE
+            self._expose.draw({"source": picture.texture, "part": 1.0 / len(moments)})
+        return exposed
 
     def vertices(self, parts: Mapping[str, Any], instanced: bool = False) -> list[tuple[Any, ...]]:
         """Bring vertices onto the GPU; returns what a vertex array is made of. instanced: one an instance."""
@@ -246,9 +292,9 @@ class Easel:
         self._drawings.append(Drawing(self.ctx, vertex, fragment, content, index, parts))
         return self._drawings[-1]
 
-    def surface(self, vertex: str, fragment: str, coarse: bool = False) -> Drawing:
+    def surface(self, vertex: str, fragment: str, coarse: bool = False, parts: Sequence[str] = ()) -> Drawing:
         """The body's surface, drawn by these shaders."""
-        return self.drawing(vertex, fragment, *self.body.content(coarse))
+        return self.drawing(vertex, fragment, *self.body.content(coarse), parts)
 
     def blur(self, blur: Drawing, picture: Target, other: Target, step_uv: tuple[float, float]) -> None:
         """Soften a picture across, into another canvas of its size, and upwards, back into its own."""

@@ -13,6 +13,7 @@ from appliance.projector.picture.scene import Easel, Scene
 DEPTH_SIDE, CAST_SIDE = 384, 192  # pixels
 FIELD = 0.85  # figure heights around the dancer's middle that the lamp sees
 REACH = 1.7  # figure heights of floor around the dancer on which a shadow can fall
+OVERHEAD = np.array([0.0, 1.0, 0.0])  # what is near the floor darkens it right below, whatever the lamp
 SPREAD = 1.0  # pixels from one sample of the floor shadow's blur to the next
 
 
@@ -37,15 +38,17 @@ class Shadow:
         easel.draw_figures(self._depth, {"row": 0, "held": 0.0, "projection": lamp_projection})
         depth.finish()
         lamps = {"lamp_depth": depth.texture, "lamp_projection": lamp_projection}
+        below = self.on_floor(scene, OVERHEAD, "contact")
+        lamps |= {"contact": below["floor_shadow"], "contact_middle": below["middle"]}
         return lamps | self.on_floor(scene, lamp)
 
-    def on_floor(self, scene: Scene, lamp: Array) -> dict[str, Any]:
-        """Draw only the floor's shadow."""
+    def on_floor(self, scene: Scene, lamp: Array, name: str = "cast") -> dict[str, Any]:
+        """Draw only the floor's shadow; name: of its canvas."""
         ctx, easel = self._easel.ctx, self._easel
         root, side = scene.poses.roots[0].astype(float), round(scene.spread * CAST_SIDE)
         middle = root[[0, 2]] - 0.5 * lamp[[0, 2]] / lamp[1]
         on_floor = {"lamp": lamp, "middle": middle, "reach": scene.spread * REACH}
-        first, second = (easel.canvas(name, (side, side)) for name in ("cast", "cast blurred"))
+        first, second = (easel.canvas(name, (side, side)) for name in (name, "cast blurred"))
         first.start()
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.MAX, moderngl.MAX

@@ -28,10 +28,14 @@ class Target:
         self.buffer = ctx.framebuffer([self._fine or self.texture], self._depth)
         self._invalidate = _invalidation() if depth else None
 
-    def start(self, colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)) -> None:
-        """Draw here from now on, over one colour."""
+    def use(self) -> None:
+        """Draw here again, over what is there."""
         self.buffer.use()
         self.buffer.viewport = (0, 0, *self.size)
+
+    def start(self, colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)) -> None:
+        """Draw here from now on, over one colour."""
+        self.use()
         self.buffer.clear(*colour)
 
     def keep(self, channels: str, depth: bool = True) -> None:

@@ -34,7 +34,7 @@ class Wall:
     third row above 0 all over it; the rest of the framebuffer becomes black. level: of the brightness;
     gamma: above 1 lifts the dark tones; finer: how many times finer the figure is drawn than its look says,
     at most as fine as the picture: in a small one its edges would else be steps; detail: of figures
-    whose look says none.
+    whose look says none; toe: air that is fainter, as a share of white, is black (0: none).
     """
 
     framebuffer: moderngl.Framebuffer
@@ -45,6 +45,7 @@ class Wall:
     gamma: float = 1.0
     finer: float = 1.0
     detail: Detail = DETAILS[0]
+    toe: float = 0.0
 
     @property
     def aspect(self) -> float:

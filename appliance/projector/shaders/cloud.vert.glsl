@@ -42,7 +42,9 @@ void main() {
     vec3 normal = turned(joint_at(in_joints.x, row), 2.0 * in_normal.xyz - 1.0);
     vec3 drift = textureLod(noise, place.xy * 0.9 + in_chance.zw * 0.15 + time * 0.01, 0.0).rgb
                + textureLod(noise, place.zy * 1.7 - time * 0.013, 0.0).gbr - 1.0;
-    place += age_s * (0.30 * velocity * (1.0 - 0.45 * age) + (0.12 + 0.20 * speed) * drift + 0.03 * normal);
+    float light_one = 1.0 - 0.6 * pow(in_chance.y, 10.0);  // large grains fall, small ones are carried away
+    place += age_s * light_one * ((0.30 + 0.25 * in_chance.w) * velocity * (1.0 - 0.45 * age) + (0.14 + 0.26 * speed) * drift + 0.04 * normal);
+    place.y -= 0.5 * age_s * age_s * (1.0 - light_one);
     place += normal * 0.006 * (in_chance.w - 0.3);
     vec3 way = eye - place;
     float distance = length(way), facing = dot(normal, way) / distance;
@@ -58,8 +60,8 @@ void main() {
     float shown = loose ? smoothstep(0.30, 1.5, speed) * pow(1.0 - age, 1.5) : smoothstep(-0.1, 0.3, facing);
     grain_colour = vec4((loose ? in_air * 1.3 : on_body) * spark * shown * deep, 1.0);
     gl_Position = projection * vec4(place + 0.012 * way / distance, 1.0);
-    float size = pixels * (0.55 + 0.5 * in_chance.w + 0.6 * pow(in_chance.y, 12.0)) / gl_Position.w;
-    gl_PointSize = clamp(size, 1.6, 12.0);
+    float size = pixels * (0.42 + 0.45 * in_chance.w + 1.5 * pow(in_chance.y, 10.0)) / gl_Position.w;
+    gl_PointSize = clamp(size, 1.6, 16.0);
     grain_colour.rgb *= min(1.0, size * size / (1.6 * 1.6));
     if (shown < 0.01) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
 }

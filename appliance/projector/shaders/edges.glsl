@@ -7,3 +7,12 @@ float edge(vec2 uv, float aspect) {
     vec2 near = smoothstep(vec2(0.0), vec2(0.06 + 0.30 * vignette), from_edge);
     return near.x * near.y;
 }
+
+// Air that is nearly black is black where the wall shows it as grey.
+uniform float toe;
+
+vec3 deep(vec3 air, float speck) {
+    float most = max(air.r, max(air.g, air.b));
+    float kept = smoothstep(0.4 * toe, 2.2 * toe + 1e-4, most);
+    return kept * air + (speck - 0.5) / 255.0 * step(0.001, kept);
+}

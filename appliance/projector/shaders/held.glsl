@@ -1,4 +1,7 @@
 // How firmly a hand holds what moves a vertex; `held` 0 switches the mark off.
+#ifdef LED
+#define holds led
+#endif
 uniform highp sampler2D holds;
 uniform float held;
 

@@ -2,6 +2,8 @@
 in vec2 uv;
 in vec3 ray;
 uniform sampler2D floor_shadow;
+uniform sampler2D contact;
+uniform vec2 contact_middle;
 uniform sampler2D noise;
 uniform vec3 eye;
 uniform vec2 ground;
@@ -33,8 +35,11 @@ vec3 floor_light() {
     vec3 bands = texture(floor_shadow, 0.5 + 0.5 * on_cast).rgb;
     float inside = 1.0 - smoothstep(0.75, 1.0, max(abs(on_cast.x), abs(on_cast.y)));
     float dark = min(1.0, 1.2 * bands.r + 1.15 * bands.g + 1.1 * bands.b) * inside * shadow;
+    vec2 on_contact = (at.xz - contact_middle) / reach;
+    float touched = texture(contact, 0.5 + 0.5 * on_contact).r * (1.0 - step(1.0, max(abs(on_contact.x), abs(on_contact.y))));
     float worn = 0.62 + 0.5 * texture(noise, at.xz * 0.21).r + 0.30 * (texture(noise, at.xz * 1.1).g - 0.5);
     vec3 bounced = light_colour * (1.0 - dark) + accent_colour * 0.05;
+    bounced *= 1.0 - shadow * smoothstep(0.25, 0.8, touched);
     return air_colour * bounced * pool * worn * 1.3;
 }
 
@@ -51,5 +56,5 @@ float beam() {
 void main() {
     vec3 light = floor_light() + fog * light_colour * air_colour * 0.42 * beam();
     float speck = texelFetch(noise, ivec2(gl_FragCoord.xy) & 255, 0).a;
-    colour = vec4(toned(exposure * light) + (speck - 0.5) / 255.0, edge(uv, aspect));
+    colour = vec4(deep(toned(exposure * light), speck), edge(uv, aspect));
 }

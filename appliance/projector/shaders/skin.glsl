@@ -1,9 +1,13 @@
 // The body follows its joints: dual quaternions w, x, y, z from the pose texture, blended (Kavan et al. 2007).
 uniform highp sampler2D poses;
+uniform float back;  // how far on the way to the row before, 0 to 1: a moment while the shutter is open
 
 mat2x4 joint_at(uint joint, int row) {
     int column = 2 * int(joint);
-    return mat2x4(texelFetch(poses, ivec2(column, row), 0), texelFetch(poses, ivec2(column + 1, row), 0));
+    mat2x4 now = mat2x4(texelFetch(poses, ivec2(column, row), 0), texelFetch(poses, ivec2(column + 1, row), 0));
+    if (back == 0.0) return now;
+    mat2x4 then = mat2x4(texelFetch(poses, ivec2(column, row + 1), 0), texelFetch(poses, ivec2(column + 1, row + 1), 0));
+    return (1.0 - back) * now + (dot(now[0], then[0]) < 0.0 ? -back : back) * then;
 }
 
 mat2x4 blended(uvec4 joints, vec4 weights, int row) {

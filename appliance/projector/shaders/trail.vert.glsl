@@ -10,6 +10,7 @@ uniform float width;
 uniform float rows;
 uniform float row_s;
 uniform float floor_side;
+uniform float pressure;  // 1: a fast brush is lifted, and strokes end in a point
 out float across;
 out float age;
 out float speed;
@@ -32,6 +33,7 @@ void main() {
     vec4 a = projection * vec4(newer_at, 1.0), b = projection * vec4(older_at, 1.0);
     vec2 along = (a.xy / a.w - b.xy / b.w) / pixel;
     vec2 side = normalize(vec2(-along.y, along.x) + 1e-5);
-    here.xy += across * side * width * pixel * here.w;
+    float pressed = mix(1.6, 0.5, smoothstep(0.6, 3.5, speed)) * sqrt(1.0 - age) * smoothstep(0.0, 0.12, age + 0.04);
+    here.xy += across * side * width * mix(sqrt(1.0 - 0.8 * age), pressed, pressure) * pixel * here.w;
     gl_Position = here;
 }

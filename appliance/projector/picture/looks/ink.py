@@ -107,6 +107,7 @@ class Ink:
             "row_s": ROW_S,
             "floor_side": 1.0,
             "brightness": 0.9,
+            "pressure": 1.0,
         }
         easel.draw_figures(self._strokes, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
         easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD

@@ -78,6 +78,7 @@ class Lines:
             "fresh_colour": stored(colours.light),
             "old_colour": stored(colours.accent),
             "brightness": 0.8 * share,
+            "pressure": 0.0,
         }
         self._easel.draw_figures(self._trails, inputs | trail, moderngl.TRIANGLE_STRIP, 2 * rows, TRACES)
         echoes = ECHOES if inputs["floor_side"] > 0 else 0

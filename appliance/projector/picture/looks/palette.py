@@ -14,6 +14,7 @@ _OWN = {  # figure, light, accent, background, held
     "lines": ("#ffd7a1", "#fff4e0", "#3d7bff", "#10141f", "#ff3b1f"),
     "ink": ("#14110f", "#2a2320", "#8c2f1f", "#e9dfcb", "#d8401c"),
     "cloud": ("#cfe0ff", "#ffe3c2", "#3b63d8", "#0d1220", "#ff7a2e"),
+    "strings": ("#86a6d0", "#ffdca8", "#4a74c0", "#0b0f18", "#ff5a2a"),
     "veil": ("#bfe6e0", "#ffffff", "#c04a7a", "#0c1016", "#ff7a2e"),
 }
 

@@ -48,12 +48,17 @@ class Plaster:
             "fog": look.fog,
             "exposure": look.exposure,
             "vignette": look.vignette,
+            "toe": wall.toe,
         }
         picture = easel.picture(wall, look)
-        picture.start()
-        easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        easel.draw_figures(self._figure, inputs)
-        picture.finish()
+
+        def draw(back: float) -> None:
+            picture.start()
+            easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+            easel.draw_figures(self._figure, inputs | {"back": back})
+            picture.finish()
+
+        exposed = easel.expose(picture, scene.shutter(wall), draw)
         pool = np.array([view.ground[0], 0.0, view.ground[1]])
         inputs |= {
             "beam_from": view.on_picture(pool + BEAM * lamp),
@@ -65,7 +70,7 @@ class Plaster:
         easel.ctx.enable_only(moderngl.NOTHING)
         self._air.draw(inputs)
         inputs |= {
-            "picture": picture.texture,
+            "picture": exposed.texture,
             "air": air.texture,
             "texel": (1 / picture.size[0], 1 / picture.size[1]),
         }

@@ -48,7 +48,12 @@ class Veil:
                 "held": held if echo == 0 else 0.0,
                 "brightness": 1.5 if echo == 0 else 0.75 * (1 - share) ** 1.3,
             }
-            body = self._figure if echo == 0 else self._echo
-            easel.draw_figures(body, inputs)
+            if echo:
+                easel.draw_figures(self._echo, inputs)
+                continue
+            moments = scene.shutter(wall)
+            inputs["brightness"] /= len(moments)
+            for back in moments:
+                easel.draw_figures(self._figure, inputs | {"back": back})
         picture.finish()
         self._glow.finish(scene, look, colours, picture, opacity, wall)

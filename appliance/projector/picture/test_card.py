@@ -1,0 +1,138 @@
+"""The test card: focus, overscan, grey steps, colours, circles, and where the page of this box is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import segno
+from numpy.typing import NDArray
+from PIL import Image as Files
+from PIL import ImageDraw
+
+from appliance.projector.picture.lettering import lettered
+
+Image = NDArray[np.uint8]
+
+GREYS = 11  # steps from black to white
+NEAR = (0, 2, 4, 6, 8, 12, 16)  # of 255: steps next to black, and as far from white
+OVERSCAN = (0.025, 0.05)  # shares of the picture that a display may cut off at each edge
+_COLOURS = ("#ffffff", "#ffff00", "#00ffff", "#00ff00", "#ff00ff", "#ff0000", "#0000ff")
+_FOCUS = (1, 2, 3)  # pixels: widths of lines
+_STAR = 36  # spokes
+_FAINT = 44  # of 255: the lines of the squares
+
+
+def test_card(size: tuple[int, int], lines: Sequence[str], address: str = "") -> Image:
+    """(height, width, 3), top row first. lines: words in its middle; address: as a QR code, '': none."""
+    width, height = size
+    image = Files.new("RGB", size, (0, 0, 0))
+    draw = ImageDraw.Draw(image)
+    unit = min(height / 36.0, width / 64.0)  # in an upright picture what is in the middle is smaller
+    _grid(draw, width, height)
+    _overscan(draw, width, height)
+    _circles(draw, width, height, unit)
+    _bars(draw, width, height, unit)
+    for x in (width / 2 - 23.7 * unit, width / 2 + 23.7 * unit):
+        _star(draw, x, height / 2 - 3.6 * unit, 4.2 * unit)
+        _focus(draw, x, height / 2 + 2.3 * unit, unit)
+    _words(image, lines, address, unit)
+    return np.asarray(image)
+
+
+def _grid(draw: ImageDraw.ImageDraw, width: int, height: int) -> None:
+    """Squares, a ninth of the height each, from the middle outwards."""
+    step = height / 9.0
+    faint = (_FAINT,) * 3
+    for number in range(-int(width / 2 / step), int(width / 2 / step) + 1):
+        x = round(width / 2 + number * step)
+        draw.line([(x, 0), (x, height)], faint)
+    for number in range(10):
+        y = min(height - 1, round(number * step))
+        draw.line([(0, y), (width, y)], faint)
+
+
+def _overscan(draw: ImageDraw.ImageDraw, width: int, height: int) -> None:
+    """The outermost pixels in white, what an overscanning display cuts off, and arrows into the corners."""
+    draw.rectangle([0, 0, width - 1, height - 1], outline=(255, 255, 255))
+    for share, level in zip(OVERSCAN, (200, 120), strict=True):
+        x, y = round(share * width), round(share * height)
+        draw.rectangle([x, y, width - 1 - x, height - 1 - y], outline=(level, level, level))
+    arm = round(0.02 * height)
+    for x, y in ((0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)):
+        across, down = (arm if x == 0 else -arm), (arm if y == 0 else -arm)
+        draw.polygon([(x, y), (x + across, y), (x, y + down)], fill=(255, 255, 255))
+
+
+def _circles(draw: ImageDraw.ImageDraw, width: int, height: int, unit: float) -> None:
+    """One in the middle, one in each corner: round where the picture is not stretched."""
+    line = max(1, round(unit / 15))
+    places = [(width / 2, height / 2, 16 * unit)]
+    corner = 3.6 * unit
+    away = 2.2 * unit + corner
+    places += [(x, y, corner) for x in (away, width - away) for y in (away, height - away)]
+    for x, y, radius in places:
+        draw.ellipse([x - radius, y - radius, x + radius, y + radius], outline=(255, 255, 255), width=line)
+
+
+def _bars(draw: ImageDraw.ImageDraw, width: int, height: int, unit: float) -> None:
+    """Colours; grey steps; steps that only just differ from black and from white."""
+    left, right = width / 2 - 13.44 * unit, width / 2 + 13.44 * unit
+
+    def row(above: float, tall: float, colours: Sequence[tuple[int, ...] | str]) -> None:
+        step, top = (right - left) / len(colours), height / 2 + above
+        for number, colour in enumerate(colours):
+            x = left + number * step
+            draw.rectangle([round(x), round(top), round(x + step) - 1, round(top + tall) - 1], fill=colour)
+
+    row(-12.8 * unit, 2.6 * unit, _COLOURS)
+    row(-10.2 * unit, 2.2 * unit, [(round(255 * step / (GREYS - 1)),) * 3 for step in range(GREYS)])
+    row(8.4 * unit, 1.8 * unit, [(level,) * 3 for level in NEAR])
+    row(10.2 * unit, 1.8 * unit, [(255 - level,) * 3 for level in reversed(NEAR)])
+
+
+def _star(draw: ImageDraw.ImageDraw, x: float, y: float, radius: float) -> None:
+    """Spokes that melt in the middle where the lens is not in focus (Siemens)."""
+    for spoke in range(_STAR):
+        start = 360.0 * spoke / _STAR
+        box = [x - radius, y - radius, x + radius, y + radius]
+        draw.pieslice(box, start, start + 180.0 / _STAR, fill=(255, 255, 255))
+
+
+def _focus(draw: ImageDraw.ImageDraw, x: float, y: float, unit: float) -> None:
+    """Upright and level lines of one, two and three pixels."""
+    side = round(2.4 * unit)
+    for number, thick in enumerate(_FOCUS):
+        for row in range(2):
+            left, top = round(x + (number - 1.5) * 1.15 * side), round(y + row * 1.15 * side)
+            for offset in range(0, side, 2 * thick):
+                ends = offset + thick - 1
+                box = (
+                    [left + offset, top, left + ends, top + side]
+                    if row == 0
+                    else [left, top + offset, left + side, top + ends]
+                )
+                draw.rectangle(box, fill=(255, 255, 255))
+
+
+def _words(image: Files.Image, lines: Sequence[str], address: str, unit: float) -> None:
+    """The words, and the address as a QR code beside them."""
+    parts: list[Files.Image] = []
+    if address:
+        code = np.array([list(row) for row in segno.make(address, error="m", micro=False).matrix], bool)
+        white = Files.fromarray(np.where(np.pad(code, 4), 0, 255).astype(np.uint8)).convert("RGB")
+        times = max(1, round(10.0 * unit / white.width))
+        parts.append(white.resize((times * white.width, times * white.height), Files.Resampling.NEAREST))
+    if lines:
+        words = Files.fromarray(lettered("\n".join(lines), max(1, round(1.35 * unit)), (255, 255, 255)))
+        limit = max(1, round(29.4 * unit - sum(part.width for part in parts) - unit))
+        if words.width > limit:
+            words = words.resize((limit, max(1, words.height * limit // words.width)))
+        ground = Files.new("RGB", words.size, (0, 0, 0))
+        ground.paste(words, (0, 0), words)
+        parts.append(ground)
+    gap = round(unit) if len(parts) > 1 else 0
+    left = (image.width - sum(part.width for part in parts) - gap) // 2
+    for part in parts:
+        image.paste(part, (left, (image.height - part.height) // 2))
+        left += part.width + gap

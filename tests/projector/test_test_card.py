@@ -1,0 +1,86 @@
+"""The test card: what a technician looks for is there, and it never covers a panic."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import segno
+
+from appliance.box.orders import Order
+from appliance.projector.alignment import Alignment
+from appliance.projector.controls import Controls
+from appliance.projector.keyboards import Key
+from appliance.projector.keys import press
+from appliance.projector.picture.test_card import GREYS, NEAR, OVERSCAN, Image
+from appliance.projector.picture.test_card import test_card as drawn
+
+SIZES = [(1280, 720), (1920, 1080), (1024, 768), (800, 1280)]
+ADDRESS = "https://192.168.7.12:8443"
+LINES = ("bunraku-box", f"page {ADDRESS}", "pin 482913", "1280x720 kmsdrm")
+
+
+def runs(values: np.ndarray) -> list[int]:
+    """Each value of a row, once for each run of equal ones."""
+    return [int(values[0]), *(int(b) for a, b in pairwise(values) if a != b)]
+
+
+def card(size: tuple[int, int]) -> Image:
+    return drawn(size, LINES, ADDRESS)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_outermost_pixels_and_the_overscan_are_marked(size: tuple[int, int]) -> None:
+    image = card(size).astype(int)
+    assert image.shape == (size[1], size[0], 3)
+    for edge in (image[0], image[-1], image[:, 0], image[:, -1]):
+        assert (edge == 255).all()
+    row = image[round(0.5 * size[1] + 7.5 * min(size[1] / 36, size[0] / 64)), : size[0] // 8, 0]
+    for share in OVERSCAN:
+        assert row[round(share * size[0])] > 100
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_circle_is_as_wide_as_it_is_high(size: tuple[int, int]) -> None:
+    width, height = size
+    image, radius = card(size)[..., 0], 16 * min(height / 36, width / 64)
+    if 2 * radius < width:
+        left = image[height // 2 - 2, : width // 2]
+        found = np.flatnonzero(left == 255)
+        assert np.abs(found - (width / 2 - radius)).min() < 3
+    assert image[round(height / 2 - radius) : round(height / 2 - radius) + 3, width // 2].max() == 255
+
+
+def test_greys_rise_from_black_to_white_in_even_steps() -> None:
+    image = card((1280, 720))
+    row = runs(image[178, 371:909, 0])
+    assert len(row) == GREYS and (row[0], row[-1]) == (0, 255)
+    assert np.ptp(np.diff(row)) <= 1
+    assert runs(image[545, 371:909, 0]) == list(NEAR)
+    assert runs(image[582, 371:909, 0]) == [255 - level for level in reversed(NEAR)]
+
+
+def test_lines_of_one_pixel_tell_the_focus() -> None:
+    image = card((1280, 720))[..., 0]
+    fine = image[420:440, 80:340]
+    assert (np.abs(np.diff(fine.astype(int), axis=1)).max(axis=0) == 255).sum() > 40
+
+
+def test_a_phone_reads_the_address() -> None:
+    """The modules of the code, black and white, are in the picture as large squares."""
+    image = card((1280, 720))[..., 0]
+    modules = np.array([list(row) for row in segno.make(ADDRESS, error="m", micro=False).matrix], bool)
+    times = round(10 * 20 / (len(modules) + 8))
+    wanted = np.kron(np.where(np.pad(modules, 4), 0, 255), np.ones((times, times))).astype(np.uint8)
+    tall, wide = wanted.shape
+    top = (720 - tall) // 2
+    places = [x for x in range(1280 - wide) if np.array_equal(image[top : top + tall, x : x + wide], wanted)]
+    assert len(places) == 1
+    assert not np.array_equal(image, drawn((1280, 720), LINES, "https://192.168.7.13:8443")[..., 0])
+
+
+def test_orders_and_the_key_show_and_hide_it() -> None:
+    controls = Controls(Alignment(), lambda _: None)
+    assert controls.carry_out(Order("test_card", (1,)))[0] and controls.told()["test_card"]
+    assert press(Key("T"), controls, (1280, 720)) and not controls.shows_test_card
