@@ -99,9 +99,7 @@ def files() -> list[str]:
 
 def fill(copy: Path, files: Sequence[str]) -> None:
     """Copy the checkout to `copy`, with this environment as its .venv, and modules as they were compiled."""
-    compiled = [
-        cache_from_source(name) for name in files if name.startswith("appliance/") and name.endswith(".py")
-    ]
+    compiled = [cache_from_source(name) for name in files if name.endswith(".py")]
     for name in (*files, *(name for name in compiled if (ROOT / name).is_file())):
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / name, copy / name)

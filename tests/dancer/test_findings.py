@@ -29,7 +29,7 @@ from tests.dancer.conftest import dance
 DEFAULT_SHOW = Path(appliance.show.__file__).parent / "default_show"
 HELD_OUT = {"salsa_29": 60.0, "indian_13": 120.0}  # takes kept apart from training, with their true rates
 SETTLING = 50  # ticks until every hand has taken its joint
-TICKS = 250
+TICKS = 160
 ANSWER = 4.0  # degrees, at 10/9, with a hand 60 degrees off that stands still; a network that copies: 3
 LARGEST_STEP_DEGREES = 36.0  # of any joint in a tick of the recordings
 

@@ -25,6 +25,7 @@ from appliance.studio.commands import app
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation import answer_picture, own_answer, pictures
 from appliance.studio.experiments import strips
+from appliance.studio.export import release
 from appliance.studio.granular import walk
 from appliance.studio.improviser import own_output
 from appliance.studio.improviser.footing import Progress, plant_feet
@@ -91,6 +92,12 @@ def quickly_written(monkeypatch: pytest.MonkeyPatch) -> None:
     """Generated dances get no picture, and their feet are hardly planted: both take seconds."""
     monkeypatch.setattr(dance_files, "draw_filmstrip", lambda *_, **__: None)
     monkeypatch.setattr(standing_dance, "plant_feet", _planting(2))
+
+
+@pytest.fixture
+def unmeasured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shows are written without the figures of their answer to a hand, which take most of the time."""
+    monkeypatch.setattr(release, "own_answer", lambda *_: {"not_measured": "this test does not ask"})
 
 
 def bunraku(*arguments: object) -> Result:

@@ -132,6 +132,7 @@ def test_evaluate_measures_the_answer_to_a_hand(tiny_show: Path, recordings: Pat
     assert "with the hands of sway_0" in said(result)
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_export_keeps_what_the_artist_wrote(trained: Trained, tmp_path: Path) -> None:
     out = tmp_path / "other"
     out.mkdir()
@@ -147,6 +148,7 @@ def test_export_keeps_what_the_artist_wrote(trained: Trained, tmp_path: Path) ->
     assert verify_bundle(out) == []
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_where_the_gate_refuses_fp32_ships_and_the_report_says_so(
     trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -160,6 +162,7 @@ def test_where_the_gate_refuses_fp32_ships_and_the_report_says_so(
     assert json.loads(figures.stdout)["network"]["precision"] == "fp32"
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_a_stop_in_the_middle_says_how_to_go_on(tmp_path: Path, recordings: Path) -> None:
     out = tmp_path / "show"
     options = ["--width", "32", "--latent", "12", "--threads", "1", "--device", "cpu"]
