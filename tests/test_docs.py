@@ -389,3 +389,8 @@ def test_the_first_thing_to_see_is_six_seconds_of_a_hand_and_its_answer() -> Non
             moved[half] += changed.crop(box).histogram()[255]
     assert seconds == pytest.approx(6.0, abs=0.1)
     assert 0 < moved[0] < moved[1]  # one arm on the left, a whole body on the right
+
+
+def test_every_picture_is_shown() -> None:
+    shown = {Path(target).name for page in PAGES for target in LINK.findall(page.read_text("utf-8"))}
+    assert {path.name for path in (ROOT / "docs" / "pictures").iterdir()} - shown == set()
