@@ -13,13 +13,13 @@ from PIL import Image, ImageDraw, ImageFont
 
 from hw_sim.figures import verdict
 
-NOTES = {  # of each limit, in the order of the verdict: beginning of its words, what it means
+NOTES = {  # for each limit, in the order of the verdict: beginning of its words, what it means
     "transport, median": "A reading comes in: so long until the frame that uses it leaves.",
     "transport, p99": "The same for 99 of 100 readings: no hitch that a dancer would feel.",
     "transport, median, against": "In phase with the sensor: running free takes 4 times as long.",
     "response": "The sensor jumps: so long until the held joint has gone half of the way.",
     "tick, median": "One step of the dance, of the 20 ms that it has.",
-    "tick, p99": "The slow ones. What is left is the reserve for a hotter day.",
+    "tick, p99": "The slow ones. The rest is the reserve for a hotter day.",
     "late ticks": "Frames that left too late, or not: the last pose was sent again.",
     "missing frames": "Frames that nobody received.",
     "memory": "All of the stage, as a small computer must hold it.",
@@ -64,7 +64,7 @@ def draw_certificate(folder: Path, out: Path) -> Path:
 
 
 def note_of(words: str) -> str:
-    """What a limit means; the longest beginning that fits. Raises KeyError for a limit without a note."""
+    """The meaning of a limit, by the longest beginning that fits. Raises KeyError for one without a note."""
     return NOTES[max((begin for begin in NOTES if words.startswith(begin)), key=len, default=words)]
 
 

@@ -121,7 +121,7 @@ def _at(along: Array, table: Array) -> Array:
 
 
 def _back_and_chest(anatomy: Anatomy) -> list[Step]:
-    """Of an upright figure: two columns of muscle along the spine, chest muscles, belly."""
+    """For an upright figure: two columns of muscle along the spine, chest muscles, belly."""
     if not anatomy.is_person:
         return []
     spine, height = _spine(anatomy), anatomy.height

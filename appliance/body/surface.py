@@ -141,7 +141,7 @@ def _crossed(
     field: NDArray[np.float32], cells: NDArray[np.bool_], axis: int, all_cells: bool
 ) -> tuple[Array, NDArray[np.int64]]:
     """Where edges along an axis cross the surface (E, 3), in samples, and the cells around each, (E, 4, 3),
-    counter-clockwise seen from outside. Of edges whose cells are all, or partly, among `cells`."""
+    counter-clockwise seen from outside. Includes edges with only some of their cells in `cells`."""
     inside = field < 0
     low = np.moveaxis(inside, axis, 0)
     edges = np.argwhere(np.moveaxis(low[:-1] != low[1:], 0, axis))

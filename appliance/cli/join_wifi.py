@@ -59,7 +59,7 @@ def join_wifi(places: Places, run: Run, wait: Wait, name_box: NameBox) -> int:
 
 
 def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
-    """What went wrong, for people; nothing where all is well or no Wi-Fi is asked for."""
+    """The fault in words for people; empty if all is well or no Wi-Fi is asked for."""
     arrived = next((path for path in (one / NAME for one in places.arrivals) if _asks(path)), None)
     kept = places.kept / NAME
     path = arrived or kept

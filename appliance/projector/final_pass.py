@@ -21,7 +21,7 @@ from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 _NO_SIZE = (1, 1)  # size of an absent picture
 _MARKER_RADIUS = 28.0  # pixels
 _TEXT_ROWS = 160  # letters are as large as on a display of this many rows of pixels
-_TOE = {"projector": 0.06, "screen": 0.0}  # of white: a projector shows fainter air as a grey rectangle
+_TOE = {"projector": 0.06, "screen": 0.0}  # share of white: a projector shows fainter air as a grey rectangle
 _DITHER_STEP = 0.618034  # pixels: no two neighbouring pictures have the same pattern
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 _CLIP_FROM_DISPLAY = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.0]])  # y down

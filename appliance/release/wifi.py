@@ -14,7 +14,7 @@ from appliance.show.yaml_file import read_yaml
 
 NAME = "bunraku-wifi.yaml"
 PROFILE = "wifi.nmconnection"
-_NAMES = uuid.UUID("2f6c1d4e-0b9a-4c39-8f0e-6a4f4f6f2d11")  # of profiles: the same network has the same one
+_NAMES = uuid.UUID("2f6c1d4e-0b9a-4c39-8f0e-6a4f4f6f2d11")  # namespace: the same network, the same id
 _CHANNELS = (1, 6, 11)
 
 
@@ -72,7 +72,7 @@ class WifiFile(Section):
     )
     hostname: Annotated[str, AfterValidator(_hostname)] = key("The box's own name.", "bunraku")
     access_point: bool = key("The box makes this network itself.", False)
-    channel: int = key("Of an access point: 1, 6 or 11.", 6)
+    channel: int = key("Channel of the access point: 1, 6 or 11.", 6)
 
     @model_validator(mode="after")
     def _channel_is_free_of_its_neighbours(self) -> WifiFile:

@@ -115,7 +115,7 @@ def running_stage(box: BoxConfig) -> RunningStage | None:
 
 
 def output_of(*command: str) -> str:
-    """What a program of this machine prints; "" where it is missing or does not answer."""
+    """The output of a program on this machine; "" if it is missing or does not answer."""
     if shutil.which(command[0]) is None:
         return ""
     try:

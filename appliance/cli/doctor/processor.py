@@ -75,7 +75,7 @@ def wakeup_latency(seen: Sample) -> Iterator[Finding]:
     worst = late[-1]
     of = "with real-time priority" if seen.real_time else "without the real-time priority of the stage"
     words = (
-        f"Of {len(late)} in {SECONDS:g} s, {of}, half came within {late[len(late) // 2]:.2f} ms, 99 % within "
+        f"{len(late)} in {SECONDS:g} s, {of}: half came within {late[len(late) // 2]:.2f} ms, 99 % within "
         f"{late[len(late) * 99 // 100]:.2f} ms, the latest {worst:.1f} ms after its time."
     )
     very_late = sum(one > VERY_LATE_MS for one in late)

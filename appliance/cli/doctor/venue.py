@@ -144,7 +144,7 @@ def _access_point_card(host: HostView) -> str:
 
 
 def access_point(host: HostView) -> Iterator[Finding]:
-    """What the card does that `bunraku-access-point` has set: the kernel is asked, not the settings."""
+    """Whether the card does as `bunraku-access-point` told it: asks the kernel, not the settings."""
     card = _access_point_card(host)
     if not card or not host.is_here or not host.at(f"/sys/class/net/{card}").exists():
         return

@@ -183,7 +183,7 @@ class Easel:
             self.draw_figure(figure, drawing, inputs, *drawn)
 
     def expose(self, picture: Target, moments: Sequence[float], draw: Callable[[float], None]) -> Target:
-        """What `draw` draws into the picture at each moment, averaged; draw: takes `back`."""
+        """The mean of the pictures that `draw` makes at each moment; draw: takes `back`."""
         if len(moments) == 1:
             draw(moments[0])
             return picture

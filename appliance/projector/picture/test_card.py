@@ -15,12 +15,12 @@ from appliance.projector.picture.lettering import lettered
 Image = NDArray[np.uint8]
 
 GREYS = 11  # steps from black to white
-NEAR = (0, 2, 4, 6, 8, 12, 16)  # of 255: steps next to black, and as far from white
+NEAR = (0, 2, 4, 6, 8, 12, 16)  # levels of 255: steps next to black, and as far from white
 OVERSCAN = (0.025, 0.05)  # shares of the picture that a display may cut off at each edge
 _COLOURS = ("#ffffff", "#ffff00", "#00ffff", "#00ff00", "#ff00ff", "#ff0000", "#0000ff")
 _FOCUS = (1, 2, 3)  # pixels: widths of lines
 _STAR = 36  # spokes
-_FAINT = 44  # of 255: the lines of the squares
+_FAINT = 44  # level of the squares' lines, of 255
 
 
 def test_card(size: tuple[int, int], lines: Sequence[str], address: str = "") -> Image:

@@ -14,8 +14,8 @@ from appliance.projector.picture.scene import Easel, Scene, direction
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
-STEPS = 40  # of a string
-STRANDS = 7  # of each limb's string at density 1
+STEPS = 40  # parts of a string
+STRANDS = 7  # in each limb's string at density 1
 WIDTH, THINNEST = 1 / 560, 1.2  # half of a strand's: of the picture's height; pixels
 ABOVE = 1.5  # figure heights: where strings hang from while no hand holds a joint
 BODY = 1.0  # brightness of the glass
