@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator
+from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
 
@@ -18,6 +19,7 @@ from tests.command import Command
 READING = {"metres_per_unit", "up", "facing", "true_fps", "root", "all_frames"}
 
 
+@cache
 def whole() -> Any:
     """The parser of all commands."""
     return parser(None, plug_ins(entry_points(group=PLUG_INS)))
