@@ -66,6 +66,34 @@ def write_improviser_network(path: Path) -> None:
     _write(path, nodes, stored, inputs, outputs, kind="improviser", window=8, mixtures=mixtures)
 
 
+def write_partner_network(path: Path) -> None:
+    """A move scores by how alike its last step and the other's are; an answer goes where the other went."""
+    chance, steps, code, mixtures = np.random.default_rng(3), LATENT + 4, 3, 2
+    stored: dict[str, np.ndarray[Any, Any]] = {
+        "see": 0.3 * chance.standard_normal((steps, mixtures * (2 * code + 1))),
+        "newest": np.array([15]),
+        "end": np.array([10]),
+        "flat": np.array([-1, steps]),
+        "list": np.array([-1]),
+        "turn": np.array([1]),
+    }
+    nodes = [
+        helper.make_node("Gather", ["led", "newest"], ["last_led"], axis=1),
+        helper.make_node("Reshape", ["last_led", "flat"], ["other"]),
+        helper.make_node("Gather", ["moves", "end"], ["last_move"], axis=1),
+        helper.make_node("Reshape", ["last_move", "flat"], ["own"]),
+        helper.make_node("Transpose", ["other"], ["upright"], perm=[1, 0]),
+        helper.make_node("MatMul", ["own", "upright"], ["product"]),
+        helper.make_node("Reshape", ["product", "list"], ["scores"]),
+        helper.make_node("ReduceMean", ["before", "turn"], ["stood"], keepdims=0),
+        helper.make_node("Add", ["other", "stood"], ["seen"]),
+        helper.make_node("MatMul", ["seen", "see"], ["mixture"]),
+    ]
+    inputs: Ports = {"led": ["l", 16, steps], "moves": ["n", 11, steps], "before": ["b", 3, steps]}
+    outputs: Ports = {"scores": ["n"], "mixture": ["b", mixtures * (2 * code + 1)]}
+    _write(path, nodes, stored, inputs, outputs, kind="partner", window=8, mixtures=mixtures)
+
+
 Ports = dict[str, list[Any]]
 Parts = tuple[list[onnx.NodeProto], dict[str, np.ndarray[Any, Any]], Ports, Ports]
 
@@ -127,4 +155,5 @@ def write_show_with_sources(folder: Path, motion: dict[str, Any] | None = None, 
     write_motion_network(folder / "sequence.onnx", SEQUENCE)
     write_motion_network(folder / "pose.onnx", POSE)
     write_improviser_network(folder / "improviser.onnx")
+    write_partner_network(folder / "partner.onnx")
     return write_show(folder, hands=[], motion=SOURCES | (motion or {}), **sections)

@@ -70,6 +70,11 @@ class Live:
         """How much of what the puppet starts from it is, 0..1."""
         return self._share * self._share * (3 - 2 * self._share)
 
+    @property
+    def newest(self) -> FloatArray:
+        """The newest pose (J, 4) of the stream."""
+        return self._newest
+
     def share_of(self, joints: Sequence[int]) -> float:
         """The same of these joints: less where they stay with the phrase."""
         return self.share * (float(self._came[[*joints]].mean()) if joints else 1.0)

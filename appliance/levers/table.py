@@ -234,6 +234,89 @@ SEED = Lever(
     follower="stage",
     said=lambda seed, _: f"The answer goes over to the seed {seed}.",
 )
+_PARTNERED = Need("has_partner", cure="No puppet of this show has a `partner`. Add one under puppets.")
+_GOES_ON = Need("goes_on", cure="No puppet of this show goes on by itself. Add `goes_on: {}` under motion.")
+MOST_DELAY_S = 2.0  # the steps that the stage remembers reach no further back
+FOLLOW = Lever(
+    "follow",
+    kind.number("how closely", 0, 1),
+    1.0,
+    "how closely the partner answers: 1 as a partner would, 0.5 not at all, 0 what a partner would not do",
+    "/partner/follow",
+    AT_ONCE,
+    cue="follow",
+    in_cue="How closely the partner answers: 1 as a partner would, 0.5 not at all, 0 contrast.",
+    follower="stage",
+    needs=_PARTNERED,
+    said=lambda value, _: f"The partner follows by {value:g}.",
+)
+LEAD = Lever(
+    "lead",
+    kind.number("share of the time", 0, 1),
+    0.0,
+    "share of the time in which the partner leads, and is answered; in turns of 8 s",
+    "/partner/lead",
+    AT_ONCE,
+    cue="lead",
+    in_cue="Share of the time in which the partner leads, and is answered.",
+    follower="stage",
+    needs=_PARTNERED,
+    said=lambda value, _: f"The partner leads for {100 * value:.0f} % of the time.",
+)
+DELAY = Lever(
+    "delay",
+    kind.number("seconds", 0, MOST_DELAY_S),
+    0.0,
+    "how much later the partner answers",
+    "/partner/delay",
+    AT_ONCE,
+    cue="delay",
+    in_cue="How much later the partner answers, in seconds.",
+    follower="stage",
+    needs=_PARTNERED,
+    said=lambda value, _: f"The partner answers {value:g} s later.",
+)
+GOAL: Lever[tuple[float, ...]] = Lever(
+    "goal",
+    kind.several((Number("x in metres", -20, 20), Number("z in metres", -20, 20)), optional=2),
+    (),
+    "the puppet goes there, dancing, and dances there: metres on the stage, to the right as the audience "
+    "sees it, and towards the audience. Nothing: back to its phrase, from where it stands",
+    "/goal",
+    AT_ONCE,
+    cue="goal",
+    in_cue="x and z of the place to which the puppet goes, in metres on the stage. []: back to its phrase.",
+    follower="stage",
+    needs=_GOES_ON,
+    said=lambda place, _: (
+        f"The puppet goes to {place[0]:g}, {place[1]:g} m." if place else "The puppet has no goal."
+    ),
+)
+TEMPERATURE = Lever(
+    "temperature",
+    kind.number("temperature", 0, 2),
+    1.0,
+    "how freely a puppet goes on by itself: 1 as it learned, 0 always the likeliest, above 1 wilder",
+    "/goes_on/temperature",
+    AT_ONCE,
+    cue="temperature",
+    in_cue="How freely a puppet goes on by itself: 1 as it learned, 0 always the likeliest.",
+    follower="stage",
+    said=lambda value, _: f"The temperature is {value:g}.",
+)
+TOP_P = Lever(
+    "top_p",
+    kind.number("share", 0.05, 1),
+    0.95,
+    "how much of what it might do next it considers: 1 all of it, 0.5 the likelier half",
+    "/goes_on/top_p",
+    AT_ONCE,
+    cue="top_p",
+    in_cue="How much of what a puppet that goes on by itself might do next it considers, 0.05 to 1.",
+    follower="stage",
+    said=lambda value, _: f"{100 * value:.0f} % of what may come is considered.",
+)
+CONTINUING: tuple[Lever[Any], ...] = (FOLLOW, LEAD, DELAY, GOAL, TEMPERATURE, TOP_P)
 RATE = Lever(
     "rate",
     kind.optional_number("rate", -4, 4),
@@ -294,6 +377,7 @@ AGAIN = Lever(
 LEVERS: tuple[Lever[Any], ...] = (
     *(GOING, CUE, PHRASE, HAND, SPRINGS, STIFFNESS, STORM, FEEDBACK, WIND, GRAVITY),
     *(ITERATIONS, LIVELINESS, SEED, RATE),
+    *CONTINUING,
     *(LOOK, CAMERA, CARD, LIGHTS, STRINGS, MASTER),
     *(lever for source in MADE for lever in MADE_NUMBERS[source].values()),
     *(PATH_POINTS, AGAIN),

@@ -53,6 +53,8 @@ class Facts:
     springs: tuple[str, ...] = ()  # names of their settings, first the one at the start
     springs_feedback: Mapping[str, float] = field(default_factory=dict)  # 0..1, of each setting
     has_strings: bool = False
+    has_partner: bool = False
+    goes_on: bool = False
     rehearsal: bool = False  # its sensors are emulated: nothing is kept
     cards: tuple[str, ...] = ()
     motion: Mapping[str, Any] = field(default_factory=dict)  # sources that are made ahead, as in show.yaml

@@ -19,6 +19,7 @@ from appliance.show.yaml_file import Location, YamlFile
 FADE_S = 2.0
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
+_Metres = Annotated[float, Field(ge=-20, le=20)]
 _Times = Annotated[int, Field(ge=0, le=MOST_ITERATIONS)]
 
 
@@ -41,6 +42,12 @@ class CueConfig(Section):
     iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = _key(levers.ITERATIONS)
     liveliness: float | None = _key(levers.LIVELINESS)
     seed: int | None = _key(levers.SEED)
+    follow: float | None = _key(levers.FOLLOW)
+    lead: float | None = _key(levers.LEAD)
+    delay: float | None = _key(levers.DELAY)
+    goal: list[_Metres] | None = _key(levers.GOAL, length=(0, 2))
+    temperature: float | None = _key(levers.TEMPERATURE)
+    top_p: float | None = _key(levers.TOP_P)
     hands: list[Name] | None = _key(levers.HAND, length=(0, 8))
     springs: Name | None = _key(levers.SPRINGS)
     look: Name | None = _key(levers.LOOK)
@@ -56,6 +63,13 @@ class CueConfig(Section):
         FADE_S,
         within=(0, 60),
     )
+
+    @field_validator("goal")
+    @classmethod
+    def _x_and_z(cls, goal: list[float] | None) -> list[float] | None:
+        if goal is not None and len(goal) == 1:
+            raise refusal("A goal of one number is no place.", "Write x and z, or [] for none.")
+        return goal
 
     @field_validator("iterations")
     @classmethod

@@ -8,7 +8,13 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from appliance.levers.sources import GRANULAR, IMPROVISE, LIVE, MADE, MAIN, PATH, SEEDS, VARY
 from appliance.show.config_error import did_you_mean
-from appliance.show.motion_sources import GranularConfig, ImproviseConfig, PathConfig, VaryConfig
+from appliance.show.motion_sources import (
+    GoesOnConfig,
+    GranularConfig,
+    ImproviseConfig,
+    PathConfig,
+    VaryConfig,
+)
 from appliance.show.section import BundleFile, Section, key, refusal
 
 Blending = Literal["prompt", "hann"]
@@ -97,6 +103,9 @@ class MotionConfig(Section):
     path: PathConfig | None = key("The source `path`: a path through the dancer's poses that wobbles.", None)
     improvise: ImproviseConfig | None = key(
         "The source `improvise`: continues from what was just danced, and never returns.", None
+    )
+    goes_on: GoesOnConfig | None = key(
+        "Lets the puppet go on by itself: after a live dancer who stands still, and to `/goal`.", None
     )
     kept: list[Annotated[str, Field(min_length=1, max_length=64)]] = key(
         "Names of motions saved on the box (`/motion/keep`) that cues of this show call. Until "

@@ -25,6 +25,24 @@ def _network(model: str) -> Any:
     return Field(default=f"{model}.onnx", description=meaning, validate_default=True)
 
 
+class GoesOnConfig(Section):
+    """The puppet that cues lead goes on by itself: after a live dancer who stands still, or to a place."""
+
+    network: BundleFile = _network("improviser")
+    after_s: float = key(
+        "How long a live dancer stands still, or is not heard, before the puppet goes on from what the "
+        "dancer has just done, in seconds.",
+        1.5,
+        within=(0.5, 2.5),
+    )
+    temperature: float = _parameter(IMPROVISE, "temperature")
+    top_p: float = key(
+        "How much of what it might do next it considers: 1 all of it, 0.5 the likelier half.",
+        0.95,
+        within=(0.05, 1),
+    )
+
+
 class VaryConfig(Section):
     """The phrase danced anew at every return, by noise in a network that knows 2.6 s at once."""
 

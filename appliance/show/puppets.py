@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from appliance.levers.table import MOST_ITERATIONS
+from appliance.levers.table import MOST_DELAY_S, MOST_ITERATIONS
 from appliance.show.config_error import Problem, did_you_mean
 from appliance.show.cues import require_coding_then_interaction
 from appliance.show.dance import MotionConfig
@@ -50,6 +50,24 @@ class PuppetConfig(Section):
         0.0,
         within=(0, 86400),
     )
+    partner: str | None = key(
+        "Name of the puppet that this one answers, by a network that has learned from couples "
+        "(docs/partner.md). Its phrase only begins the dance. One puppet of a show may have a partner.",
+        None,
+        length=(1, 32),
+    )
+    follow: float = key(
+        "How closely it answers its partner. 1: as a partner would; 0.5: not at all; 0: it does what a "
+        "partner would not.",
+        1.0,
+        within=(0, 1),
+    )
+    lead: float = key(
+        "Share of the time in which it leads instead, and its partner answers it. A live dancer does not.",
+        0.0,
+        within=(0, 1),
+    )
+    delay: float = key("How much later it answers, in seconds.", 0.0, within=(0, MOST_DELAY_S))
     hands: list[HandConfig] = key(
         "Not for the first puppet: which puppeteer holds which of its joints. A sensor may lead several "
         "puppets.",
@@ -118,6 +136,20 @@ def _light_problems(
                 yield file.problem(at, f"The show has no puppet '{rule.puppet}'.", cure)
 
 
+def _partner_problems(puppets: Sequence[PuppetConfig], file: YamlFile) -> Iterator[Problem]:
+    names = [puppet.name for puppet in puppets]
+    answering = [place for place, puppet in enumerate(puppets) if puppet.partner is not None]
+    for place in answering:
+        at, own = ("puppets", place, "partner"), puppets[place]
+        if place != answering[0]:
+            words = f"'{own.name}' answers '{own.partner}', but '{names[answering[0]]}' is a partner already."
+            yield file.problem(at, words, "Keep one `partner` in the show.")
+        elif own.partner == own.name or own.partner not in names:
+            others = [name for name in names if name != own.name]
+            words = f"'{own.name}' answers '{own.partner}', which is no other puppet."
+            yield file.problem(at, words, did_you_mean(own.partner or "", others))
+
+
 def puppet_problems(
     puppets: Sequence[PuppetConfig], motion: MotionConfig, mappings: Sequence[MappingConfig], file: YamlFile
 ) -> Iterator[Problem]:
@@ -125,6 +157,7 @@ def puppet_problems(
     that it lacks in rules of lights.
     """
     yield from _light_problems(puppets, mappings, file)
+    yield from _partner_problems(puppets, file)
     for place, puppet in enumerate(puppets):
         if place == 0:
             for name in (name for name in LED_BY_THE_SHOW if name in puppet.model_fields_set):

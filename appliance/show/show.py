@@ -167,6 +167,15 @@ class ShowConfig(Section):
         return next(puppet for puppet in self.cast if puppet.is_led)
 
     @property
+    def answerer(self) -> tuple[int, int, PuppetConfig] | None:
+        """The puppet with a partner: its number, its partner's, and its keys."""
+        names = [puppet.name for puppet in self.puppets]
+        for number, puppet in enumerate(self.puppets):
+            if puppet.partner is not None:
+                return number, names.index(puppet.partner), puppet
+        return None
+
+    @property
     def hands_at(self) -> Iterator[tuple[Location, HandConfig]]:
         """All hands of all puppets, and their places in the file."""
         for puppet in self.cast:
@@ -227,6 +236,18 @@ class Show:
         """The networks of the sources that the generator makes, by source."""
         sources = self.config.motion.made_sources
         return {name: self.directory / section.network for name, section in sources.items()}
+
+    @property
+    def improviser(self) -> Path:
+        """The network with which puppets go on by themselves, in the stage."""
+        motion = self.config.motion
+        section = motion.goes_on or motion.improvise
+        return self.directory / (section.network if section else "improviser.onnx")
+
+    @property
+    def partner(self) -> Path:
+        """The network that has learned to answer another dancer."""
+        return self.directory / "partner.onnx"
 
     def require_moving(self, joints: Sequence[str]) -> None:
         """Refuse hands on joints that the network does not move; `joints` are those that it does."""

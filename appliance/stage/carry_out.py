@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from appliance.box.orders import Order
 from appliance.dancer.held_places import RemotePlace
@@ -10,7 +11,9 @@ from appliance.dancer.puppeteers import Remote
 from appliance.dancer.springs import Springs
 from appliance.levers.lever import Lever
 from appliance.levers.table import (
+    CONTINUING,
     CUE,
+    DELAY,
     FEEDBACK,
     GRAVITY,
     HAND,
@@ -183,6 +186,19 @@ def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
     return here
 
 
+def _go_on(lever: Lever[Any]) -> Effect:
+    """A number of what goes on by itself, called as the lever is."""
+    attribute = {DELAY.name: "delay_s"}.get(lever.name, lever.name)
+
+    def go_on(order: Order, parts: StageParts) -> str:
+        if parts.continuing is None:
+            raise ValueError("No puppet of this show goes on by itself, and none has a partner.")
+        setattr(parts.continuing, attribute, lever.given(order.text, order.values)[0])
+        return ""
+
+    return go_on
+
+
 def _gate(order: Order, parts: StageParts) -> str:
     """Whether the strings of all puppets drive their joints."""
     opened, seconds = order.values
@@ -267,6 +283,7 @@ EFFECTS: dict[str, Effect] = {
     SPRINGS.name: _call_springs,
     WIND.name: _blow,
     **{knob.name: _turn(knob) for knob in (STIFFNESS, STORM, FEEDBACK, GRAVITY)},
+    **{one.name: _go_on(one) for one in CONTINUING},
     CUE.name: _note,
     "hold": _lead,
     "place": _lead,

@@ -12,12 +12,13 @@ from appliance.levers.fade import Fade
 from appliance.levers.lever import AT_ONCE, Lever, at_once
 from appliance.levers.show_state import ShowState
 from appliance.levers.sources import LIVE, MAIN
-from appliance.levers.table import PHRASE, RATE, SPRINGS, find_lever
+from appliance.levers.table import CONTINUING, PHRASE, RATE, SPRINGS, find_lever
 from appliance.stage.carry_out import obey
 from appliance.stage.made_motions import MELT_S, MadeMotions
 from appliance.stage.stage_parts import StageParts
 
-_OF_SPRINGS = frozenset((SPRINGS.name, *SPRINGS.ends))
+# what a checkpoint knows nothing of
+_FROM_STATE = frozenset((SPRINGS.name, *SPRINGS.ends, *(one.name for one in CONTINUING)))
 GATE_S = 1.0  # in which strings drive the joints again after panic, blackout and stop
 
 
@@ -45,7 +46,7 @@ class Reconciler:
         self.generation, self.cue, self.words = 0, "", ""
         self.rate = self._usual_rate = parts.led.motion.rate
         self._show, self._reader = show, reader
-        self._is_first = parts.led.springs is not None  # a checkpoint knows nothing of the springs' setting
+        self._is_first = parts.led.springs is not None or parts.continuing is not None
         self._gate = True
         self._made, self.source, self.wanted = made, source, ""
         self.motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
@@ -75,7 +76,7 @@ class Reconciler:
                     continue  # others follow it
                 elif is_news:
                     orders.append(order_of(one, fade))
-                elif self._is_first and name in _OF_SPRINGS:  # it was in force
+                elif self._is_first and name in _FROM_STATE:  # it was in force
                     orders.append(order_of(one, at_once(fade)))
             self._is_first = False
         if self._goes != self._gate:

@@ -50,6 +50,8 @@ def facts_of(
         springs_feedback={name: one.feedback for name, one in springs_by_name(config.springs).items()},
         has_strings=config.strings is not None,
         cards=names["card"],
+        has_partner=config.answerer is not None,
+        goes_on=config.motion.goes_on is not None,
         coding=iterations.coding,
         interaction=iterations.interaction,
         most_iterations=iterations.most,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -17,6 +17,9 @@ from appliance.dancer.grounding import Floor, Grounding, GroundingError
 from appliance.dancer.hands import Hands
 from appliance.dancer.live import Live
 from appliance.dancer.loop import Loop
+from appliance.dancer.material.improviser_network import ImproviserNetwork
+from appliance.dancer.material.motion_network import MotionNetworkError
+from appliance.dancer.material.partner_network import PartnerNetwork
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.phrase_cache import PhraseCache
@@ -37,6 +40,7 @@ from appliance.show.config_error import ConfigError
 from appliance.show.puppets import PuppetStart
 from appliance.show.show import Show
 from appliance.stage.admission import MOST_ITERATIONS, Admission, admit, lowered
+from appliance.stage.continuing import Continuing
 from appliance.stage.iterations import Iterations
 from appliance.stage.liveliness import Liveliness
 from appliance.stage.open_sensors import open_sensors
@@ -54,7 +58,7 @@ class StageParts:
     `complaints`: why sensors are not let in.
     """
 
-    SNAPSHOT = ("puppets", "liveliness", "newest_primary")
+    SNAPSHOT = ("puppets", "liveliness", "newest_primary", "continuing")
 
     skeleton: Skeleton
     network: PuppetNetwork
@@ -71,6 +75,7 @@ class StageParts:
     live_refused: int = 0  # poses of another figure, or none
     complaints: tuple[str, ...] = ()
     newest_primary: SensorReading | None = field(default=None)
+    continuing: Continuing | None = None
 
     @property
     def not_let_in(self) -> list[str]:
@@ -181,6 +186,7 @@ def assemble(
         link=link,
         outputs=_outputs(show, box, box_file),
         complaints=complaints,
+        continuing=_continuing(show, puppets),
     )
 
 
@@ -260,6 +266,27 @@ def _phrase(show: Show, path: Path, preparations: PhraseCache) -> tuple[Recordin
             "Nothing can be danced. Export the show again."
         )
     return found
+
+
+def _continuing(show: Show, puppets: Sequence[StagePuppet]) -> Continuing | None:
+    """The parts that go on by themselves; None for a show without any. Raises StageError."""
+    config, answerer = show.config, show.config.answerer
+    goes_on = config.motion.goes_on
+    if goes_on is None and answerer is None:
+        return None
+    try:
+        network = ImproviserNetwork(show.improviser, show.skeleton.names)
+        partner = None if answerer is None else PartnerNetwork(show.partner, show.skeleton.names)
+        if partner is not None and partner.features != network.features:
+            raise MotionNetworkError("The partner was trained with another improviser.")
+    except (MotionNetworkError, OSError) as error:
+        raise StageError(
+            f"{show.directory}: no puppet can go on by itself: {error} Nothing is danced. Copy the bundle "
+            "again, or remove `goes_on` and `partner` from show.yaml."
+        ) from None
+    after_s = None if goes_on is None else goes_on.after_s
+    chosen = (goes_on.temperature, goes_on.top_p) if goes_on else ()
+    return Continuing(network, partner, puppets, config.led.number, answerer, after_s, *chosen)
 
 
 def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:

@@ -87,6 +87,7 @@ class StagePuppet:
     network_failed: bool = False
     figures_refused: int = 0
     liveliness: float = 1.0
+    continued: float = 0.0
     noise: FloatArray = field(init=False)
     _whole: FloatArray = field(init=False)  # (T, J, 4)
     _roots: FloatArray = field(init=False)  # (T, 3)
@@ -100,9 +101,21 @@ class StagePuppet:
         self.noise = np.zeros(self.puppet.latent, np.float32)
 
     @property
+    def begun_with(self) -> tuple[FloatArray, FloatArray]:
+        """The window (T, J, 4) and the roots (T, 3) that it has started from in this tick."""
+        return self._whole, self._roots
+
+    def begin_with(self, window: FloatArray, roots: FloatArray, continued: float) -> None:
+        """Start from others in this tick; continued: how much of them goes on by itself, 0..1."""
+        if window is not self._whole:
+            self._window = self.puppet.select(window)
+        self._whole, self._roots, self.continued = window, roots, continued
+
+    @property
     def lift(self) -> float:
         """How far the figure is to be above the floor, metres: in a jump of the phrase."""
-        return self.motion.lift * (1.0 - (self.live.share_of(self.feet) if self.live is not None else 0.0))
+        live = self.live.share_of(self.feet) if self.live is not None else 0.0
+        return self.motion.lift * (1.0 - live) * (1.0 - self.continued)
 
     @property
     def source(self) -> str:

@@ -82,6 +82,8 @@ class Tick:
         if not self.late:
             for puppet in parts.puppets:
                 puppet.start(slot.started)
+            if parts.continuing is not None:
+                parts.continuing.lay_over(slot.tick, slot.started, parts.liveliness.seed)
             ends[MOTION] = now()
             parts.liveliness.dance(slot.tick)
             self._look_again(slot)
@@ -101,6 +103,8 @@ class Tick:
             ends[BLEND] = now()
             for puppet in parts.puppets:
                 puppet.stand()
+            if parts.continuing is not None:
+                parts.continuing.watch()
             ends[FIGURE] = now()
 
         parts.outputs.publish_frame(frame)

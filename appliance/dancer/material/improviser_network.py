@@ -10,7 +10,7 @@ from appliance.dancer.material.steps import ROOT, WINDOW
 
 
 class ImproviserNetwork(MotionNetwork):
-    """A Coder of steps and a Choreographer. features: numbers of a step."""
+    """A Coder of steps and a Choreographer. features: numbers of a step; code_size: of a move's code."""
 
     kind = "improviser"
 
@@ -30,5 +30,6 @@ class ImproviserNetwork(MotionNetwork):
     def _take_facts(self, facts: Mapping[str, str]) -> None:
         self.mixtures, self.cells = int(facts["bunraku.mixtures"]), self._idle["cells"].shape[1]
         self.features = self._idle["move_heard"].shape[2]
+        self.code_size = self._idle["next_code"].shape[1]
         if self.window != WINDOW or self.features != self.latent + ROOT:
             raise ValueError("its steps are not those of its windows")

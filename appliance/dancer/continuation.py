@@ -1,0 +1,294 @@
+"""Continuation: a figure goes on from what it has just danced, by choosing among moves of its own.
+
+Every 0.32 s it draws moves from the show's improviser and dances the one that suits best: that answers
+another dancer, leads to a place, or any. So it always dances as its improviser does, and the choice says what
+about. The work of a choice is spread over three ticks.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from appliance.dancer.material.improviser_network import ImproviserNetwork
+from appliance.dancer.material.improvising import BEFORE, MOVE, drawn, parts_of
+from appliance.dancer.material.partner_network import LED_STEPS, SEEN, PartnerNetwork
+from appliance.dancer.material.steps import HOP, MIDDLE, ROOT, WINDOW
+from appliance.dancer.slerp import FloatArray, Slerp
+from appliance.dancer.step_memory import StepMemory
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+
+CANDIDATES = 24
+DANCED = 4  # steps of a move that are danced before the next choice
+FIRST = 6  # of the first one: until it is made some have passed
+ANSWERING = 5.0  # how much an answer counts at most, in deviations among the candidates
+WHERE = 4.0  # how much a metre nearer to the goal counts
+ROAM_M = 1.2  # how far from where it began it goes without a goal
+LED_M_S = 0.3  # how fast the path is led to the goal besides the steps' own way
+TEMPERATURE, TOP_P, FREE = 1.0, 0.95, 0.5
+_ROWS = 40
+_HOME = 0.001  # metres a tick, by which it comes back to the phrase's own path
+_STEP_M = HOP * 0.02 * LED_M_S
+
+
+class Continuation:
+    """Poses and roots of a continued dance, laid over a phrase's window; once a tick.
+
+    temperature, top_p: of the draws. follow: 1 answers, 0.5 does not care, 0 contrasts. goal: x, z in metres
+    on the puppet's own floor; None: it roams about where it began.
+    """
+
+    SNAPSHOT = (
+        *("temperature", "top_p", "follow", "delay_steps", "goal"),
+        *("_chosen", "_leaves", "_left", "_is_going", "_share", "_step", "_signs"),
+        *("_rows", "_roots", "_head", "_end", "_steps", "_cells", "_turn", "_place", "_slope", "_home"),
+        *("_work", "_codes", "_move", "_decoded"),
+    )
+
+    def __init__(
+        self,
+        network: ImproviserNetwork,
+        partner: PartnerNetwork | None,
+        joints: int,
+        window: int = WINDOW,
+        tick_s: float = 0.02,
+    ) -> None:
+        self._network, self._partner, self._tick_s, self._length = network, partner, tick_s, window
+        self.temperature, self.top_p, self.follow, self.delay_steps = TEMPERATURE, TOP_P, FREE, 0
+        self.goal: tuple[float, float] | None = None
+        self._chosen, self._leaves, self._is_going, self._share, self._step = False, False, False, 0.0, 1.0
+        self._left = np.zeros(2)  # how far from the phrase's path the figure was left, x and z
+        features, moving = network.features, len(network.places)
+        self._rows = np.zeros((_ROWS, moving, 4), np.float32)
+        self._roots = np.zeros((_ROWS, 3), np.float32)
+        self._head = self._end = 0
+        self._steps = np.zeros((SEEN, features), np.float32)
+        self._cells = np.zeros((2, 1, network.cells), np.float32)
+        self._turn = 0  # which memory is next: each remembers moves, two of which overlap by half
+        self._place, self._slope, self._home = np.zeros(3), np.zeros(3), np.zeros(2)
+        self._work = 0
+        self._codes = np.zeros((CANDIDATES, network.code_size), np.float32)
+        self._move = np.zeros((MOVE, features), np.float32)
+        self._decoded = np.zeros((WINDOW, moving, 4), np.float32)
+        self._window = np.zeros((window, joints, 4), np.float32)
+        self._path = np.zeros((window, 3), np.float32)
+        # Between two dances that turn more than half a turn apart, the short way would change sides.
+        self._over = Slerp(window * moving, short=False)
+        self._signs = np.ones((moving, 1), np.float32)
+        self._laid = np.zeros((window, moving, 4), np.float32)
+        self._rise = (np.sin(np.pi * (np.arange(HOP) + 0.5) / WINDOW) ** 2)[:, None]
+
+    @property
+    def is_chosen(self) -> bool:
+        """Whether the figure goes on by itself, or is about to."""
+        return self._chosen
+
+    @property
+    def share(self) -> float:
+        """How much of what the puppet starts from it is, 0..1."""
+        return self._share * self._share * (3 - 2 * self._share)
+
+    def choose(self, chosen: bool, fade_s: float) -> None:
+        """Take over from the phrase, or give back to it where the figure stands, over fade_s."""
+        self._leaves = self._chosen and not chosen
+        self._chosen, self._step = chosen, min(1.0, self._tick_s / max(fade_s, self._tick_s))
+
+    def lay_over(
+        self,
+        window: FloatArray,
+        roots: FloatArray,
+        own: StepMemory,
+        led: StepMemory | None,
+        rng: np.random.Generator | None,
+        still_steps: int = 0,
+    ) -> tuple[FloatArray, FloatArray]:
+        """The window (T, J, 4) and the roots (T, 3) that the puppet starts from, of the phrase's own.
+
+        own: what the figure has danced, the last still_steps of it standing still: it goes on from before.
+        led: what the other one has danced, None: nobody. rng: of this tick.
+        """
+        if self._chosen and not self._is_going:
+            self._begin(own, window, still_steps)
+        if self._is_going:
+            self._head += 1
+            if self._work or self._end - self._head < self._length + 3:
+                self._work_on(led, rng)
+        if self._leaves:
+            if self._is_going and self._share:
+                self._left[:] = (self._roots[self._head] - roots[0])[[0, 2]]
+            self._leaves = False
+        is_ready = self._is_going and self._end - self._head >= self._length
+        goes = self._chosen and is_ready
+        if is_ready and self._share in (0.0, 1.0):
+            alike = np.einsum("mk,mk->m", self._rows[self._head], window[0, self._network.places])
+            self._signs[:] = np.copysign(1.0, alike)[:, None]
+        self._share = min(1.0, self._share + self._step) if goes else max(0.0, self._share - self._step)
+        if not self._share or not is_ready:
+            self._is_going = self._is_going and self._chosen
+            self._left *= max(0.0, 1.0 - _HOME / max(math.hypot(*self._left), _HOME))
+            return (window, self._moved(roots)) if self._left.any() else (window, roots)
+        rows = slice(self._head, self._head + self._length)
+        flat, places = self._laid.reshape(-1, 4), self._network.places
+        np.multiply(self._rows[rows], self._signs, out=self._laid)
+        self._over(flat, window[:, places].reshape(-1, 4), 1.0 - self.share, out=flat)
+        self._window[:] = window
+        self._window[:, places] = self._laid
+        path = self._moved(roots)
+        path += np.float32(self.share) * (self._roots[rows] - path)
+        return self._window, path
+
+    def _moved(self, roots: FloatArray) -> FloatArray:
+        """The phrase's roots from where the figure was left."""
+        np.copyto(self._path, roots)
+        self._path[:, [0, 2]] += self._left.astype(np.float32)
+        return self._path
+
+    def _begin(self, own: StepMemory, window: FloatArray, still_steps: int) -> None:
+        heard = own.recent(SEEN, still_steps)
+        if heard is None:
+            heard = own.recent(SEEN)
+        if heard is None:
+            return
+        self._steps[:] = heard
+        self._place[:], self._slope[:] = own.place, 0.0
+        if not still_steps:
+            self._slope[:] = _way(heard[-1], own.place[2] - heard[-1, -ROOT + 2])
+            self._slope[1] = heard[-1, -1] - heard[-2, -1]
+        self._home[:] = own.place[:2]
+        self._cells[:], self._turn, self._work = 0.0, 0, 0
+        self._rows[:] = window[0, self._network.places]
+        self._head, self._end = own.age, 0
+        self._is_going = True
+        self._decoded[:] = self._facing(self._network.decode(heard[-1:, :-ROOT]), [own.place[2]])[0]
+
+    def _work_on(self, led: StepMemory | None, rng: np.random.Generator | None) -> None:
+        """A third of a choice."""
+        network, before = self._network, self._steps[-BEFORE:]
+        if self._work == 0:
+            code = network.code_of(self._steps[None, :BEFORE], self._steps[None, BEFORE:])
+            mixture, self._cells[self._turn] = network.forecast(before[None], code, self._cells[self._turn])
+            self._turn = 1 - self._turn
+            rng = rng or np.random.default_rng(0)
+            self._codes[:] = self._drawn(mixture, network.mixtures, CANDIDATES, rng)
+            seen = self._seen(led)
+            answers = round(CANDIDATES * max(0.0, 2 * (self.follow - FREE)))
+            if seen is not None and answers and self._partner is not None:
+                mixture = self._partner.answers(before, seen)
+                self._codes[-answers:] = self._drawn(mixture, self._partner.mixtures, answers, rng)
+        elif self._work == 1:
+            moves = network.move_of(np.repeat(before[None], CANDIDATES, 0), self._codes)
+            self._move[:] = moves[self._suits(before, moves, led).argmax()]
+        else:
+            self._dance(self._move)
+        self._work = (self._work + 1) % 3
+
+    def _drawn(self, mixture: FloatArray, mixtures: int, count: int, rng: np.random.Generator) -> FloatArray:
+        logits, means, log_scales = parts_of(mixture, mixtures)
+        logits = nucleus(logits, self.top_p)
+        logits, means, log_scales = (np.repeat(part, count, 0) for part in (logits, means, log_scales))
+        return drawn(logits, means, log_scales, self.temperature, rng)
+
+    def _seen(self, led: StepMemory | None) -> FloatArray | None:
+        return None if led is None else led.recent(LED_STEPS, self.delay_steps)
+
+    def _suits(self, before: FloatArray, moves: FloatArray, led: StepMemory | None) -> FloatArray:
+        """(N,): how well each of the moves (N, 8, F) suits."""
+        suits = np.zeros(CANDIDATES, np.float32)
+        suits[0] = 1e-6  # the first one where nothing matters
+        seen = self._seen(led)
+        if self._partner is not None and seen is not None and self.follow != FREE:
+            score = self._partner.scores(
+                seen, np.concatenate([np.repeat(before[None], CANDIDATES, 0), moves], axis=1)
+            )
+            suits += 2 * (self.follow - FREE) * ANSWERING * (score - score.mean()) / (score.std() + 1e-6)
+        ends = np.array([_ends(self._place, move)[-1] for move in moves[:, :, -ROOT:]])
+        away = np.hypot(*(ends - (self._home if self.goal is None else self.goal)).T)
+        near = ROAM_M if self.goal is None else 0.0
+        suits -= (WHERE * np.maximum(away - near, 0.0)).astype(np.float32)
+        return suits
+
+    def _dance(self, move: FloatArray) -> None:
+        """Rows for the next steps of a move; as many as are danced before the next choice."""
+        count = FIRST if not self._end else DANCED
+        headings = self._place[2] + np.cumsum(move[: count + 1, -ROOT + 2].astype(float))
+        knots = np.empty((count + 2, 3))
+        x, z, _ = self._place
+        knots[0] = x, self._steps[-1, -1], z
+        knots[1:, [0, 2]] = _ends(self._place, move[: count + 1, -ROOT:])
+        knots[1:, 1] = move[: count + 1, -1]
+        if self.goal is not None:
+            off = np.array(self.goal) - knots[count, [0, 2]]
+            far = math.hypot(*off)
+            led = off / max(far, 1e-6) * min(far / count, _STEP_M)
+            knots[:, [0, 2]] += np.minimum(np.arange(count + 2), count)[:, None] * led
+        made = self._facing(self._network.decode(move[:count, :-ROOT]), headings[:count])
+        windows = np.concatenate([self._decoded[None], made])
+        earlier, later = windows[:-1, MIDDLE:], windows[1:, :MIDDLE]
+        poses = quaternion.slerp(earlier.astype(float), later.astype(float), self._rise[None])
+        kept = self._end - self._head if self._end else 0
+        if kept:
+            self._rows[:kept], self._roots[:kept] = (
+                self._rows[self._head : self._end].copy(),
+                self._roots[self._head : self._end].copy(),
+            )
+            self._head = 0
+        new = slice(kept, kept + HOP * count)
+        last = self._rows[max(kept - 1, 0)]
+        together = np.concatenate([last[None], poses.reshape(-1, *last.shape)])
+        self._rows[new] = quaternion.continuous(together)[1:]
+        self._roots[new], self._slope[:] = _curve(knots, self._slope)
+        self._end = kept + HOP * count
+        self._decoded[:] = made[-1]
+        self._place[:] = *knots[count, [0, 2]], headings[count - 1]
+        self._steps[:-count] = self._steps[count:].copy()
+        self._steps[-count:] = move[:count]
+
+    def _facing(self, windows: FloatArray, headings: FloatArray | list[float]) -> FloatArray:
+        """Windows (W, 8, M, 4) of unit length, turned to their headings (W,)."""
+        windows = quaternion.normalize(windows)
+        half = np.asarray(headings, np.float32)[:, None] / 2
+        turns = np.zeros((len(windows), 1, 4), np.float32)
+        turns[..., 0], turns[..., 2] = np.cos(half), np.sin(half)
+        windows[:, :, 0] = quaternion.multiply(turns, windows[:, :, 0])
+        return windows
+
+
+def nucleus(logits: FloatArray, top_p: float) -> FloatArray:
+    """Logits (B, K) of the likeliest Gaussians that have top_p of the probability together; others: -1e9."""
+    shares = np.exp(logits - logits.max(axis=1, keepdims=True))
+    shares /= shares.sum(axis=1, keepdims=True)
+    order = np.argsort(-shares, axis=1)
+    before = np.cumsum(np.take_along_axis(shares, order, 1), axis=1) - np.take_along_axis(shares, order, 1)
+    left = np.zeros_like(shares, dtype=bool)
+    np.put_along_axis(left, order, before >= top_p, 1)
+    return np.where(left, np.float32(-1e9), logits)
+
+
+def _way(step: FloatArray, heading: float) -> Array:
+    """A step's displacement (3,) on the floor, from its own heading before."""
+    left, ahead = float(step[-ROOT]), float(step[-ROOT + 1])
+    cosine, sine = math.cos(heading), math.sin(heading)
+    return np.array([cosine * left + sine * ahead, 0.0, cosine * ahead - sine * left])
+
+
+def _ends(place: Array, ways: FloatArray) -> Array:
+    """Where each of the steps (T, 4) ends: x, z (T, 2) metres; place: x, z, heading before them."""
+    heading = place[2] + np.cumsum(ways[:, 2].astype(float)) - ways[:, 2]
+    cosine, sine = np.cos(heading), np.sin(heading)
+    moved = np.stack([cosine * ways[:, 0] + sine * ways[:, 1], cosine * ways[:, 1] - sine * ways[:, 0]], 1)
+    ends: Array = place[:2] + np.cumsum(moved, axis=0)
+    return ends
+
+
+def _curve(knots: Array, slope: Array) -> tuple[Array, Array]:
+    """A cubic curve (4 * (T - 2), 3) through all knots (T, 3) but the last, which only gives the slope (3,)
+    at the end.
+    """
+    slopes = np.concatenate([slope[None], (knots[2:] - knots[:-2]) / 2])
+    t = (np.arange(HOP) / HOP)[None, :, None]
+    a, b, da, db = knots[:-2, None], knots[1:-1, None], slopes[:-1, None], slopes[1:, None]
+    t2, t3 = t * t, t * t * t
+    curve = (2 * t3 - 3 * t2 + 1) * a + (t3 - 2 * t2 + t) * da + (3 * t2 - 2 * t3) * b + (t3 - t2) * db
+    return curve.reshape(-1, 3), slopes[-1]
