@@ -29,7 +29,7 @@ DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump 
     libclang-rt-$(CLANG)-dev:/usr/lib/llvm-$(CLANG)/lib/clang/*/lib/linux/libclang_rt.fuzzer-* \
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \
     qemu-system-arm:qemu-system-arm systemd:systemd-analyze shellcheck:shellcheck openssh-client:ssh-keygen \
-    openssl:openssl
+    openssl:openssl mtools:mcopy dosfstools:mkfs.vfat fdisk:sfdisk kmod:depmod cpio:cpio zstd:zstd
 
 # A box that boots in a container.
 DEBIAN_FOR_BOOT := mmdebstrap:mmdebstrap systemd-container:systemd-nspawn squashfs-tools:mksquashfs \

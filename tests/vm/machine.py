@@ -61,12 +61,13 @@ class Machine:
     def _command(self) -> list[str]:
         # -icount: the machine's own clock counts its instructions, 2 ns each: it is a slow but steady machine
         # however busy this one is; all times inside are its own, the clock of the day too.
-        command = "-accel tcg -icount shift=1 -smp 2 -m 2048 -nodefaults -no-user-config -rtc clock=vm"
+        command = "-accel tcg -icount shift=1 -smp 2 -nodefaults -no-user-config -rtc clock=vm"
         command += " -display none -device i6300esb -action watchdog=reset -device qemu-xhci,id=usb"
         command += " -netdev user,id=net -device virtio-net-pci,netdev=net,romfile= -device virtio-rng-pci"
         command += " -uuid 6c1f3c8e-6a55-4a0e-9a63-0b5a6c0b8d11 -chardev null,id=adapter"
         words = ["qemu-system-aarch64" if self.is_pi else "qemu-system-x86_64", *command.split()]
-        words += self._loader() if self.is_pi else ["-machine", "q35", "-cpu", "max", *_uefi()]
+        pc = ["-machine", "q35", "-cpu", "max", "-m", "2048", *_uefi()]
+        words += self._loader() if self.is_pi else pc
         words += ["-drive", f"file={self.disk},format=raw,if=none,id=disk,discard=unmap"]
         words += ["-device", "virtio-blk-pci,drive=disk"]
         console = f"socket,id=tty,path={self.console.path},server=on,wait=off"
@@ -85,7 +86,8 @@ class Machine:
             )
         # Linux takes one number of a kind of serial port; a Pi 5's is 10.
         options = (self.folder / "cmdline.txt").read_text().strip().replace("ttyAMA10,115200", "ttyAMA0")
-        words = ["-machine", "virt,gic-version=2", "-cpu", "cortex-a72", "-append", options]
+        # The memory that docs/hardware.md names: the check of a show may take a fifth of it.
+        words = ["-machine", "virt,gic-version=2", "-cpu", "cortex-a72", "-m", "4096", "-append", options]
         return [*words, "-kernel", str(self.folder / "linux"), "-initrd", str(self.folder / "initrd")]
 
 
