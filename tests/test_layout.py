@@ -103,13 +103,18 @@ def test_top_level_names_are_as_agreed() -> None:
     assert {name.partition("/")[0] for name in tracked_files()} <= TOP_LEVEL
 
 
-@pytest.mark.parametrize("name", [name for package in PACKAGES for name in modules_of(package)])
-def test_every_module_has_a_one_line_summary(name: str) -> None:
-    path = ROOT / Path(*name.split("."))
+def test_every_module_has_a_one_line_summary() -> None:
+    names = [name for package in PACKAGES for name in modules_of(package)]
+    assert len(names) > 100
+    without = [name for name in names if not summary_of(name).endswith((".", ":", "?"))]
+    assert not without
+
+
+def summary_of(module: str) -> str:
+    """The first line of its docstring; empty without one."""
+    path = ROOT / Path(*module.split("."))
     source = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
-    docstring = ast.get_docstring(ast.parse(source))
-    assert docstring
-    assert docstring.splitlines()[0].endswith((".", ":", "?"))
+    return (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0]
 
 
 def pins(lock: str) -> dict[str, str]:
