@@ -21,7 +21,7 @@ def built(tmp_path: Path) -> Path:
         out / "bunraku_0.2.0_amd64.deb",
         out / "bunraku_0.2.0_amd64.deb.sig",
         out / "bunraku-amd64.img",
-        out / "bunraku-0.2.0-amd64.cdx.json",
+        out / "bunraku-amd64.img.spdx.json",
         out / "dist" / "bunraku-0.2.0.tar.gz",
         out / "firmware" / "wearable.ino.bin",
         out / "firmware" / "wearable.ino.elf",
@@ -47,7 +47,7 @@ def test_all_downloads_are_in_the_signed_sums(built: Path, tmp_path: Path) -> No
     named = {line.split()[1] for line in (folder / "SHA256SUMS").read_text().splitlines()}
     assert named == {
         *("bunraku_0.2.0_amd64.deb", "bunraku_0.2.0_amd64.deb.sig", "bunraku-amd64.img.xz"),
-        *("bunraku-0.2.0-amd64.cdx.json", "bunraku-0.2.0.tar.gz"),
+        *("bunraku-amd64.img.spdx.json", "bunraku-0.2.0.tar.gz"),
         *("wearable.ino.bin", "brought.whl", "release-key"),
     }
     assert {path.name for path in folder.iterdir()} == named | {"SHA256SUMS", "SHA256SUMS.sig"}
