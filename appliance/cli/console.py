@@ -6,6 +6,7 @@ import contextlib
 import os
 import socket
 import sys
+import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
 _KEPT = "console.json"
 _PATIENCE_S = 2.0
+_CARD_LETTERS, _CARD_LINES = 40, 5  # of the test card, for one fault
 
 console = command_group(
     "Serve the page: a browser at the venue shows the box and, with the PIN, commands it. `bunraku play` "
@@ -155,14 +157,27 @@ def phone(
 
 
 def card_lines(box: BoxConfig) -> tuple[str, ...]:
-    """For the projector's test card: address and PIN of the page that runs here; nothing without one."""
+    """For the projector's test card: address and PIN of the page that runs here, and a fault of the Wi-Fi."""
+    wifi = wifi_lines(box)
     try:
         kept, host, port, https = (runtime_of(box) / WHERE).read_text().splitlines()
         code = pending_code(runtime_of(box))
         update = (f"update code {code}",) if code else ()
-        return f"page {address(host, int(port), bool(https))}", f"pin {Devices(Path(kept)).pin}", *update
+        where = f"page {address(host, int(port), bool(https))}", f"pin {Devices(Path(kept)).pin}"
+        return *where, *update, *wifi
     except (OSError, ValueError, StageError):
+        return wifi
+
+
+def wifi_lines(box: BoxConfig) -> tuple[str, ...]:
+    """Short lines about the Wi-Fi that bunraku-wifi.yaml names; nothing where all is well."""
+    from appliance.cli.join_wifi import WORDS
+
+    try:
+        words = (runtime_of(box) / WORDS).read_text("utf-8", "replace")
+    except (OSError, StageError):
         return ()
+    return tuple(textwrap.wrap(words, _CARD_LETTERS, max_lines=_CARD_LINES, placeholder=" ..."))
 
 
 def console_command(

@@ -68,7 +68,8 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
     try:
         wifi = read_wifi(path)
     except ConfigError as error:
-        return f"{error}\nThe box keeps the network from before."
+        words = str(error).replace(f"{path.parent}/", "")  # the wall has room for little
+        return f"{words}\nThe box keeps the network from before."
     name_box(wifi.hostname)
     is_new = not kept.is_file() or kept.read_bytes() != path.read_bytes()
     try:

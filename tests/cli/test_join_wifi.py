@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from appliance.cli.console import card_lines
 from appliance.cli.join_wifi import WORDS, Places, join_wifi
 from appliance.release.wifi import NAME, PROFILE
+from appliance.show.box import BoxConfig
 
 GOOD = "country: DE\nname: hall\npassword: correct horse\nhostname: puppet\n"
 AP = GOOD + "access_point: yes\nchannel: 11\n"
@@ -105,6 +107,18 @@ def test_a_fault_is_said_with_its_line_and_the_network_before_stays(box: Box) ->
     assert "keeps the network from before" in box.words
     assert not box.ran
     assert (box.folder / "kept" / PROFILE).read_bytes() == before
+
+
+def test_a_fault_is_on_the_test_card(box: Box) -> None:
+    (box.folder / "run").chmod(0o700)
+    config = BoxConfig(runtime=box.folder / "run")
+    assert card_lines(config) == ()
+    (box.folder / "boot" / NAME).write_text(GOOD.replace("password", "pasword"))
+    box.power_on()
+    lines = card_lines(config)
+    assert "Unknown key 'pasword'." in " ".join(lines)
+    assert 1 < len(lines) <= 5
+    assert max(map(len, lines)) <= 40
 
 
 def test_a_network_that_is_not_joined_is_said_and_tried_again(box: Box) -> None:
