@@ -92,7 +92,7 @@ def long_run(pytestconfig: pytest.Config) -> bool:
 
 
 @pytest.fixture
-def chance(request: pytest.FixtureRequest) -> random.Random:
+def rng(request: pytest.FixtureRequest) -> random.Random:
     """Differs in each run; a test that fails prints its seed."""
     seed = request.config.getoption("--seed")
     if seed is None:

@@ -79,16 +79,14 @@ def test_the_surface_of_another_skeleton_or_of_another_model_is_made_again(
     assert write_mesh(tmp_path, toy) and read_mesh(tmp_path, toy) is not None
 
 
-def test_a_damaged_file_never_stops_the_projector(
-    toy: Skeleton, tmp_path: Path, chance: random.Random
-) -> None:
+def test_a_damaged_file_never_stops_the_projector(toy: Skeleton, tmp_path: Path, rng: random.Random) -> None:
     file = tmp_path / MESH_FILE
     whole = file.read_bytes()
     for _ in range(200):
-        spoilt = bytearray(whole[: chance.randrange(len(whole))] if chance.random() < 0.3 else whole)
-        for _ in range(chance.randrange(1, 9)):
+        spoilt = bytearray(whole[: rng.randrange(len(whole))] if rng.random() < 0.3 else whole)
+        for _ in range(rng.randrange(1, 9)):
             if spoilt:
-                spoilt[chance.randrange(len(spoilt))] = chance.randrange(256)
+                spoilt[rng.randrange(len(spoilt))] = rng.randrange(256)
         file.write_bytes(spoilt)
         found = read_mesh(tmp_path, toy)
         assert found is None or (found.faces.max() < len(found.vertices) and found.joints.max() < len(toy))

@@ -20,13 +20,13 @@ pytestmark = pytest.mark.boot
 
 
 def test_it_dances_again_after_power_cuts(
-    box: Box, figures: Figures, chance: random.Random, long_run: bool
+    box: Box, figures: Figures, rng: random.Random, long_run: bool
 ) -> None:
     cuts = MOST_CUTS if long_run else CUTS
     box.power_on()
     box.await_frames()
     for cut in range(cuts):
-        left = _cut_somewhere(box, chance, in_the_start=cut % 5 == 4)
+        left = _cut_somewhere(box, rng, in_the_start=cut % 5 == 4)
         box.power_on()
         first = box.await_frames()[0]
         figures.note("power-on after a power cut to first frame", first.at - box.machine.powered_at)
@@ -41,7 +41,7 @@ def test_it_dances_again_after_power_cuts(
     assert box.disk.sound()
 
 
-def _cut_somewhere(box: Box, chance: random.Random, in_the_start: bool) -> Checkpoint | None:
+def _cut_somewhere(box: Box, rng: random.Random, in_the_start: bool) -> Checkpoint | None:
     """Cut while it dances, with writes on the way; or while it starts, before or after its first frame.
 
     Where the dance was; None in a start.
@@ -49,10 +49,10 @@ def _cut_somewhere(box: Box, chance: random.Random, in_the_start: bool) -> Check
     if in_the_start:
         box.machine.cut_power()
         box.power_on()
-        time.sleep(chance.uniform(0.0, 3.0))
+        time.sleep(rng.uniform(0.0, 3.0))
         box.machine.cut_power()
         return None
-    box.hall.audience.watch(chance.uniform(0.1, 2.5))
+    box.hall.audience.watch(rng.uniform(0.1, 2.5))
     (box.machine.path("/data/bunraku") / "unsynced").write_bytes(bytes(4096))
     left = box.place()
     box.machine.cut_power()

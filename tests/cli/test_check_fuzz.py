@@ -42,58 +42,56 @@ ODD = (
 PLAIN = (None, True, -1, 0, 1, 3, 0.5, 1e300, 10**30, "", "x", "lShldr", "phrase.bvh", "\xe4\0")
 
 
-def random_tree(chance: random.Random, depth: int = 0) -> Any:
-    kind = chance.randrange(3 if depth < 4 else 1)
+def random_tree(rng: random.Random, depth: int = 0) -> Any:
+    kind = rng.randrange(3 if depth < 4 else 1)
     if kind == 1:
-        return [random_tree(chance, depth + 1) for _ in range(chance.randrange(4))]
+        return [random_tree(rng, depth + 1) for _ in range(rng.randrange(4))]
     if kind == 2:
         keys = (*yaml.safe_load(SHOW), "name", "joint", "sensor", "x", "")
-        return {chance.choice(keys): random_tree(chance, depth + 1) for _ in range(chance.randrange(4))}
-    return chance.choice(
-        (None, True, -1, 0, 1, 3, 0.5, 1e300, 10**30, "", "x", "lShldr", "phrase.bvh", "ä\0")
-    )
+        return {rng.choice(keys): random_tree(rng, depth + 1) for _ in range(rng.randrange(4))}
+    return rng.choice((None, True, -1, 0, 1, 3, 0.5, 1e300, 10**30, "", "x", "lShldr", "phrase.bvh", "ä\0"))
 
 
-def changed_tree(value: Any, chance: random.Random) -> Any:
+def changed_tree(value: Any, rng: random.Random) -> Any:
     """The same tree, somewhere with another value."""
-    if isinstance(value, dict) and value and chance.random() < 0.9:
-        key = chance.choice(list(value))
-        return value | {key: changed_tree(value[key], chance)}
-    if isinstance(value, list) and value and chance.random() < 0.9:
-        place = chance.randrange(len(value))
-        return [*value[:place], changed_tree(value[place], chance), *value[place + 1 :]]
-    return random_tree(chance)
+    if isinstance(value, dict) and value and rng.random() < 0.9:
+        key = rng.choice(list(value))
+        return value | {key: changed_tree(value[key], rng)}
+    if isinstance(value, list) and value and rng.random() < 0.9:
+        place = rng.randrange(len(value))
+        return [*value[:place], changed_tree(value[place], rng), *value[place + 1 :]]
+    return random_tree(rng)
 
 
-def random_show(chance: random.Random) -> bytes:
-    if chance.random() < 0.2:
-        return yaml.safe_dump(random_tree(chance)).encode()
-    return yaml.safe_dump(changed_tree(yaml.safe_load(SHOW), chance), sort_keys=False).encode()
+def random_show(rng: random.Random) -> bytes:
+    if rng.random() < 0.2:
+        return yaml.safe_dump(random_tree(rng)).encode()
+    return yaml.safe_dump(changed_tree(yaml.safe_load(SHOW), rng), sort_keys=False).encode()
 
 
-def odd_show(chance: random.Random) -> bytes:
+def odd_show(rng: random.Random) -> bytes:
     """Something that YAML knows and a show does not, in the place of a word."""
     words = SHOW.split(" ")
-    words[chance.randrange(1, len(words))] = chance.choice(ODD)
+    words[rng.randrange(1, len(words))] = rng.choice(ODD)
     return " ".join(words).encode(errors="surrogatepass")
 
 
-def random_bytes(chance: random.Random) -> bytes:
-    return chance.randbytes(chance.choice((0, 1, 100, 100_000)))
+def random_bytes(rng: random.Random) -> bytes:
+    return rng.randbytes(rng.choice((0, 1, 100, 100_000)))
 
 
-def damaged(whole: bytes, chance: random.Random) -> bytes:
+def damaged(whole: bytes, rng: random.Random) -> bytes:
     """Some bytes are others, a part is missing or stands there twice."""
     data = bytearray(whole)
-    for _ in range(chance.randrange(1, 9)):
-        data[chance.randrange(len(data))] = chance.randrange(256)
-    begin, end = sorted(chance.randrange(len(data)) for _ in range(2))
-    return bytes(chance.choice((data, data[:begin], data[:begin] + data[end:], data[:end] + data[begin:])))
+    for _ in range(rng.randrange(1, 9)):
+        data[rng.randrange(len(data))] = rng.randrange(256)
+    begin, end = sorted(rng.randrange(len(data)) for _ in range(2))
+    return bytes(rng.choice((data, data[:begin], data[:begin] + data[end:], data[:end] + data[begin:])))
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_check_ends_with_words_whatever_a_file_holds(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, chance: random.Random, long_run: bool
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, rng: random.Random, long_run: bool
 ) -> None:
     show, box = write_show(tmp_path / "show"), tmp_path / "box.yaml"
     box.write_text("control: null\nsensors: {udp: null}\noutputs: {osc: []}\n")
@@ -102,9 +100,9 @@ def test_check_ends_with_words_whatever_a_file_holds(
     write_checksums(show)
     assert said(show, box) == SOUND
     whole = (show / name).read_bytes()
-    made: list[Callable[[], bytes]] = [lambda: random_bytes(chance), lambda: damaged(whole, chance)]
+    made: list[Callable[[], bytes]] = [lambda: random_bytes(rng), lambda: damaged(whole, rng)]
     if name == "show.yaml":
-        made += [lambda: random_show(chance), lambda: odd_show(chance)] * 3
+        made += [lambda: random_show(rng), lambda: odd_show(rng)] * 3
     for make in made * (MOST_ROUNDS if long_run else ROUNDS):
         content = make()
         (show / name).write_bytes(content)

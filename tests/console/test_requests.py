@@ -153,10 +153,10 @@ def test_no_command_that_the_page_does_not_have(page: Page) -> None:
         assert answer.status == 200 and answer.value["done"] is False and answer.value["words"]
 
 
-def test_whatever_comes_as_a_body_is_refused(page: Page, chance: random.Random, long_run: bool) -> None:
+def test_whatever_comes_as_a_body_is_refused(page: Page, rng: random.Random, long_run: bool) -> None:
     page.unlock()
     bodies = [b"", b"[]", b"5", b"null", b"{", b"[" * 3000, b'{"pin": 5}', b"\xff\xfe", b'{"pin": NaN}']
-    bodies += [chance.randbytes(chance.randrange(200)) for _ in range(1000 if long_run else 100)]
+    bodies += [rng.randbytes(rng.randrange(200)) for _ in range(1000 if long_run else 100)]
     for body in bodies:
         for path in ("/api/pin", "/api/command", "/api/revoke"):
             answer = page.post(path, body)
@@ -227,7 +227,7 @@ def test_no_path_leads_out_of_the_page(page: Page) -> None:
         assert page.request(method, "/status", b"", {"Origin": page.origin}).status in (404, 405)
 
 
-def test_the_raw_port_survives_what_is_no_http(page: Page, chance: random.Random, long_run: bool) -> None:
+def test_the_raw_port_survives_what_is_no_http(page: Page, rng: random.Random, long_run: bool) -> None:
     starts = [
         b"GET / HTTP/1.1\r\nHost: a\r\n",
         b"GET /watch HTTP/1.1\r\n",
@@ -236,7 +236,7 @@ def test_the_raw_port_survives_what_is_no_http(page: Page, chance: random.Random
     ]
     for _ in range(1000 if long_run else 100):
         with socket.create_connection((HOST, page.port), 60) as one:
-            one.sendall(chance.choice(starts) + chance.randbytes(chance.randrange(400)))
+            one.sendall(rng.choice(starts) + rng.randbytes(rng.randrange(400)))
     assert page.get("/status").status == 200
 
 

@@ -125,13 +125,11 @@ def test_garbage_closes_its_own_connection_alone(venue: tuple[Box, Page], said: 
     asyncio.run(send())
 
 
-def test_raw_garbage_after_the_handshake(
-    venue: tuple[Box, Page], chance: random.Random, long_run: bool
-) -> None:
+def test_raw_garbage_after_the_handshake(venue: tuple[Box, Page], rng: random.Random, long_run: bool) -> None:
     _, page = venue
     for _ in range(300 if long_run else 30):
         with raw_watcher(page) as one, contextlib.suppress(OSError):
-            one.sendall(chance.randbytes(chance.randrange(1, 400)))
+            one.sendall(rng.randbytes(rng.randrange(1, 400)))
     assert page.get("/status").value["frames"] == "fresh"
 
 

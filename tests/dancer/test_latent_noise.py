@@ -73,8 +73,8 @@ def test_a_stage_that_begins_later_goes_on() -> None:
 
 
 def test_a_new_seed_crosses_over_without_a_jump_and_with_the_same_variance() -> None:
-    chance, within, fastest = np.random.default_rng(0), list[np.ndarray](), 0.0
-    for seed in chance.integers(0, 2**31, 60).tolist():
+    rng, within, fastest = np.random.default_rng(0), list[np.ndarray](), 0.0
+    for seed in rng.integers(0, 2**31, 60).tolist():
         noise = LatentNoise(seed, 1, LATENTS)
         begin = course(noise, 0, 200)
         noise.change(seed + 1)

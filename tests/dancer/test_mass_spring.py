@@ -103,9 +103,9 @@ def test_a_flow_carries_masses_along() -> None:
 
 
 @pytest.mark.parametrize("anchored", [True, False])
-def test_nothing_bursts_at_the_bounds_of_its_parameters(anchored: bool, chance: Random) -> None:
+def test_nothing_bursts_at_the_bounds_of_its_parameters(anchored: bool, rng: Random) -> None:
     for _ in range(12):
-        parents = [-1, *(chance.randrange(node) for node in range(1, 18))]
+        parents = [-1, *(rng.randrange(node) for node in range(1, 18))]
         one = system(parents, anchored)
         either = {
             "mass": (0.05, 50.0),
@@ -113,12 +113,12 @@ def test_nothing_bursts_at_the_bounds_of_its_parameters(anchored: bool, chance: 
             "directional": (0.0, 1e5),
             "damping": (0, 60.0),
         }
-        one.set_parameters(*(np.array([chance.choice(two) for _ in parents]) for two in either.values()))
-        rng = np.random.default_rng(chance.randrange(1 << 30))
+        one.set_parameters(*(np.array([rng.choice(two) for _ in parents]) for two in either.values()))
+        noise = np.random.default_rng(rng.randrange(1 << 30))
         for _ in range(100):
-            one.rest[1:] = rng.normal(size=(17, 3))
-            one.velocities += rng.normal(size=(18, 3)) * 20
-            one.step(rng.normal(size=3), rng.normal(size=(18, 3)) * 30, DOWN)
+            one.rest[1:] = noise.normal(size=(17, 3))
+            one.velocities += noise.normal(size=(18, 3)) * 20
+            one.step(noise.normal(size=3), noise.normal(size=(18, 3)) * 30, DOWN)
         assert np.isfinite(one.positions).all()
         flow = np.zeros((18, 3))
         for _ in range(100):
@@ -129,12 +129,12 @@ def test_nothing_bursts_at_the_bounds_of_its_parameters(anchored: bool, chance: 
 
 def test_light_masses_on_the_stiffest_springs_come_to_rest() -> None:
     """Some shook for ever: through a bone's own start, and from the bound of the stretch and back."""
-    rng = np.random.default_rng(5)
+    noise = np.random.default_rng(5)
     for parents, stretch_m, speed_m_s in [*[([-1, 0], 0.0, 20.0)] * 10, ([-1, 0, 1], 3.0, 400.0)]:
         one = system(parents, len(parents) == 2, mass=0.05, stiffness=1e6, damping=0.5)
         one.rest[1:] = [0.0, -0.05, 0.0]
         one.begin(np.cumsum(one.rest, axis=0))
         one.positions[1:, 0] += stretch_m
-        one.velocities[1:] = rng.normal(size=3) * speed_m_s
+        one.velocities[1:] = noise.normal(size=3) * speed_m_s
         course(one, 20.0)
         assert one.energy() < 0.01

@@ -156,13 +156,13 @@ def test_a_puppet_without_poses_is_noticed_and_breaks_no_other(tiny_show: Path, 
 
 def test_each_of_four_dances_as_it_would_alone(tiny_show: Path, phrase: Recording, puppet: Puppet) -> None:
     four = PuppetNetwork(tiny_show / "puppet.onnx", phrase.skeleton, 4).puppets
-    motion, chance = Playback(phrase), np.random.default_rng(7)
+    motion, rng = Playback(phrase), np.random.default_rng(7)
     alone = []
     for number, (one, joint, times) in enumerate(
         zip(four, ("lShldr", "head", "chest", "lShldr"), ((3, 2), (10, 9), (1, 0), (2, 2)), strict=True)
     ):
         window = one.select(motion.window()).copy()
-        hands = holding(one, joint, random_quaternions(chance), 0.25 * (number + 1))
+        hands = holding(one, joint, random_quaternions(rng), 0.25 * (number + 1))
         one.hold(*hands, *times)
         alone.append(dance(puppet, window, *hands, *times))
         for _ in range(10):

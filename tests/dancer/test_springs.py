@@ -177,35 +177,35 @@ def test_they_go_on_from_their_state_bit_for_bit() -> None:
     assert np.array_equal(one.tick(50), other.tick(50))
 
 
-def test_whatever_the_numbers_are_targets_stay_orientations(chance: Random) -> None:
+def test_whatever_the_numbers_are_targets_stay_orientations(rng: Random) -> None:
     def drawn() -> RegionConfig:
         return RegionConfig(
-            mass=chance.choice((0.05, 1.0, 50.0)),
-            stiffness=chance.choice((0.0, 5000.0, 1e6)),
-            directional_stiffness=chance.choice((0.0, 60.0, 1e5)),
-            damping=chance.choice((0.0, 60.0)),
+            mass=rng.choice((0.05, 1.0, 50.0)),
+            stiffness=rng.choice((0.0, 5000.0, 1e6)),
+            directional_stiffness=rng.choice((0.0, 60.0, 1e5)),
+            damping=rng.choice((0.0, 60.0)),
         )
 
     for _ in range(10):
         setting = SpringsConfig(
             name="drawn",
             **{name: drawn() for name in ("trunk", "head", "arms", "legs")},
-            gravity=chance.choice((-20.0, 20.0)),
+            gravity=rng.choice((-20.0, 20.0)),
             wind=(30.0, -30.0, 30.0),
             gusts=1.0,
-            air=chance.choice((0.0, 20.0)),
+            air=rng.choice((0.0, 20.0)),
             stir=4.0,
             follow=1.0,
         )
         dance = Dance(joint="Hips")
         dance.springs.settings = SETTINGS | {"drawn": setting}
         dance.springs.call("drawn")
-        rng = np.random.default_rng(chance.randrange(1 << 30))
+        noise = np.random.default_rng(rng.randrange(1 << 30))
         for _ in range(100):
-            dance.pose = quaternion.normalize(rng.normal(size=REST.shape)).astype(np.float32)
-            dance.root = rng.normal(size=3).astype(np.float32)
+            dance.pose = quaternion.normalize(noise.normal(size=REST.shape)).astype(np.float32)
+            dance.root = noise.normal(size=3).astype(np.float32)
             dance.figure.set_pose(dance.pose, dance.root)
-            dance.springs.kick(rng.normal(size=3) * 50)
+            dance.springs.kick(noise.normal(size=3) * 50)
             targets = dance.tick()[0]
         assert np.allclose(np.linalg.norm(targets, axis=-1), 1.0, atol=1e-3)
         assert dance.springs.energy() < 1e7

@@ -92,10 +92,10 @@ def test_bones_that_stretch_come_back(ending: str, tmp_path: Path) -> None:
 def test_any_rotations_come_back(
     seed: int, frames: int, fps: float, ending: str, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     figure = body()
-    poses = quaternion.continuous(quaternion.normalize(chance.normal(size=(frames, len(figure), 4))))
-    meant = Recording(figure, poses, chance.normal(size=(frames, 3)), fps)
+    poses = quaternion.continuous(quaternion.normalize(rng.normal(size=(frames, len(figure), 4))))
+    meant = Recording(figure, poses, rng.normal(size=(frames, 3)), fps)
     path = tmp_path_factory.mktemp("any") / f"dance{ending}"
     write_recording(path, meant)
     found = read_as_told(path, AS_IT_IS)[0]

@@ -250,18 +250,18 @@ def dance_of(convention: str, seconds: float = 12.0, fps: float = 50.0, seed: in
     A root on the floor follows the hips over it.
     """
     skeleton, time = skeleton_of(convention), np.arange(round(seconds * fps)) / fps
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     system = CONVENTIONS[convention]
     poses = np.tile(quaternion.IDENTITY.astype(float), (len(time), len(skeleton), 1))
 
     def swing(size: float) -> Array:
         slow = np.minimum(time / 2.0, 1.0)  # the dancer begins standing
-        return size * slow * np.sin(time * chance.uniform(1.5, 4.0) + chance.uniform(0, 6))
+        return size * slow * np.sin(time * rng.uniform(1.5, 4.0) + rng.uniform(0, 6))
 
     for role in system.roles():
         joint = skeleton.index(system.name(role))
         part = role.rpartition(" ")[2] if role.startswith(("left", "right")) else role
-        axis = chance.normal(size=3)
+        axis = rng.normal(size=3)
         turn = quaternion.from_axis_angle(axis, swing(0.05 if part in ("hips", "foot") else 0.25))
         if role.endswith("upper arm"):
             hanging = np.radians(-75.0 if role.startswith("left") else 75.0)

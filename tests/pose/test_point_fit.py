@@ -33,8 +33,8 @@ def phrase() -> Recording:
     return read_bvh(files("appliance.show").joinpath("martial_show", "phrase.bvh"))
 
 
-def frames(chance: random.Random, count: int = 40) -> list[int]:
-    return chance.sample(range(len(phrase().poses)), count)
+def frames(rng: random.Random, count: int = 40) -> list[int]:
+    return rng.sample(range(len(phrase().poses)), count)
 
 
 def points_of(layout: str, frame: int) -> dict[str, tuple[float, float, float]]:
@@ -43,13 +43,13 @@ def points_of(layout: str, frame: int) -> dict[str, tuple[float, float, float]]:
     return {part: (x, y, z) for part, (x, y, z) in zip(parts, seen.tolist(), strict=True) if part and x == x}
 
 
-def off(layout: str, chance: random.Random) -> dict[str, tuple[list[float], list[float], list[float]]]:
+def off(layout: str, rng: random.Random) -> dict[str, tuple[list[float], list[float], list[float]]]:
     """For each part of the body, degrees off the dance: of the fit, of a T-pose, of the pose before."""
     recording = phrase()
     skeleton, rest = recording.skeleton, humanoid_rest(recording.skeleton)
     found: dict[str, tuple[list[float], list[float], list[float]]] = {}
     before: Mapping[str, Array] = {}
-    for frame in frames(chance):
+    for frame in frames(rng):
         turns = PointFit(skeleton).turns(points_of(layout, frame))
         pose, root = recording.poses[frame].astype(float), recording.roots[frame].astype(float)
         positions, world = skeleton.forward_kinematics(pose, root)
@@ -83,11 +83,11 @@ def off(layout: str, chance: random.Random) -> dict[str, tuple[list[float], list
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_the_pose_comes_back_from_its_points(layout: str, chance: random.Random) -> None:
+def test_the_pose_comes_back_from_its_points(layout: str, rng: random.Random) -> None:
     """Limbs point where they pointed within a tenth of a degree; hips and chest within 25 degrees (95 %), as
     no point says how the spine is shared between them. A T-pose and the pose before are far off.
     """
-    for part, (fitted, t_pose, before) in off(layout, chance).items():
+    for part, (fitted, t_pose, before) in off(layout, rng).items():
         most = 25.0 if part in ("Hips", "Chest") else 0.1
         assert np.percentile(fitted, 95) < most, part
         if part not in ("Hips", "Chest"):
@@ -174,8 +174,8 @@ def test_axes_are_found_from_a_dancer_that_stands(
     assert left @ x > 0.9
 
 
-def test_sides_that_change_places_for_a_moment_are_put_back_and_a_turn_is_one(chance: random.Random) -> None:
-    points = points_of("mediapipe", frames(chance, 1)[0])
+def test_sides_that_change_places_for_a_moment_are_put_back_and_a_turn_is_one(rng: random.Random) -> None:
+    points = points_of("mediapipe", frames(rng, 1)[0])
     mixed = {
         part: points[part.replace("left", "!").replace("right", "left").replace("!", "right")]
         for part in points
@@ -190,8 +190,8 @@ def test_sides_that_change_places_for_a_moment_are_put_back_and_a_turn_is_one(ch
     assert after["left shoulder"][:2] == before["right shoulder"][:2]  # the figure has turned round
 
 
-def test_a_point_that_is_not_seen_leaves_its_bones_out_and_no_others(chance: random.Random) -> None:
-    points = points_of("mediapipe", frames(chance, 1)[0])
+def test_a_point_that_is_not_seen_leaves_its_bones_out_and_no_others(rng: random.Random) -> None:
+    points = points_of("mediapipe", frames(rng, 1)[0])
     whole = PointFit(phrase().skeleton).turns(points)
     without = PointFit(phrase().skeleton).turns(
         {part: at for part, at in points.items() if part != "left wrist"}

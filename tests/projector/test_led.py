@@ -21,11 +21,11 @@ HAND, FOLLOWER, LATE, RANDOM, STANDING = range(1, 6)
 
 def dance(seed: int, lag: int = 4) -> Poses:
     """A still root, a hand, a limb that does the same, one that does it later, one by itself, a still one."""
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     long = ROWS + 3 * LAGS
 
     def wandering() -> np.ndarray:
-        steps = chance.normal(size=(long + 8, 3))
+        steps = rng.normal(size=(long + 8, 3))
         smooth = np.stack([np.convolve(one, np.hanning(9), "valid") for one in steps.T], axis=1)
         return np.cumsum(0.012 * smooth * (1 + np.sin(np.arange(long) / 5.0))[:, None], axis=0)
 

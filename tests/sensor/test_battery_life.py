@@ -10,10 +10,10 @@ HOUR_S = 3600.0
 
 
 def test_what_is_left_is_known_after_a_while_and_no_longer_than_it_lasts() -> None:
-    life, chance, lasts_s = BatteryLife(), random.Random(1), 3 * HOUR_S
+    life, rng, lasts_s = BatteryLife(), random.Random(1), 3 * HOUR_S
     told = []
     for now in range(round(lasts_s)):
-        percent = round(100 * (1 - now / lasts_s) + chance.uniform(-0.7, 0.7))
+        percent = round(100 * (1 - now / lasts_s) + rng.uniform(-0.7, 0.7))
         life.hear(max(0, percent), float(now))
         if life.left_s != UNKNOWN_S:
             told.append((life.left_s, lasts_s - now))

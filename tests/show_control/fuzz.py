@@ -25,9 +25,9 @@ _TEXTS = ["", "storm", "ink", "lShldr", "x" * 300, "\x1b[2J", "雪", "/go", "\x0
 
 def datagrams(seed: int, count: int) -> Iterator[bytes]:
     """The same ones for a seed."""
-    chance = random.Random(seed)
+    rng = random.Random(seed)
     for _ in range(count):
-        yield chance.choice(_KINDS)(chance)
+        yield rng.choice(_KINDS)(rng)
 
 
 def message(address: str, *arguments: object) -> bytes:
@@ -59,39 +59,39 @@ def _text(text: str) -> bytes:
     return packed + b"\0" * (-len(packed) % 4)
 
 
-def _some_command(chance: random.Random) -> bytes:
+def _some_command(rng: random.Random) -> bytes:
     """An address that there is, with arguments that may fit."""
     choices: list[object] = [*_NUMBERS, *_FLOATS, *_TEXTS, True, False]
     return message(
-        chance.choice(list(FORMS)),
-        *(chance.choice(choices) for _ in range(chance.choice([0, 0, 1, 1, 2, 3, 8]))),
+        rng.choice(list(FORMS)),
+        *(rng.choice(choices) for _ in range(rng.choice([0, 0, 1, 1, 2, 3, 8]))),
     )
 
 
-def _noise(chance: random.Random) -> bytes:
-    return chance.randbytes(chance.choice([0, 1, 3, 4, 8, 33, 100, 1500]))
+def _noise(rng: random.Random) -> bytes:
+    return rng.randbytes(rng.choice([0, 1, 3, 4, 8, 33, 100, 1500]))
 
 
-def _damaged(chance: random.Random) -> bytes:
-    damaged = bytearray(_some_command(chance))
-    for _ in range(chance.randrange(1, 6)):
-        damaged[chance.randrange(len(damaged))] = chance.randrange(256)
-    return bytes(damaged[: chance.randrange(len(damaged) + 1)] if chance.random() < 0.3 else damaged)
+def _damaged(rng: random.Random) -> bytes:
+    damaged = bytearray(_some_command(rng))
+    for _ in range(rng.randrange(1, 6)):
+        damaged[rng.randrange(len(damaged))] = rng.randrange(256)
+    return bytes(damaged[: rng.randrange(len(damaged) + 1)] if rng.random() < 0.3 else damaged)
 
 
-def _tags(chance: random.Random) -> bytes:
+def _tags(rng: random.Random) -> bytes:
     """A command with type tags of all kinds, and no arguments to match, or nested arrays."""
-    tags = "".join(chance.choice("ifsbhdtrmTFNIcS[]{}x") for _ in range(chance.choice([1, 5, 40, 2000])))
-    if chance.random() < 0.2:
-        tags = "[" * 1500 + "]" * chance.choice([0, 1500])
-    return _text(chance.choice(list(FORMS))) + _text("," + tags) + chance.randbytes(chance.randrange(64))
+    tags = "".join(rng.choice("ifsbhdtrmTFNIcS[]{}x") for _ in range(rng.choice([1, 5, 40, 2000])))
+    if rng.random() < 0.2:
+        tags = "[" * 1500 + "]" * rng.choice([0, 1500])
+    return _text(rng.choice(list(FORMS))) + _text("," + tags) + rng.randbytes(rng.randrange(64))
 
 
-def _bundle(chance: random.Random, depth: int = 0) -> bytes:
-    bundle = b"#bundle\0" + chance.choice([struct.pack(">Q", 1), chance.randbytes(8)])
-    for _ in range(chance.choice([0, 1, 2, 5, 70])):
-        inner = _bundle(chance, depth + 1) if depth < 3 and chance.random() < 0.1 else _some_command(chance)
-        size = len(inner) if chance.random() < 0.9 else chance.choice(_sizes(len(bundle)))
+def _bundle(rng: random.Random, depth: int = 0) -> bytes:
+    bundle = b"#bundle\0" + rng.choice([struct.pack(">Q", 1), rng.randbytes(8)])
+    for _ in range(rng.choice([0, 1, 2, 5, 70])):
+        inner = _bundle(rng, depth + 1) if depth < 3 and rng.random() < 0.1 else _some_command(rng)
+        size = len(inner) if rng.random() < 0.9 else rng.choice(_sizes(len(bundle)))
         bundle += struct.pack(">i", size) + inner
     return bundle
 
@@ -101,33 +101,33 @@ def _sizes(at: int) -> list[int]:
     return [-4, -8, -12, -20, -24, -4 - at, 12 - at, -at, -1, 0, 3, 4, 2**31 - 1, -(2**31)]
 
 
-def _returns(chance: random.Random) -> bytes:
+def _returns(rng: random.Random) -> bytes:
     """A bundle of a few messages, and sizes that lead back into them."""
     bundle = b"#bundle\0" + struct.pack(">Q", 1)
-    for _ in range(chance.randrange(4)):
-        inner = _some_command(chance)
+    for _ in range(rng.randrange(4)):
+        inner = _some_command(rng)
         bundle += struct.pack(">i", len(inner)) + inner
-    return bundle + struct.pack(">i", chance.choice(_sizes(len(bundle))))
+    return bundle + struct.pack(">i", rng.choice(_sizes(len(bundle))))
 
 
-def _blobs(chance: random.Random) -> bytes:
+def _blobs(rng: random.Random) -> bytes:
     """Texts and blobs of untrue lengths, which lead back to the texts."""
-    count = chance.choice([1, 10, 400])
-    body = b"x" * chance.choice([0, 4, 1000]) + b"\0" * 4
-    body += b"".join(struct.pack(">i", chance.choice(_sizes(len(body)))) for _ in range(count))
-    return _text(chance.choice(list(FORMS))) + _text("," + "sb" * count) + body
+    count = rng.choice([1, 10, 400])
+    body = b"x" * rng.choice([0, 4, 1000]) + b"\0" * 4
+    body += b"".join(struct.pack(">i", rng.choice(_sizes(len(body)))) for _ in range(count))
+    return _text(rng.choice(list(FORMS))) + _text("," + "sb" * count) + body
 
 
-def _nest(chance: random.Random) -> bytes:
+def _nest(rng: random.Random) -> bytes:
     """Bundles in bundles, as deep as a datagram allows."""
-    nest = _some_command(chance)
-    for _ in range(chance.choice([5, 50, 190])):
+    nest = _some_command(rng)
+    for _ in range(rng.choice([5, 50, 190])):
         nest = b"#bundle\0" + struct.pack(">Qi", 1, len(nest)) + nest
     return nest
 
 
-def _huge(chance: random.Random) -> bytes:
-    return message(chance.choice(list(FORMS)), "x" * chance.choice([4000, 4096, 9000, 60000]))
+def _huge(rng: random.Random) -> bytes:
+    return message(rng.choice(list(FORMS)), "x" * rng.choice([4000, 4096, 9000, 60000]))
 
 
 _KINDS = (

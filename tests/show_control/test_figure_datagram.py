@@ -154,10 +154,10 @@ def mocopi(turns: dict[str, Array]) -> bytes:
 
 @pytest.mark.parametrize("program", [slimevr, xsens, mocopi])
 def test_the_dance_of_a_program_is_the_figures(
-    reader: LivePoseReader, control: ControlInThread, asker: Asker, program, chance: random.Random
+    reader: LivePoseReader, control: ControlInThread, asker: Asker, program, rng: random.Random
 ) -> None:
     asker.ask("/ping")
-    for frame in chance.sample(range(len(PHRASE.poses)), 3):
+    for frame in rng.sample(range(len(PHRASE.poses)), 3):
         world, turns = true_turns(frame)
         heard = follows([program(turns)], asker, reader, world)
         assert heard.root == pytest.approx(HIPS, abs=1e-5)
@@ -197,12 +197,12 @@ def test_a_damaged_datagram_is_refused_in_words(
 
 
 @pytest.mark.parametrize("program", [xsens, mocopi])
-def test_whatever_bytes_come_there_is_a_figure_or_a_sentence(program, chance: random.Random) -> None:
+def test_whatever_bytes_come_there_is_a_figure_or_a_sentence(program, rng: random.Random) -> None:
     whole = program(true_turns(0)[1])
     for _ in range(2000):
-        received = bytearray(whole[: chance.choice((len(whole), chance.randrange(8, len(whole))))])
-        for place in chance.sample(range(8, len(received)), min(chance.randrange(8), len(received) - 8)):
-            received[place] = chance.randrange(256)
+        received = bytearray(whole[: rng.choice((len(whole), rng.randrange(8, len(whole))))])
+        for place in rng.sample(range(8, len(received)), min(rng.randrange(8), len(received) - 8)):
+            received[place] = rng.randrange(256)
         try:
             figure = turns_in(bytes(received))
         except ValueError:

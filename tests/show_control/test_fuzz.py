@@ -26,7 +26,7 @@ SOMEBODY = ("127.0.0.1", 5000)
 
 
 def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
-    folder: Path, key_file: Path, stage: StageDouble, chance: random.Random, long_run: bool
+    folder: Path, key_file: Path, stage: StageDouble, rng: random.Random, long_run: bool
 ) -> None:
     count = MOST if long_run else COUNT
     writer, sender, projector = ShowStateWriter(folder), OrderSender(folder), InboxDouble(folder, "projector")
@@ -41,7 +41,7 @@ def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
     )
     reader = ShowStateReader(folder)
     now = time.monotonic()
-    for number, received in enumerate(datagrams(chance.randrange(1 << 30), count)):
+    for number, received in enumerate(datagrams(rng.randrange(1 << 30), count)):
         handler.handle_datagram(received[:LARGEST_DATAGRAM], SOMEBODY, now + number / 1000)
         if number % 100 == 0:
             now = time.monotonic() - number / 1000

@@ -141,16 +141,16 @@ def test_a_program_that_also_sends_rotations_of_its_own_joints_is_taken_by_its_p
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_whatever_numbers_come_there_is_a_pose_or_a_sentence(layout: str, chance: random.Random) -> None:
+def test_whatever_numbers_come_there_is_a_pose_or_a_sentence(layout: str, rng: random.Random) -> None:
     points, now, poses = PointsInput(FIGURE, FigurePose(FIGURE), layout), 0.0, 0
     odd = (0.0, math.nan, math.inf, -math.inf, 1e-300, 1e30, -1e5, 1e5, 1.0)
-    for frame in chance.sample(range(len(PHRASE.poses)), 200):
-        now += chance.choice((0.0, 0.02, 3.0, -1.0))
+    for frame in rng.sample(range(len(PHRASE.poses)), 200):
+        now += rng.choice((0.0, 0.02, 3.0, -1.0))
         numbers = camera(layout, PHRASE.poses[frame].astype(float), [0.0, 0.9, 0.0])
-        for place in chance.sample(range(len(numbers)), chance.choice((0, 3, 10, len(numbers)))):
-            numbers[place] = chance.choice(odd)
-        if chance.random() < 0.2:
-            numbers[chance.randrange(3) :: 3] = [0.0] * (len(numbers) // 3)  # a picture, without depth
+        for place in rng.sample(range(len(numbers)), rng.choice((0, 3, 10, len(numbers)))):
+            numbers[place] = rng.choice(odd)
+        if rng.random() < 0.2:
+            numbers[rng.randrange(3) :: 3] = [0.0] * (len(numbers) // 3)  # a picture, without depth
         try:
             whole = points.hear(numbers, now)
         except ValueError as error:

@@ -21,20 +21,20 @@ NUMBERS = (0.0, 0.3, -0.7, 1.0, -1.0, 30.0, -900.0, 1e4, 1e30, -3.5e38, 1e300, f
 ROTATIONS_OF_BONES = ((0.0, 0.0, 0.0, 1.0), (0.6, 0.0, 0.8, 0.0), (0.0, 0.0, 0.0, 0.0), (0.0, 1.04, 0.0, 0.0))
 
 
-def some_message(chance: random.Random) -> tuple[str, list[object]]:
+def some_message(rng: random.Random) -> tuple[str, list[object]]:
     """One that may be well, or have numbers of any size in some places."""
-    address = chance.choice([BONE] * 6 + [ROOT, ROTATIONS, POSITIONS])
+    address = rng.choice([BONE] * 6 + [ROOT, ROTATIONS, POSITIONS])
     if address in (BONE, ROOT):
-        numbers = [chance.choice(NUMBERS[:7]) for _ in range(3)] + [*chance.choice(ROTATIONS_OF_BONES)]
-        values: list[object] = [chance.choice(BONES), *numbers]
+        numbers = [rng.choice(NUMBERS[:7]) for _ in range(3)] + [*rng.choice(ROTATIONS_OF_BONES)]
+        values: list[object] = [rng.choice(BONES), *numbers]
     else:
         values = [0.5] * ((4 if address == ROTATIONS else 3) * len(FIGURE))
-    if chance.random() < 0.2:
-        values[chance.randrange(1, len(values))] = chance.choice(NUMBERS)
+    if rng.random() < 0.2:
+        values[rng.randrange(1, len(values))] = rng.choice(NUMBERS)
     return address, values
 
 
-def test_whatever_a_live_stream_sends_no_frame_is_impossible(tmp_path: Path, chance: random.Random) -> None:
+def test_whatever_a_live_stream_sends_no_frame_is_impossible(tmp_path: Path, rng: random.Random) -> None:
     show = write_show(tmp_path / "show", hands=[], motion={"live": True})
     night = Night(show, tmp_path / "runtime")
     facts = facts_of(night.show, None, night.parts.led.iterations, 0.0)
@@ -46,7 +46,7 @@ def test_whatever_a_live_stream_sends_no_frame_is_impossible(tmp_path: Path, cha
         for _ in range(1500):
             for _ in range(4):
                 with contextlib.suppress(ValueError):
-                    live.hear(*some_message(chance), facts, night.slot.deadline + 0.019)
+                    live.hear(*some_message(rng), facts, night.slot.deadline + 0.019)
             night.dance(1)
             heard += night.tick.live_heard is not None
             for numbers in (first.frame.positions, first.frame.pose, first.frame.world, first.frame.root):

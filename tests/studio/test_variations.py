@@ -185,13 +185,13 @@ def test_a_phrase_or_free_is_asked_for(model: Path, tmp_path: Path) -> None:
     assert result.exit_code == 2 and "PHRASE" in result.stderr
 
 
-def test_windows_of_a_spin_join_whatever_their_signs(chance: random.Random) -> None:
+def test_windows_of_a_spin_join_whatever_their_signs(rng: random.Random) -> None:
     """A joint that turns five times a second, decoded with either sign: blended it turns as evenly."""
     length, hop, count = 32, 8, 20
     ticks = (count - 1) * hop + length
     spin = quaternion.from_axis_angle([0, 1, 0], 2 * np.pi * 5 / 50 * np.arange(ticks))[:, None]
     starts = np.arange(count) * hop
-    windows = np.stack([chance.choice((-1, 1)) * spin[start : start + length] for start in starts])
+    windows = np.stack([rng.choice((-1, 1)) * spin[start : start + length] for start in starts])
     danced = hann_mean(variations.aligned_windows(windows, starts, ticks), starts, ticks)
     steps = np.degrees(quaternion.angle_between(danced[1:], danced[:-1]))
     np.testing.assert_allclose(steps, 36.0, atol=0.1)

@@ -122,7 +122,7 @@ class Lockstep:
 
     sensors: list[LockstepSensor]
     port: int
-    chance: random.Random
+    rng: random.Random
     tick_s: float = STEP_S
     now: float = EPOCH_S
     link: SensorLink | None = None  # None: the box is off
@@ -132,7 +132,7 @@ class Lockstep:
     look: Callable[[float], None] = lambda now: None  # after each step
 
     def box_on(self) -> None:
-        with mock.patch("secrets.token_bytes", self.chance.randbytes):  # the same seed: the same sessions
+        with mock.patch("secrets.token_bytes", self.rng.randbytes):  # the same seed: the same sessions
             self.link = open_link({one.key.name: one.key for one in self.sensors}, udp=(HOST, self.port))
 
     def box_off(self) -> None:
@@ -171,13 +171,13 @@ def lockstep(
 
     tick_s: how often the box drains and sends, a multiple of STEP_S.
     """
-    chance = random.Random(f"lockstep {seed}")
+    rng = random.Random(f"lockstep {seed}")
     [port] = free_ports(1)
-    keys = [SensorKey(name, 0x5000 + number, chance.randbytes(16)) for number, name in enumerate(names)]
+    keys = [SensorKey(name, 0x5000 + number, rng.randbytes(16)) for number, name in enumerate(names)]
     sensors = [
         LockstepSensor(key, motion_of(number), 1000 * seed + number, port) for number, key in enumerate(keys)
     ]
-    together = Lockstep(sensors, port, chance, tick_s)
+    together = Lockstep(sensors, port, rng, tick_s)
     together.access_point(True)
     try:
         yield together

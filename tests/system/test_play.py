@@ -124,10 +124,10 @@ def test_the_whole_box_runs_where_torch_and_the_simulation_cannot_be_imported(
 
 
 def test_a_flood_of_bad_datagrams_moves_nothing(
-    show: Path, tmp_path: Path, chance: random.Random, long_run: bool
+    show: Path, tmp_path: Path, rng: random.Random, long_run: bool
 ) -> None:
     lengths = [0, 1, 3, 20, 45, 60, 400, 1400]
-    bad = [chance.randbytes(chance.choice(lengths)) for _ in range(1000)]
+    bad = [rng.randbytes(rng.choice(lengths)) for _ in range(1000)]
     with playing(show, tmp_path, settings=JOURNAL) as box, box.wearables():
         box.frame_that(lambda frame: frame[2] > 20)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as flood:

@@ -85,14 +85,14 @@ def test_a_check_that_takes_all_memory_ends_alone(machine: Machine, monkeypatch:
     assert run_with_timeout(60.0, check) == b"1"
 
 
-def test_a_power_cut_at_any_moment_leaves_whole_shows_alone(machine: Machine, chance: random.Random) -> None:
+def test_a_power_cut_at_any_moment_leaves_whole_shows_alone(machine: Machine, rng: random.Random) -> None:
     """Killed while it copies, checks or writes; the next preflight chooses a whole show."""
     machine.bring("Spring")
     machine.preflight()
     for number in range(8):
         machine.bring(f"Summer {number}")
         with subprocess.Popen([*PREFLIGHT, *machine.arguments], stdout=subprocess.DEVNULL) as process:
-            time.sleep(chance.uniform(0.02, 1.2))
+            time.sleep(rng.uniform(0.02, 1.2))
             process.send_signal(signal.SIGKILL)
         for pair in (Choice.read(machine.data / CHOSEN) or Choice()).pairs:
             assert not checksum_problems(pair.show)
