@@ -69,7 +69,7 @@ def test_a_training_learns_that_its_dancer_only_copies(tmp_path: Path) -> None:
     found = own_answer.own_answer(Pasting(), takes, tmp_path / "answer.png")
     assert found["cause"] == "copies" and "does not answer" in found["verdict"]
     assert "0.1 minutes of dance in a single one" in found["advice"]
-    barely = own_answer.own_answer(Pasting(), takes, tmp_path / "answer.png", one_pass_error=22.0, steps=103)
+    barely = own_answer.judged(found, own_answer.learned(takes, steps=103), error=22.0)
     assert barely["cause"] == "unlearned" and "103 steps" in barely["advice"]
     assert set(found["lShldr"]) == {"2_1", "10_9", "onset_ticks", "step_answer", "baselines"}
     assert (tmp_path / "answer.png").read_bytes().startswith(b"\x89PNG")

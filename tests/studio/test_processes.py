@@ -50,7 +50,7 @@ def small(recordings: Path, network: str = "mlp") -> Training:
     return training
 
 
-def test_two_processes_learn_what_one_does_and_go_on_where_one_stopped(
+def test_two_processes_learn_what_one_does_and_go_on_where_one_stopped_and_one_after_them(
     recordings: Path, tmp_path: Path
 ) -> None:
     """The same batches, noise and weights, to the rounding of sums; the loss curves with them."""
@@ -70,13 +70,20 @@ def test_two_processes_learn_what_one_does_and_go_on_where_one_stopped(
         torch.testing.assert_close(two["averaged"][name], value, atol=1e-5, rtol=1e-4, msg=name)
     mean = one["history"][-1]["losses"]["rotation"]
     later = two["history"][-1]["losses"]["rotation"]
+    again = bunraku("train", "--resume", "--out", tmp_path / "two", "--steps", STEPS + 2, "--device", "cpu")
+    assert again.exit_code == 0, again.output
+    assert torch.load(tmp_path / "two" / "checkpoint.pt", weights_only=True)["step"] == STEPS + 2
     assert (sum(curve) + later * (STEPS - STOPPED)) / STEPS == pytest.approx(mean, rel=1e-4)
     assert two["history"][-1]["held_out_degrees"] == pytest.approx(
         one["history"][-1]["held_out_degrees"], rel=1e-4
     )
 
 
-def test_one_process_goes_on_where_two_stopped(recordings: Path, tmp_path: Path) -> None:
+def test_one_improviser_goes_on_where_two_processes_stopped(
+    recordings: Path, tmp_path: Path, long_run: bool
+) -> None:
+    if not long_run:
+        pytest.skip("another model: --long")
     sizes = ["--window", 10, "--width", 12, "--depth", 1, "--mixtures", 2, "--threads", 1, "--device", "cpu"]
     arguments = ["--model", "improviser", "--network", "lstm-mixtures", "--recordings", recordings]
     result = two_processes("train", *arguments, *sizes, "--steps", 6, "--out", tmp_path / "two")
