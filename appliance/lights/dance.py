@@ -16,7 +16,11 @@ from appliance.show.light_rules import FEATURES, RuleConfig
 
 SMOOTHING_S = 0.06  # window of speeds: three ticks, so that one late frame is no step
 PAUSE_S = 0.2  # without a new frame for this long, nothing moves
+# Passes are at 40 Hz, frames at 50: every fourth frame is skipped. Places move on with their velocities until
+# the next frame, at most this long; else heads tremble at 10 Hz and its harmonics.
+MOST_ON_S = 0.03
 FASTEST_M_S = 15.0  # no joint of a dancer is faster; a phrase that jumps is
+HELD = 0.1  # a joint that is held less firmly answers
 ROOT = 0
 _COORDINATE = {"across": 0, "height": 1, "depth": 2}
 
@@ -49,6 +53,9 @@ class Dance:
         self.world = self.pose.copy()
         self.speeds: NDArray[np.float64] = np.zeros(joints)  # metres a second
         self.body_speed = 0.0
+        self.answer = 0.0  # mean degrees from the phrase, smoothed
+        self._velocities = np.zeros((joints, 3))
+        self._age_s = 0.0  # age of the newest frame since it left the stage
         self._features: MotionFeatures | None = None  # made when a rule first reads one
         self._felt: dict[str, float] = dict.fromkeys(FEATURES, 0.0)  # smoothed
         self._time = -math.inf
@@ -57,10 +64,12 @@ class Dance:
     def take_frame(self, frame: JointFrame, puppet: PuppetFrame, generation: int, now: float) -> None:
         """Take the puppet's newest frame, which may be the same again; `generation`: the stage's."""
         tick = (generation, frame.tick)
+        self._age_s = min(max(now - max(frame.left, frame.frame_time), 0.0), MOST_ON_S)
         if tick == self._tick:
             if now - self._time > PAUSE_S:
                 self._settle(np.zeros_like(self.speeds), PAUSE_S)
                 self._feel(dict.fromkeys(FEATURES, 0.0), PAUSE_S)
+                self._velocities[:] = 0.0
             return
         if (not frame.late or self._tick is None) and np.isfinite(puppet.positions).all():
             self._measure(frame, puppet, generation)
@@ -70,9 +79,11 @@ class Dance:
         """A rule's present input: metres, metres a second or degrees."""
         joint = ROOT if rule.joint is None else self.skeleton.index(rule.joint)
         if rule.reads in _COORDINATE:
-            return float(self.positions[joint, _COORDINATE[rule.reads]])
+            return float(self._now(joint)[_COORDINATE[rule.reads]])
         if rule.reads == "speed":
             return self.body_speed if rule.joint is None else float(self.speeds[joint])
+        if rule.reads == "answer":
+            return self.answer
         if rule.reads in self._felt:
             self._features = self._features or MotionFeatures(len(self.skeleton))
             return self._felt[rule.reads]
@@ -81,24 +92,42 @@ class Dance:
 
     def place(self, joint: str | None) -> NDArray[np.float64]:
         """Position of a joint (None: the root), (3,) metres."""
-        where: NDArray[np.float64] = self.positions[ROOT if joint is None else self.skeleton.index(joint)]
+        return self._now(ROOT if joint is None else self.skeleton.index(joint))
+
+    def _now(self, joint: int) -> NDArray[np.float64]:
+        """The joint's position moved on to this pass, (3,) metres."""
+        where: NDArray[np.float64] = self.positions[joint] + self._age_s * self._velocities[joint]
         return where
 
     def _measure(self, frame: JointFrame, puppet: PuppetFrame, generation: int) -> None:
         elapsed_s = frame.frame_time - self._time
         continues = self._tick is not None and self._tick[0] == generation
         if continues and 0.0 < elapsed_s < PAUSE_S:
-            speeds = np.linalg.norm(puppet.positions - self.positions, axis=-1) / elapsed_s
-            if speeds.max() > FASTEST_M_S and self._features is not None:
-                self._features = MotionFeatures(len(self.skeleton))  # a jump: motion begins anew
+            self._velocities[:] = (puppet.positions - self.positions) / elapsed_s
+            speeds = np.linalg.norm(self._velocities, axis=-1)
+            if speeds.max() > FASTEST_M_S:  # a jump: motion begins anew
+                self._velocities[:] = 0.0
+                self._features = self._features and MotionFeatures(len(self.skeleton))
             self._settle(np.minimum(speeds, FASTEST_M_S), elapsed_s)
         else:
+            self._velocities[:] = 0.0
             self._settle(np.zeros_like(self.speeds), PAUSE_S)
+        self._compare(puppet, min(elapsed_s, PAUSE_S))
         self.positions[:], self.pose[:], self.world[:] = puppet.positions, puppet.pose, puppet.world
         self._time = frame.frame_time
         if self._features is not None:
             self._features.take_frame(puppet.positions, frame.frame_time)
             self._feel({name: float(self._features.numbers[name][0]) for name in FEATURES}, elapsed_s)
+
+    def _compare(self, puppet: PuppetFrame, elapsed_s: float) -> None:
+        """How far the joints that no hand holds are from the phrase; 0 while none is held."""
+        answering = puppet.holds < HELD
+        answering[ROOT] = False
+        answer = 0.0
+        if not answering[1:].all() and answering.any():
+            apart = quaternion.angle_between(puppet.pose[answering], puppet.source[answering])
+            answer = math.degrees(float(np.mean(apart)))
+        self.answer += (answer - self.answer) * (1.0 - math.exp(-elapsed_s / SMOOTHING_S))
 
     def _settle(self, speeds: NDArray[np.float64], elapsed_s: float) -> None:
         self.speeds += (speeds - self.speeds) * (1.0 - math.exp(-elapsed_s / SMOOTHING_S))

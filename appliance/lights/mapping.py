@@ -104,7 +104,7 @@ class _Rule:
         else:
             wanted = bent(config, share(dances.of(config.puppet).read(config), config.ends))
         if self._level is not None:
-            wanted = eased(self._level, wanted, config.attack_s, config.release_s, seconds)
+            wanted = eased(self._level, wanted, *config.eases_s, seconds)
         self._level = wanted
         low, high = config.output
         level = low + (high - low) * wanted

@@ -14,6 +14,7 @@ from appliance.lights.dance import Dances
 from appliance.lights.head import LONGEST_STEP_S
 from appliance.lights.mapping import Mapping, MappingOutput, faded, mappings_of
 from appliance.lights.patch import Patch, Values
+from appliance.lights.usual_mapping import with_usual_mapping
 from appliance.outputs.joint_frame import JointFrame
 from appliance.pose.skeleton import Skeleton
 from appliance.show.fixture_profile import DIMMER
@@ -49,7 +50,7 @@ class Rig:
         self._safe, self._homes = _safe_look(config.safe, patch), config.safe.heads == "home"
         self.values: Values = patch.dimmed(self._safe, 1.0)  # (S,) what the last pass showed
         self._is_dark = config.safe.dimmer == 0.0
-        self._mappings = mappings_of(config.mappings, patch)
+        self._mappings = mappings_of(with_usual_mapping(config, patch, skeleton).mappings, patch)
         self._layers: list[_Layer] = []
         self._called: tuple[str, float] | None = None
         self._unseen_s = np.inf  # age of the newest frame, without delays of this process

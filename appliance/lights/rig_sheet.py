@@ -14,6 +14,7 @@ from appliance.lights.phrase_run import passes
 from appliance.lights.plan import draw_plan
 from appliance.lights.run import rig_problems, say
 from appliance.lights.unknown_name import UnknownNameError
+from appliance.lights.usual_mapping import with_usual_mapping
 from appliance.pictures.filmstrip import MissingPicturesError
 from appliance.pose.bvh import read_bvh
 from appliance.pose.counted import counted
@@ -44,10 +45,12 @@ def print_rig(
         words = f"The show has no mapping '{mapping}'. {did_you_mean(mapping, names)}"
         raise UnknownNameError("--mapping", words)
     config = at_venue(show.config.lights, box.lights)
+    patch = Patch(config.fixtures, show.directory)
+    config = with_usual_mapping(config, patch, show.skeleton)
     Console().print(_table(config, show, box))
     for sentence in unwired(show, box):
         say(sentence)
-    phrase, patch = read_bvh(show.phrase), Patch(config.fixtures, show.directory)
+    phrase = read_bvh(show.phrase)
     for sentence in dazzling(config, patch, phrase):
         say(sentence)
     try:

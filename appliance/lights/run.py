@@ -70,7 +70,7 @@ class Lights:
         """Log which fixtures are lit by which wires, and what stays dark."""
         mappings = [mapping.name for mapping in self.show.config.lights.mappings]
         wires = " and ".join(universe.wire.name for universe in self.universes)
-        rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: they rest at their defaults"
+        rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: each lamp follows a limb"
         self._say(f"Lights: {counted(len(self.rig.patch.fixtures), 'fixture')} by {wires}; {rules}.")
         for sentence in unwired(self.show, self.box):
             self._say(sentence)

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
+from appliance.show.fixture_profile import DIMMER
 from appliance.show.section import Axis, Joint, Section, key, refusal
 from appliance.show.venue_lights import Metres
 
@@ -15,7 +16,9 @@ Pair = Annotated[tuple[float, float], Field(strict=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Colour = Annotated[tuple[Share, Share, Share], Field(strict=False)]
 Feature = Literal["qom", "weight_effort", "time_effort", "flow_effort", "space_effort"]
-ReadValue = Literal["place", "across", "height", "depth", "speed", "turn", "lean", "steady", Feature]
+ReadValue = Literal[
+    "place", "across", "height", "depth", "speed", "turn", "lean", "answer", "steady", Feature
+]
 FEATURES: tuple[Feature, ...] = get_args(Feature)
 
 USUAL_RANGES: dict[str, tuple[float, float]] = {
@@ -25,13 +28,16 @@ USUAL_RANGES: dict[str, tuple[float, float]] = {
     "speed": (0.0, 2.0),  # metres a second
     "turn": (-180.0, 180.0),  # degrees
     "lean": (0.0, 90.0),
+    "answer": (0.0, 25.0),
     "qom": (0.0, 2.0),  # metres a second
     "weight_effort": (0.0, 4.0),  # (metres a second)^2
     "time_effort": (0.0, 20.0),  # metres a second^2
     "flow_effort": (0.0, 1000.0),  # metres a second^3
     "space_effort": (1.0, 4.0),
 }
-AIM, COLOUR = "aim", "colour"  # what a rule can drive beside attributes
+AIM, COLOUR = "aim", "colour"  # what a rule can drive in addition to attributes
+# Dimmers and colours rise by at most 26 of 255 levels in a pass and fall by 8. Faster light flickers.
+USUAL_ATTACK_S, USUAL_RELEASE_S = 0.25, 0.8
 MAX_RULES = 64
 
 
@@ -43,8 +49,9 @@ class RuleConfig(Section):
     )
     reads: ReadValue = key(
         "place (for aim), across, height and depth in metres, speed in metres a second, turn "
-        "about `axis` and lean of `axis` away from its rest direction in degrees, steady (a constant); "
-        "of the whole body qom (quantity of motion) and the efforts after Laban."
+        "about `axis` and lean of `axis` away from its rest direction in degrees, answer (how far the body "
+        "is from its phrase because a hand holds it, mean degrees of the joints that are not held), steady "
+        "(a constant); of the whole body qom (quantity of motion) and the efforts after Laban."
     )
     joint: Joint | None = key(
         "The joint that is read; default: the root, and for speed the whole body's mean.", None
@@ -60,7 +67,7 @@ class RuleConfig(Section):
     )
     range: Pair | None = key(
         "The readings that count as 0 and 1. Defaults: speed 0 to 2, height 0 to 2, across and "
-        "depth -2 to 2, turn -180 to 180, lean 0 to 90; qom 0 to 2, weight_effort 0 to 4, "
+        "depth -2 to 2, turn -180 to 180, lean 0 to 90, answer 0 to 25; qom 0 to 2, weight_effort 0 to 4, "
         "time_effort 0 to 20, flow_effort 0 to 1000, space_effort 1 to 4.",
         None,
     )
@@ -75,8 +82,12 @@ class RuleConfig(Section):
         "The output at 0 and at 1, as fractions of the attribute's range; [1, 0] inverts it.", (0.0, 1.0)
     )
     value: Share = key("For steady: its value, 0 to 1.", 1.0)
-    attack_s: float = key("Seconds for a rise from 0 to 1.", 0.0, within=(0, 60))
-    release_s: float = key("Seconds for a fall from 1 to 0.", 0.0, within=(0, 60))
+    attack_s: float | None = key(
+        "Seconds for a rise from 0 to 1. null: 0.25 for dimmer and colour, else 0.", None, within=(0, 60)
+    )
+    release_s: float | None = key(
+        "Seconds for a fall from 1 to 0. null: 0.8 for dimmer and colour, else 0.", None, within=(0, 60)
+    )
     colours: list[Colour] = key(
         "For colour: from 0 to 1 through these, each [red, green, blue] from 0 to 1.", [], length=(0, 16)
     )
@@ -131,6 +142,14 @@ class RuleConfig(Section):
             cure = "Write [in, out] pairs with growing first numbers."
             raise refusal("The points are not in growing order within 0 to 1.", cure, "points")
         return self
+
+    @property
+    def eases_s(self) -> tuple[float, float]:
+        """Seconds for a rise from 0 to 1, and for a fall."""
+        is_light = self.drives in (DIMMER, COLOUR)
+        usual = (USUAL_ATTACK_S, USUAL_RELEASE_S) if is_light else (0.0, 0.0)
+        attack_s, release_s = self.attack_s, self.release_s
+        return usual[0] if attack_s is None else attack_s, usual[1] if release_s is None else release_s
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -62,7 +62,8 @@ lights:
     - name: warm
       rules:
         - {reads: place, joint: lShldr, drives: aim, fixtures: [spot left]}
-        - {reads: speed, drives: dimmer, attack_s: 0.1, release_s: 1.5}
+        - {reads: qom, drives: dimmer, output: [0.1, 0.5], attack_s: 1.5, release_s: 3}
+        - {reads: speed, joint: lShldr, drives: dimmer, mix: highest}
 cues:                         # /cue storm, or /cue alone for the next one
   - name: storm
     phrase: main

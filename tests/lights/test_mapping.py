@@ -26,6 +26,7 @@ PAR = {"name": "par", "profile": "led-par", "address": 1}
 OTHER = {"name": "other", "profile": "led-par", "address": 11}
 HEAD = {"name": "head", "profile": "moving-wash", "address": 21, "place": [0, 4, 0]}
 DIMMER, RED, GREEN, BLUE = 0, 1, 2, 3  # channels of PAR, from 0
+AT_ONCE = {"attack_s": 0, "release_s": 0}
 
 
 def levels(
@@ -60,7 +61,7 @@ def test_places_drive_an_attribute(reads: str, hand: Any, wanted: int) -> None:
 
 def test_ranges_and_outputs_scale_and_turn_round() -> None:
     rule = {"reads": "height", "joint": "hand", "drives": "dimmer", "range": [2, 1], "output": [0.2, 0.6]}
-    made = rig(lights([PAR], rule))
+    made = rig(lights([PAR], rule | AT_ONCE))
     assert still(made, (0, 1.0, 0))[DIMMER] == 153
     assert still(made, (0, 2.0, 0), first=2)[DIMMER] == 51
 
@@ -82,7 +83,8 @@ def test_a_jump_of_the_phrase_is_no_speed_that_a_dancer_could_have() -> None:
 
 
 def test_a_stage_that_hangs_moves_no_more() -> None:
-    made = rig(lights([PAR], {"reads": "speed", "joint": "hand", "drives": "dimmer", "range": [0, 1]}))
+    rule = {"reads": "speed", "joint": "hand", "drives": "dimmer", "range": [0, 1]}
+    made = rig(lights([PAR], rule | AT_ONCE))
     path = [(1.0 * PERIOD_S * step, 1.0, 0.0) for step in range(60)]
     assert levels(made, *path)[-1][DIMMER] > 250
     last = frame(60, path[-1])
@@ -111,7 +113,8 @@ def test_attack_and_release_take_the_seconds_that_they_say() -> None:
 
 def test_height_drives_colour_through_the_colours_of_the_rule() -> None:
     colours = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    made = rig(lights([PAR], {"reads": "height", "joint": "hand", "drives": "colour", "colours": colours}))
+    rule = {"reads": "height", "joint": "hand", "drives": "colour", "colours": colours}
+    made = rig(lights([PAR], rule | AT_ONCE))
     wanted = [(255, 0, 0), (128, 128, 0), (0, 255, 0), (0, 0, 255)]
     for tick, (height, colour) in enumerate(zip((0, 0.5, 1, 2), wanted, strict=True), 1):
         assert tuple(still(made, (0, height, 0), first=tick)[1:4]) == colour
