@@ -204,6 +204,7 @@ first_start_done() {
 debian_kept
 install_release
 settle
+rm -rf "$root/var/cache/ldconfig" # its file has times in it
 if [[ $out == *.tar ]]; then
     tar -C "$root" --numeric-owner --sort=name -cf "$out.part" .
     mv "$out.part" "$out"
