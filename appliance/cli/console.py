@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _KEPT = "console.json"
 _PATIENCE_S = 2.0
-_CARD_LETTERS, _CARD_LINES = 40, 5  # of the test card, for one fault
+_CARD_LETTERS, _CARD_LINES = 40, 5  # the test card's, for one fault
 
 console = command_group(
     "Serve the page: a browser at the venue shows the box and, with the PIN, commands it. `bunraku play` "

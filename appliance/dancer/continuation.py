@@ -1,4 +1,4 @@
-"""Continuation: a figure goes on from what it has just danced, by choosing among moves of its own.
+"""Continuation: a figure goes on from what it has just danced, by choosing among its own moves.
 
 Every 0.32 s it draws moves from the show's improviser and dances the one that suits best: that answers
 another dancer, leads to a place, or any. So it always dances as its improviser does, and the choice says what
@@ -22,7 +22,7 @@ from appliance.pose.quaternion import Array
 
 CANDIDATES = 24
 DANCED = 4  # steps of a move that are danced before the next choice
-FIRST = 6  # of the first one: until it is made some have passed
+FIRST = 6  # danced of the first move: some have passed until it is made
 ANSWERING = 5.0  # how much an answer counts at most, in deviations among the candidates
 WHERE = 4.0  # how much a metre nearer to the goal counts
 ROAM_M = 1.2  # how far from where it began it goes without a goal

@@ -49,9 +49,9 @@ class RuleConfig(Section):
     )
     reads: ReadValue = key(
         "place (for aim), across, height and depth in metres, speed in metres a second, turn "
-        "about `axis` and lean of `axis` away from its rest direction in degrees, answer (how far the body "
-        "is from its phrase because a hand holds it, mean degrees of the joints that are not held), steady "
-        "(a constant); of the whole body qom (quantity of motion) and the efforts after Laban."
+        "about `axis` and lean of `axis` away from its rest direction in degrees, steady (a constant); "
+        "answer: how far a hand takes the body from its phrase, in degrees, the mean of the joints that are "
+        "not held; of the whole body qom (quantity of motion) and the efforts after Laban."
     )
     joint: Joint | None = key(
         "The joint that is read; default: the root, and for speed the whole body's mean.", None

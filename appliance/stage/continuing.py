@@ -50,7 +50,7 @@ class Guest:
 
 
 class Continuing:
-    """What goes on of the puppets of a stage, once a tick: lay_over after they start, watch once they stand.
+    """Continuations of a stage's puppets, once a tick: lay_over after they start, watch once they stand.
 
     led, answerer: numbers of puppets; answerer None: no partner. follow, lead, delay_s: of the partner;
     temperature, top_p: of all that goes on; goal: x, z in metres on the stage, of the led puppet; (): none.

@@ -8,7 +8,7 @@ from appliance.dancer.material.improvising import BEFORE, MOVE, Numbers
 from appliance.dancer.material.motion_network import MotionNetwork
 from appliance.dancer.material.steps import ROOT
 
-LED_STEPS = 16  # of the other dancer: 1.3 s
+LED_STEPS = 16  # the other dancer's: 1.3 s
 GAP = 4  # steps by which the other dancer is known less far than the figure that answers
 SEEN = BEFORE + MOVE
 
