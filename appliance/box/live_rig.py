@@ -39,8 +39,8 @@ class LiveRigWriter:
         """beams: of each the fixture's name, its place (x, y, z; metres), where it points (a unit vector),
         its colour (red, green, blue; 0..1), its level 0..1, its width in degrees; walk: what is walked now.
         """
-        told = {"beams": beams[:MOST_BEAMS], "walk": walk}
-        self._block.write(json.dumps(told, separators=(",", ":")).encode())
+        seen = {"beams": beams[:MOST_BEAMS], "walk": walk}
+        self._block.write(json.dumps(seen, separators=(",", ":")).encode())
 
     def close(self) -> None:
         """Nothing shines any more."""

@@ -25,7 +25,7 @@ class LogWriter:
         self._descriptor = descriptor
         # Its put() takes no lock: the real-time thread would wait for one that another thread holds.
         self._lines: SimpleQueue[str | None] = SimpleQueue()
-        self.dropped = self._told = 0
+        self.dropped = self._reported = 0
         self._kept: Path | None = None
         self._last: deque[str] = deque(maxlen=MOST_SAID)
         self._since_whole = 0  # lines since the file was written as a whole
@@ -54,11 +54,11 @@ class LogWriter:
         try:
             while (line := self._lines.get()) is not None:
                 self._write(line)
-                if (dropped := self.dropped) != self._told and self._lines.empty():
+                if (dropped := self.dropped) != self._reported and self._lines.empty():
                     self._write(
-                        f"{dropped - self._told} lines before this one are missing: nothing took them."
+                        f"{dropped - self._reported} lines before this one are missing: nothing took them."
                     )
-                    self._told = dropped
+                    self._reported = dropped
         except OSError:
             return  # the reader is gone: the show goes on
 

@@ -101,15 +101,15 @@ class NotifyListener:
         return {"NOTIFY_SOCKET": f"@{os.fsdecode(name)}", "WATCHDOG_USEC": str(round(watchdog_s * 1e6))}
 
     def heard(self) -> Iterator[tuple[int, str]]:
-        """Sender's process and words of all that waits; the kernel tells the process."""
+        """Sender's process and message of all that waits; the kernel tells the process."""
         while True:
             try:
-                words, told, _, _ = self._socket.recvmsg(_LARGEST, socket.CMSG_SPACE(_SENDER.size))
+                message, credentials, _, _ = self._socket.recvmsg(_LARGEST, socket.CMSG_SPACE(_SENDER.size))
             except OSError:
                 return
-            for level, kind, sender in told:
+            for level, kind, sender in credentials:
                 if (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS):
-                    yield _SENDER.unpack(sender)[0], words.decode(errors="replace")
+                    yield _SENDER.unpack(sender)[0], message.decode(errors="replace")
 
     def close(self) -> None:
         """Hear nothing more."""

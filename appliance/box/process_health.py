@@ -83,7 +83,7 @@ class ProcessHealthWriter:
     """A process publishes its health once a second; without room for the block it works on without."""
 
     def __init__(self, folder: Path, process: str, fallbacks: Fallbacks) -> None:
-        self.told: dict[str, Any] = {}  # what else it says, for the page
+        self.reported: dict[str, Any] = {}  # what else it says, for the page
         self._fallbacks = fallbacks
         self._due = 0.0
         self._block: BlockWriter | None = None
@@ -114,12 +114,12 @@ class ProcessHealthWriter:
     def _write(self, now: float, ended: bool) -> None:
         if self._block is None:
             return
-        told = self._fallbacks.happened(now)
-        values = {"pid": os.getpid(), "starts": self._starts, "beat": now, "ended": ended, "fallbacks": told}
-        values |= {"parts": dict(self._fallbacks.parts), "told": self.told}
+        fallbacks = self._fallbacks.happened(now)
+        values: dict[str, Any] = {"pid": os.getpid(), "starts": self._starts, "beat": now, "ended": ended}
+        values |= {"fallbacks": fallbacks, "parts": dict(self._fallbacks.parts), "reported": self.reported}
         packed = json.dumps(values).encode()
-        while len(packed) > _LARGEST and told:
-            values["fallbacks"] = told = told[:-1]
+        while len(packed) > _LARGEST and fallbacks:
+            values["fallbacks"] = fallbacks = fallbacks[:-1]
             packed = json.dumps(values).encode()
         self._block.write(packed)
 
@@ -127,7 +127,7 @@ class ProcessHealthWriter:
 class Member(NamedTuple):
     """A process beside the stage. late: it published nothing for LATE_S, and did not end.
 
-    parts: as in `Fallbacks`. lives: the process that published last is there. told: what else it said.
+    parts: as in `Fallbacks`. lives: the process that published last is there. reported: what else it said.
     """
 
     process: str
@@ -136,7 +136,7 @@ class Member(NamedTuple):
     fallbacks: tuple[Fallen, ...]
     parts: dict[str, str]
     lives: bool = True
-    told: Mapping[str, Any] = MappingProxyType({})
+    reported: Mapping[str, Any] = MappingProxyType({})
 
 
 class ProcessHealth:
@@ -155,12 +155,13 @@ class ProcessHealth:
             if values is not None:
                 late = not values.get("ended") and now - float(values.get("beat", now)) > LATE_S
                 starts, fallbacks = int(values.get("starts", 1)), fallen(values.get("fallbacks"))
-                parts = values.get("parts")
-                told = {str(name): str(why) for name, why in parts.items()} if isinstance(parts, dict) else {}
+                found_parts = values.get("parts")
+                parts = found_parts if isinstance(found_parts, dict) else {}
+                parts = {str(name): str(why) for name, why in parts.items()}
                 lives = block.writer_lives() and not values.get("ended")
-                said = values.get("told")
+                said = values.get("reported")
                 more = said if isinstance(said, dict) else {}
-                found.append(Member(process, starts, late, fallbacks, told, lives, more))
+                found.append(Member(process, starts, late, fallbacks, parts, lives, more))
         return found
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:

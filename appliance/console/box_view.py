@@ -50,9 +50,9 @@ class BoxView:
         seen, state, members = self._seen, self._show_state.read(), self._seen.members(now)
         control = next((one for one in members if one.process == "control" and one.lives), None)
         trouble = "" if control else SILENT if self._desk.has_control else NO_COMMANDS
-        told = control.told if control else {}
-        counted = int(told.get("refused", 0)), int(told.get("strangers", 0))
-        known = status(state, seen, *counted, now, str(told.get("live", ""))) if control else None
+        reported = control.reported if control else {}
+        counted = int(reported.get("refused", 0)), int(reported.get("strangers", 0))
+        known = status(state, seen, *counted, now, str(reported.get("live", ""))) if control else None
         frames = self._stage.state(now)
         lines = seen.health().get("sensors", ()) if self._stage.lives else ()
         sensors = [self._sensor(RosterLine(*line)) for line in lines if len(line) == _FIELDS]
@@ -70,7 +70,9 @@ class BoxView:
             "sensors": sensors,
             "fallbacks": fallbacks,
             "processes": [{"process": one.process, "late": one.late} for one in members],
-            "wall": dict(next((one.told for one in members if one.process == "projector" and one.lives), {})),
+            "wall": dict(
+                next((one.reported for one in members if one.process == "projector" and one.lives), {})
+            ),
             "hands": [one._asdict() for one in hands_of(seen)] if known else [],
             "generation": self._stage.generation,
             **self._declared(),

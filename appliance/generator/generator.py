@@ -91,14 +91,14 @@ class Generator:
         self._pointed: list[float] = []
         self._state, self._disk = box.state_folder, ""
         self._kept_names = KeptNamesWriter(folder)
-        self._told_names: list[str] | None = None
+        self._published_names: list[str] | None = None
         self._ahead = [_Ahead(puppet, MadeMotionWriter(folder, puppet.number)) for puppet in config.cast]
         self._number = 1000 + int(time.time()) % _MOST_NUMBERS
 
     def look(self, state_reader: ShowStateReader, now: float) -> bool:
         """Make what is wanted next, if anything is; whether it did."""
-        if (names := sorted(self.kept.recipes)) != self._told_names:
-            self._told_names = names
+        if (names := sorted(self.kept.recipes)) != self._published_names:
+            self._published_names = names
             self._kept_names.write(names)
         if self.kept.complaint and self._state is not None and not self._disk:
             self._disk = disk_of(self._state)
@@ -132,8 +132,8 @@ class Generator:
 
     def _look_at(self, ahead: _Ahead, state: ShowState, now: float) -> bool:
         """Make what is wanted next for a puppet, if anything is; whether it did."""
-        told, danced = self._told(ahead.puppet), self._danced(ahead.puppet)
-        base, wanted = str(told.get("base", MAIN)), str(told.get("wanted", ""))
+        reported, danced = self._reported(ahead.puppet), self._danced(ahead.puppet)
+        base, wanted = str(reported.get("base", MAIN)), str(reported.get("wanted", ""))
         request = self._requests.request(
             state, base, self.kept.recipes, now, wanted, ahead.puppet, self._pointed
         )
@@ -157,7 +157,7 @@ class Generator:
         ahead.request = request
         return True
 
-    def _told(self, puppet: PuppetStart) -> Mapping[str, Any]:
+    def _reported(self, puppet: PuppetStart) -> Mapping[str, Any]:
         """The stage's report on a puppet."""
         health = self._stage.health() or {}
         found = (one for one in health.get("puppets", ()) if one.get("name") == puppet.name)
@@ -165,7 +165,7 @@ class Generator:
 
     def _danced(self, puppet: PuppetStart) -> str:
         """The recipe that a puppet dances; "" for none."""
-        return str(self._told(puppet).get("made", ""))
+        return str(self._reported(puppet).get("made", ""))
 
     def _adopt(self, ahead: _Ahead, request: Request, danced: str) -> None:
         """After a restart: the present motion was made for this request; the next follows at its return."""
@@ -201,8 +201,8 @@ class Generator:
 
     def _going_on(self, puppet: PuppetStart, at_once: bool) -> dict[str, Any]:
         """The pose that an improvisation continues: one that is soon danced, or the end of another one."""
-        told, danced = self._told(puppet), self._danced(puppet)
-        name = str(told.get("base", MAIN))
+        reported, danced = self._reported(puppet), self._danced(puppet)
+        name = str(reported.get("base", MAIN))
         if danced:
             number = int(parsed_recipe(danced)["number"])
             loop = read_material(self._file(number), self._show.skeleton.names).loop
@@ -210,9 +210,9 @@ class Generator:
             number, loop = [*self._show.phrases].index(name), self._loop_of(name)
         frame = float(end_of(loop))
         if at_once:
-            told_at = float(told.get("looked_at", time.monotonic()))
-            ahead_s = _AHEAD_S + time.monotonic() - told_at
-            frame = round((float(told.get("position_s", 0.0)) + ahead_s - loop.start_s) * FPS)
+            reported_at = float(reported.get("looked_at", time.monotonic()))
+            ahead_s = _AHEAD_S + time.monotonic() - reported_at
+            frame = round((float(reported.get("position_s", 0.0)) + ahead_s - loop.start_s) * FPS)
             frame = frame % loop.period
         network = self._maker.network(IMPROVISE)
         prompt = prompt_of(loop, frame, self._show.skeleton, network, network.places)

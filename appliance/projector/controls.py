@@ -114,7 +114,7 @@ class Controls:
         self.shows_test_card = shown
         return "The test card is on the wall in place of the dance." if shown else "The dance is on the wall."
 
-    def told(self) -> dict[str, Any]:
+    def report(self) -> dict[str, Any]:
         """For the page: corners in shares of the display, brightness as a factor, grid and figures."""
         corners, brightness = self.alignment.corners, self.alignment.brightness
         return {

@@ -268,7 +268,7 @@ class Run:
         if self.reader.facts is not None:
             self.fallbacks.set(STAGE_UNSEEN.name, stage != "fresh" and not self.projector.sees_stage)
         self.fallbacks.set(PICTURES_SMALLER.name, share < 1.0)
-        self._health.told = self._controls.told()
+        self._health.reported = self._controls.report()
         self._health.publish_health(now)
 
     def _check_context(self) -> None:

@@ -36,7 +36,7 @@ from appliance.show_control.sensor_roster import END as ROSTER_END
 from appliance.show_control.sensor_roster import SENSOR, roster_messages
 from appliance.show_control.show_state_commands import declare, in_cue, let_go, of_this_show
 from appliance.show_control.stage_observer import StageObserver
-from appliance.show_control.status_messages import END, status, told
+from appliance.show_control.status_messages import END, answer_to, status
 from appliance.show_control.trackers import TRACKERS, Trackers
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class CommandHandler:
         self._note_live(now)
         self.acknowledgements.send_due(now)
 
-    def told(self, strangers: int, now: float) -> dict[str, Any]:
+    def report(self, strangers: int, now: float) -> dict[str, Any]:
         """The part of the status that only this process knows."""
         return {"refused": self.refused, "strangers": strangers, "live": self._live.came(now)}
 
@@ -169,7 +169,7 @@ class CommandHandler:
         elif words := let_go(command):
             self._send(asker, (REPLY, address, 0, words))  # not done, and nothing was refused
         elif address in _QUESTIONS:
-            for message in told(address, self.show_state, observer, self.status(0, now), now):
+            for message in answer_to(address, self.show_state, observer, self.status(0, now), now):
                 self._send(asker, message)
         elif address == "/sensors/list":
             self._send_roster(asker, now)

@@ -69,8 +69,8 @@ class Port:
 
     def dropped(self) -> int:
         """How many datagrams the kernel dropped because the socket was full."""
-        told = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * (_DROPS + 1))
-        return int(struct.unpack_from("=I", told, 4 * _DROPS)[0])
+        memory = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * (_DROPS + 1))
+        return int(struct.unpack_from("=I", memory, 4 * _DROPS)[0])
 
     def send(self, to: Address, message: Message) -> None:
         """Send a message; it is dropped when the network does not take it at once."""

@@ -128,7 +128,7 @@ class ControlProcess:
         now = self._monotonic()
         self._count(now)
         self.handler.follow_stage(now)
-        self._health.told = self.handler.told(self.port.strangers, now)
+        self._health.reported = self.handler.report(self.port.strangers, now)
         self._health.publish_health(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)

@@ -86,7 +86,7 @@ def status(
     )
 
 
-def told(
+def answer_to(
     question: str, show_state: ShowState, observer: Seen, now_status: Status, now: float
 ) -> Iterator[Message]:
     """The answer to a question: a message for each thing, and one to end with."""

@@ -82,5 +82,5 @@ def test_a_phone_reads_the_address() -> None:
 
 def test_orders_and_the_key_show_and_hide_it() -> None:
     controls = Controls(Alignment(), lambda _: None)
-    assert controls.carry_out(Order("test_card", (1,)))[0] and controls.told()["test_card"]
+    assert controls.carry_out(Order("test_card", (1,)))[0] and controls.report()["test_card"]
     assert press(Key("T"), controls, (1280, 720)) and not controls.shows_test_card

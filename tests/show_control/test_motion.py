@@ -18,7 +18,7 @@ from appliance.levers.table import AGAIN, MADE_NUMBERS, PATH_POINTS, PHRASE
 from appliance.show_control.command import command
 from appliance.show_control.show_state_commands import declare
 from appliance.show_control.stage_observer import StageObserver
-from appliance.show_control.status_messages import told
+from appliance.show_control.status_messages import answer_to
 from tests.show_control.doubles import facts
 
 SOURCES = ("main", "quiet", "vary", "granular", "path", "improvise")
@@ -96,7 +96,7 @@ def test_the_status_tells_what_is_danced_and_every_parameter() -> None:
         health = {"puppets": [{"is_led": True, "made": made}]}
         seen = SimpleNamespace(facts=shown, health=lambda health=health: health)
         observer = cast(StageObserver, seen)
-        *answers, end = told("/motion", state, observer, Status(phrase="vary"), NOW)
+        *answers, end = answer_to("/motion", state, observer, Status(phrase="vary"), NOW)
         assert [answer[1:] for answer in answers if answer[0] == "/motion/is"] == danced
         parameters = [answer[1:] for answer in answers if answer[0] == "/motion/parameter"]
         assert parameters == [("vary", "sigma", 2.0), ("vary", "seed", 3.0)]
