@@ -94,6 +94,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
         "bunraku path phrase.bvh --model out/pose/checkpoint.pt --out wobble.bvh --wobble 0.1 0.5",
         "bunraku path --model out/pose/checkpoint.pt --out drawn.bvh --draw map.svg",
     ),
+    "duet": ("bunraku duet couples --show my_show", "bunraku duet couples --show my_show --minutes 5"),
     "version": ("bunraku version",),
 }
 ORDER = tuple(dict.fromkeys(path.split()[0] for path in EXAMPLES if path))
@@ -134,5 +135,6 @@ OTHER_WORDS: dict[str, tuple[str, ...]] = {
     "vary": ("variation", "variations", "mutate", "mix"),
     "map": ("space", "pca", "umap", "embed"),
     "path": ("wobble", "line", "trace"),
+    "duet": ("partner", "couple", "answer", "dependence"),
     "version": ("about",),
 }

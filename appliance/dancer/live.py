@@ -73,7 +73,8 @@ class Live:
     @property
     def newest(self) -> FloatArray:
         """The newest pose (J, 4) of the stream."""
-        return self._newest
+        newest: FloatArray = self._newest
+        return newest
 
     def share_of(self, joints: Sequence[int]) -> float:
         """The same of these joints: less where they stay with the phrase."""

@@ -1,0 +1,1 @@
+"""A partner: what couples of recordings teach about answering another dancer."""

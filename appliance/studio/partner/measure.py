@@ -1,0 +1,219 @@
+"""`bunraku duet`: trains a show's partner on couples, and measures it on couples that it never saw."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from appliance.dancer.material.improviser_network import ImproviserNetwork
+from appliance.dancer.material.motion_network import MotionNetworkError
+from appliance.dancer.material.partner_network import PartnerNetwork
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.reading_options import ReadingOptions
+from appliance.pose.recording import Recording
+from appliance.show.show import Show, load_show
+from appliance.studio.data.dataset import Dataset, Take, load_folder
+from appliance.studio.data.mirror import mirror_pairs
+from appliance.studio.evaluation.critic import critic
+from appliance.studio.evaluation.dependence import dependence, likeness, share_led_by_second
+from appliance.studio.evaluation.limbs import limb_figures, limbs_of
+from appliance.studio.partner.couples import Moments, couples_of, moments_of
+from appliance.studio.partner.duet import LEAD_IN, danced_duet
+from appliance.studio.partner.export import FILE, export_partner
+from appliance.studio.partner.training import train, train_answers
+from appliance.studio.studio_error import StudioError
+
+COPY_LATE = 25  # ticks by which the null product copies
+_FOLLOWS, _LEADS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.5, 1.0)
+Pairs = Sequence[tuple[Take, Take]]
+
+
+@dataclass(frozen=True)
+class DuetOptions:
+    """What to measure, and for how many minutes to train before; 0: not at all."""
+
+    recordings: Path
+    show: Path
+    minutes: float
+    steps: int
+    seconds: float
+    seed: int
+    out: Path | None
+    reading: ReadingOptions
+
+
+@dataclass(frozen=True)
+class Row:
+    """A kind of duet: how much the second dancer depends on the first, and so on; see docs/partner.md."""
+
+    name: str
+    dependence: float
+    lag_s: float
+    leads: float
+    likeness: float
+    critic: float = float("nan")
+    energy: float = float("nan")
+
+
+def run(options: DuetOptions, device: str = "cpu") -> list[Row]:
+    """Raises StudioError, ConfigError, DatasetError."""
+    console = Console(stderr=True)
+    show, dataset = load_show(options.show), load_folder(options.recordings, options.reading)
+    apart = list(couples_of(dataset.held_out).values())
+    if not apart:
+        raise StudioError(
+            "No couple is kept apart: two recordings of one take that the catalogue holds out. List takes "
+            "and held_out in catalogue.yaml (docs/training.md)."
+        )
+    network = _improviser(show)
+    if options.minutes or options.steps:
+        _train(network, dataset, show.directory / FILE, options, console, device)
+    try:
+        partner = PartnerNetwork(show.directory / FILE, show.skeleton.names)
+    except (MotionNetworkError, OSError) as error:
+        raise StudioError(f"{show.directory / FILE}: {error} Train one: --minutes 5.") from None
+    rows = list(_rows(network, partner, dataset, apart, options, console.print))
+    _print(rows)
+    if options.out is not None:
+        options.out.write_text(json.dumps([row.__dict__ for row in rows], indent=1))
+    return rows
+
+
+def _improviser(show: Show) -> ImproviserNetwork:
+    try:
+        return ImproviserNetwork(show.improviser, show.skeleton.names)
+    except (MotionNetworkError, OSError) as error:
+        raise StudioError(
+            f"{show.improviser}: {error} A partner dances as the show's improviser does: train one with "
+            "bunraku train --model improviser."
+        ) from None
+
+
+def _train(
+    network: ImproviserNetwork,
+    dataset: Dataset,
+    path: Path,
+    options: DuetOptions,
+    console: Console,
+    device: str,
+) -> None:
+    """Both networks, each for half of the time; the last couple of the training takes says which is best."""
+    console.print("Couples become steps.")
+    moments = moments_of(network, dataset, dataset.training, np.random.default_rng(options.seed))
+    is_last = moments.takes == moments.takes.max()
+    if is_last.all():
+        raise StudioError("It takes two couples that are not kept apart to train a partner.")
+    training, asked = (Moments(*(part[rows] for part in moments)) for rows in (~is_last, is_last))
+    seconds, steps = (30.0 * options.minutes, 10**9) if options.minutes else (float("inf"), options.steps)
+    learned = train(training, asked, seconds, steps, device, options.seed, console.print)
+    answers, _, _ = train_answers(training, asked, seconds, steps, device, options.seed, console.print)
+    export_partner(learned.scorer, answers, network, path)
+    console.print(f"{path} is written.")
+
+
+def _rows(
+    network: ImproviserNetwork,
+    partner: PartnerNetwork,
+    dataset: Dataset,
+    apart: Pairs,
+    options: DuetOptions,
+    told: Callable[[str], None],
+) -> Iterator[Row]:
+    joints, moving = dataset.moving_names, list(dataset.moving)
+    counterparts = mirror_pairs(dataset.skeleton)
+    pairs = [moving.index(counterparts[joint]) for joint in moving]
+    couples = [one for pair in apart for one in (pair, pair[::-1])]
+    whole = {take.name: _seen(take.recording, moving) for pair in couples for take in pair}
+
+    def row(name: str, both: Sequence[tuple[Array, Array]], recorded: Sequence[Take] = ()) -> Row:
+        found = [dependence(one, two, joints) for one, two in both]
+        figures = [
+            float(np.mean(values))
+            for values in (
+                [one.above for one in found],
+                [one.lag_s for one in found],
+                [share_led_by_second(one, two, joints) for one, two in both],
+                [likeness(one, two, pairs) for one, two in both],
+            )
+        ]
+        if recorded:
+            made, real = [two for _, two in both], [whole[take.name] for take in recorded]
+            seen = [one[: len(two) + LEAD_IN] for one, two in zip(real, made, strict=True)]
+            names = [take.take for take in recorded]
+            figures.append(critic(seen, made, list(range(len(moving))), names))
+            limbs = limbs_of(joints)
+            energies = [
+                value
+                for one, two in zip(made, real, strict=True)
+                for name, value in limb_figures(one, two, limbs).items()
+                if name.startswith("energy")
+            ]
+            figures.append(float(np.mean(energies)))
+        return Row(name, *figures)
+
+    yield row("recorded couples", [(whole[one.name], whole[two.name]) for one, two in apart])
+    others = couples[2:] + couples[:2]
+    if len(apart) > 1:
+        shuffled = [
+            (whole[one.name], whole[two.name]) for (one, _), (_, two) in zip(couples, others, strict=True)
+        ]
+        yield row("dancers of different couples (null)", shuffled)
+    copies = [(whole[one.name], np.roll(whole[one.name], COPY_LATE, 0)) for one, _ in apart]
+    yield row(f"a copy {COPY_LATE / 50:g} s later (null)", copies)
+    dials = [(follow, 0.0) for follow in _FOLLOWS] + [(1.0, lead) for lead in _LEADS]
+    for follow, lead in dials:
+        told(f"dances with follow {follow:g}, lead {lead:g}")
+        duets = [
+            danced_duet(
+                network,
+                partner,
+                _beginning(led.recording, options.seconds),
+                own.recording,
+                follow,
+                lead,
+                seed=options.seed,
+            )
+            for led, own in couples
+        ]
+        seen = [(_seen(one, moving)[LEAD_IN:], _seen(two, moving)[LEAD_IN:]) for one, two in duets]
+        yield row(f"follow {follow:g}, lead {lead:g}", seen, [own for _, own in couples])
+        if (follow, lead) == (1.0, 0.0) and len(apart) > 1:
+            wrong = seen[2:] + seen[:2]
+            yield row(
+                "the same beside dancers of other couples (null)",
+                [(other[0], own[1]) for other, own in zip(wrong, seen, strict=True)],
+            )
+
+
+def _beginning(recording: Recording, seconds: float) -> Recording:
+    return recording.excerpt(0.0, min(seconds + LEAD_IN / 50, recording.seconds))
+
+
+def _seen(recording: Recording, moving: Sequence[int]) -> Array:
+    """Poses (T, M, 4) without headings."""
+    poses = np.array(recording.poses[:, list(moving)], dtype=float)
+    poses[:, 0] = quaternion.multiply(quaternion.inverse(quaternion.heading(poses[:, 0])), poses[:, 0])
+    return poses
+
+
+def _print(rows: Sequence[Row]) -> None:
+    table = Table("duet", "depends", "later by, s", "second leads", "likeness", "critic", "energy")
+    for row in rows:
+        values = (row.dependence, row.lag_s, row.leads, row.likeness, row.critic, row.energy)
+        digits = (3, 1, 2, 2, 2, 2)
+        table.add_row(
+            row.name,
+            *("" if value != value else f"{value:.{n}f}" for value, n in zip(values, digits, strict=True)),
+        )
+    Console().print(table)
+    real, best = rows[0].dependence, max(row.dependence for row in rows if row.name == "follow 1, lead 0")
+    print(
+        f"The partner depends on the other dancer by {best:.3f} above chance; recorded couples by {real:.3f}."
+    )
