@@ -73,6 +73,7 @@ def test_the_same_version_with_another_content_lies_beside_it(
 def test_a_package_for_another_processor_is_refused(box: BoxRoot, make_release: MakeRelease) -> None:
     stick = make_release("1.1.0", arch="s390x")
     assert "no bunraku_*_" in refused(box, stick)
+    assert "no bunraku_*_" in refused(box, f"{stick}/"), "a folder named with a slash at its end"
     assert "this system does not take it (above). Nothing was changed." in refused(box, package_of(stick))
 
 
