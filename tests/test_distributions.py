@@ -88,7 +88,7 @@ def test_all_have_one_version_and_ask_for_it_exactly(wheels: dict[str, Path]) ->
 class Place:
     """A virtual environment that sees this one's packages, but nothing of Bunraku."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, without: tuple[str, ...] = ()) -> None:
         self.folder = folder
         subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "venv"], check=True)
         self.bin = folder / "venv/bin"
@@ -96,7 +96,7 @@ class Place:
         self.packages, others = folder / "venv" / lib, folder / "others"
         others.mkdir()
         for path in (Path(sys.prefix) / lib).iterdir():
-            if not path.name.startswith(OWN) and path.suffix != ".pth":
+            if not path.name.startswith(OWN + without) and path.suffix != ".pth":
                 (others / path.name).symlink_to(path)
         (self.packages / "others.pth").write_text(f"{others}\n")
 
@@ -149,3 +149,42 @@ def test_the_box_then_the_simulation_then_the_studio(wheels: dict[str, Path], tm
     assert "Not installed here" not in place.bunraku("--help")
     place.bunraku("convert", "a.glb", "b.bvh")
     assert (tmp_path / "b.bvh").read_text().startswith("HIERARCHY")
+
+
+def test_where_moderngl_has_no_wheel_everything_but_the_picture_works(
+    wheels: dict[str, Path], tmp_path: Path
+) -> None:
+    """As `pipx install bunraku` on a processor for which it is left out: no compiler is needed."""
+    place = Place(tmp_path, without=("moderngl", "_moderngl", "glcontext"))
+    for name in ("bunraku", "bunraku-sim"):
+        place.install(wheels[name])
+    [port] = free_ports(1)
+    box = tmp_path / "box.yaml"
+    box.write_text(
+        f"runtime: {tmp_path / 'run'}\nsensors: {{udp: {{host: 127.0.0.1, port: {port}}}}}\n"
+        "outputs: {osc: []}\ncontrol: null\n"
+    )
+    assert "Danced" in place.bunraku("play", "--emulate", "--box", box, "--seconds", "1")
+    assert " project " in place.bunraku("--help")
+    for words in (("project",), ("project", "--window", "--seconds", "1")):
+        said = place.bunraku(*words, status=2)
+        assert "draws with moderngl, which is not installed here" in said
+        assert "pip install 'bunraku[projector]'" in said
+
+
+@pytest.mark.parametrize(
+    ("machine", "system", "needed"),
+    [
+        ("x86_64", "linux", True),
+        ("aarch64", "linux", False),
+        ("arm64", "darwin", True),
+        ("x86_64", "darwin", False),
+        ("AMD64", "win32", True),
+    ],
+)
+def test_moderngl_is_asked_for_where_it_has_wheels(machine: str, system: str, *, needed: bool) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    [asked] = [one for one in map(Requirement, project["dependencies"]) if one.name == "moderngl"]
+    where = {"platform_machine": machine, "sys_platform": system}
+    assert asked.marker is not None and asked.marker.evaluate(where) == needed
+    assert Requirement(project["optional-dependencies"]["projector"][0]).marker is None

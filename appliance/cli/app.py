@@ -26,7 +26,7 @@ from appliance.cli.help_page import complete_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
 from appliance.options.idle_options import refuse_idle  # noqa: E402
 from appliance.pose.file_trouble import sentence  # noqa: E402
-from appliance.show.config_error import ConfigError, nearest  # noqa: E402
+from appliance.show.config_error import ConfigError, Problem, nearest  # noqa: E402
 
 REFUSED = 2
 _HERE = __name__
@@ -55,6 +55,14 @@ _MODULES = {  # in each a function or a group of the command's name
 }
 
 
+_OWN_OPTIONS = ("preflight", "release")  # programs that also run without this parser
+_OF_THE_PROJECTOR = ("moderngl", "glcontext")
+_PROJECTOR_CURE = (
+    "Where it has no wheel it needs a compiler (Debian: sudo apt install g++ python3-dev), then: "
+    "pip install 'bunraku[projector]'. The Debian package of a box has it."
+)
+
+
 def command_line(name: str | None = None) -> typer.Typer:
     """The parser of one command, which loads no other (none where it is a plug-in's), or of all of them."""
     app = typer.Typer(
@@ -68,13 +76,10 @@ def command_line(name: str | None = None) -> typer.Typer:
     app.callback()(_bunraku)  # a parser of one command expects its name too
     for command, module in _MODULES.items():
         if name in (None, command):
-            found = getattr(import_module(module), command)
+            found = _loaded(command, module)
             if isinstance(found, typer.Typer):
                 app.add_typer(found, name=command)
-            elif command in (
-                "preflight",
-                "release",
-            ):  # both read their options themselves
+            elif command in _OWN_OPTIONS or module not in sys.modules:
                 settings = {"allow_extra_args": True, "ignore_unknown_options": True}
                 app.command(command, add_help_option=False, context_settings=settings)(_ending(found))
             else:
@@ -86,6 +91,23 @@ def _bunraku(
     version: Annotated[bool, typer.Option("--version", help="Print the version, and end.")] = False,
 ) -> None:
     """The box that lets a dancer puppeteer an AI dancer on stage."""
+
+
+def _loaded(command: str, module: str) -> Any:
+    """The command, or one in its place that says which package is missing: only the projector's can be."""
+    try:
+        return getattr(import_module(module), command)
+    except ModuleNotFoundError as error:
+        if error.name not in _OF_THE_PROJECTOR:
+            raise
+        message = f"The projector draws with {error.name}, which is not installed here: there is no picture."
+        missing = ConfigError([Problem(Path(command), 0, message, _PROJECTOR_CURE)])
+
+    def absent_projector(context: typer.Context) -> NoReturn:
+        """Show what the stage dances. Not installed here."""
+        raise missing
+
+    return absent_projector
 
 
 def _ending(command: Callable[..., int | None]) -> Callable[..., None]:
