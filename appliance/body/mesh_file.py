@@ -10,8 +10,10 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import tokenize
 import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,7 @@ _PAIR = [0, 1, 2, 0, 2, 3]  # two triangles as corners of the quad that they are
 
 _UNREADABLE = (
     *(OSError, ValueError, LookupError, TypeError, EOFError, RuntimeError, MemoryError, OverflowError),
-    *(zipfile.BadZipFile, zlib.error),
+    *(zipfile.BadZipFile, zlib.error, SyntaxError, tokenize.TokenError),
 )
 
 Arrays = dict[str, Any]  # NDArray by name
@@ -60,18 +62,30 @@ def read_mesh(folder: Path, skeleton: Skeleton) -> BodyMesh | None:
         return None
 
 
-def write_mesh(folder: Path, skeleton: Skeleton) -> bool:
+def write_mesh(
+    folder: Path, skeleton: Skeleton, model: Callable[[], BodyMesh] | None = None, source: str = ""
+) -> bool:
     """Write the skeleton's surface into a show's folder, unless it is there; returns whether it was written.
 
-    Raises OSError.
+    model: makes a surface from a file of that hash (`source`), in place of the modelled one. Raises OSError
+    and what `model` raises.
     """
-    if read_mesh(folder, skeleton) is not None:
+    if read_mesh(folder, skeleton) is not None and _source(folder) == source:
         return False
+    mesh = body_mesh(skeleton) if model is None else model()
     written = folder / f".{MESH_FILE}.new"
     with written.open("wb") as stream:
-        np.savez_compressed(stream, key=np.array(mesh_key(skeleton)), **_packed(body_mesh(skeleton)))
+        np.savez_compressed(
+            stream, key=np.array(mesh_key(skeleton)), source=np.array(source), **_packed(mesh)
+        )
     written.replace(folder / MESH_FILE)
     return True
+
+
+def _source(folder: Path) -> str:
+    """The hash of the file that the surface in a show's folder was made from; '' for a modelled one."""
+    with np.load(folder / MESH_FILE, allow_pickle=False) as loaded:
+        return str(loaded["source"]) if "source" in loaded.files else ""
 
 
 def mesh_key(skeleton: Skeleton) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from appliance.body.surface import Grid
 from appliance.pose.quaternion import Array
 
-FAR = 1.0  # metres: the field where no volume is near
+FAR = 60.0  # in samples: the field where no volume is near
 MARGIN = 4.5  # in samples: how far around a volume its distance is known
 
 
@@ -212,14 +212,14 @@ def grid_around(groups: Sequence[Group], spacing: float) -> Grid:
 
 def sampled(trunk: Group, limbs: Sequence[Group], grid: Grid) -> NDArray[np.float32]:
     """The field of a trunk and of limbs that melt into it, but not into each other, on a grid."""
-    total = np.full(grid.shape, FAR, dtype=np.float32)
+    total = np.full(grid.shape, FAR * grid.spacing, dtype=np.float32)
     _make(trunk, grid, total)
     body = total.copy()
     for limb in limbs:
         near = _window([solid.box for solid in limb.solids], grid, limb.softness)
         part = body[near]
         if part.size:
-            alone = np.full(part.shape, FAR, dtype=np.float32)
+            alone = np.full(part.shape, FAR * grid.spacing, dtype=np.float32)
             _make(limb, _part_of(grid, near), alone)
             total[near] = np.minimum(total[near], smooth_minimum(part, alone, limb.softness))
     return total

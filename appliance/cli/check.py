@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from appliance.body.mesh_file import MESH_FILE, read_mesh, write_mesh
+from appliance.body.mesh_file import MESH_FILE, read_mesh
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import SHOW_OR_NAME, BoxFile
 from appliance.cli.phones import out_of_phones_reach
@@ -18,6 +18,8 @@ from appliance.dancer.material.maker import open_network
 from appliance.dancer.material.map_reach import MapReach
 from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
 from appliance.dancer.phrase_cache import PhraseCache
+from appliance.exchange.exchange_error import ExchangeError
+from appliance.exchange.glb_body import write_body
 from appliance.levers.sources import MAIN, PATH
 from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
@@ -124,8 +126,10 @@ def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you cha
         checksums.unlink() if before is None else checksums.write_bytes(before)
         raise
     try:
-        if write_mesh(show, load_show(show).skeleton):
+        if write_body(show, load_show(show).skeleton):
             write_checksums(show)
+    except ExchangeError as error:
+        raise StageError(f"{error} The show keeps the body that it had.") from error
     except OSError as error:
         raise StageError(f"{sentence(error, show)} Pack the show again.") from error
     size_mb = bundle_bytes(show) / 1e6

@@ -68,14 +68,14 @@ def aimed(standing: Anatomy, aims: dict[tuple[int, int], Array], tolerance_degre
         if joint in towards:
             child, aim = towards[joint]
             bone = quaternion.rotate(world[joint], skeleton.offsets[child])
-            turn = _shortest_turn(bone, aim)
+            turn = shortest_turn(bone, aim)
             if np.degrees(quaternion.angle_between(turn, quaternion.IDENTITY)) > tolerance_degrees:
                 world[joint] = quaternion.multiply(turn, world[joint])
         local[joint] = quaternion.multiply(quaternion.inverse(above), world[joint])
     return local
 
 
-def _shortest_turn(start: Array, end: Array) -> Array:
+def shortest_turn(start: Array, end: Array) -> Array:
     """The rotation (4,) from one direction to another."""
     a, b = start / max(float(np.linalg.norm(start)), 1e-12), end / np.linalg.norm(end)
     axis, cosine = np.cross(a, b), float(a @ b)

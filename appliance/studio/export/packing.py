@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from appliance.body.mesh_file import write_mesh
+from appliance.exchange.glb_body import write_body
 from appliance.pose.body_facts import with_stance
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
@@ -113,5 +113,5 @@ cues:                          # /cue opening, or /cue alone for the next one; w
 
 def seal(folder: Path) -> None:
     """Write the body's surface, then the checksums over all that is in the bundle."""
-    write_mesh(folder, with_stance(read_bvh(folder / "skeleton.bvh")))
+    write_body(folder, with_stance(read_bvh(folder / "skeleton.bvh")))
     write_checksums(folder)
