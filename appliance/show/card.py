@@ -9,7 +9,7 @@ from pydantic import Field, field_validator
 
 from appliance.levers.sources import NO_CARD
 from appliance.show.picture_file import Colour, PictureFile
-from appliance.show.section import BundleFile, Section, key, refusal, refuse_repeats
+from appliance.show.section import BundleFile, Section, key, refusal
 
 BLANK = "blank"
 MOST_CARDS = 32
@@ -45,9 +45,3 @@ def cards_by_name(cards: Sequence[CardConfig]) -> dict[str, CardConfig]:
     """The cards in their order, by name; behind them `blank`, which is black, unless the show has its own."""
     named = {card.name: card for card in cards}
     return named | {BLANK: named.get(BLANK, CardConfig(name=BLANK, background="#000000"))}
-
-
-def each_card_once(cards: list[CardConfig]) -> list[CardConfig]:
-    """Refuse two cards of one name."""
-    refuse_repeats([card.name for card in cards], "Two cards are called '{value}'.", "Give one another name.")
-    return cards

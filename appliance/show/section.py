@@ -6,7 +6,7 @@ import ipaddress
 import math
 import os
 import stat
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
@@ -75,6 +75,17 @@ def refuse_repeats(values: Sequence[object], message: str, cure: str) -> None:
         if value in values[:place]:
             words = message.format(value=value, first=values.index(value), place=place)
             raise refusal(words, cure, at=place)
+
+
+def each_name_once(kind: str) -> Callable[[list[Any]], list[Any]]:
+    """A validator for a list of sections with names. kind: what they are, in the plural."""
+
+    def named_once(sections: list[Any]) -> list[Any]:
+        names = [section.name for section in sections]
+        refuse_repeats(names, f"Two {kind} are called '{{value}}'.", "Give one another name.")
+        return sections
+
+    return named_once
 
 
 def _in_degrees(value: Any) -> Any:

@@ -14,7 +14,7 @@ from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import require_inside
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import COPY_AGAIN, no_such_show
-from appliance.show.card import MOST_CARDS, CardConfig, cards_by_name, each_card_once
+from appliance.show.card import MOST_CARDS, CardConfig, cards_by_name
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.cues import CueConfig, cue_problems
 from appliance.show.dance import DancerConfig, MotionConfig
@@ -28,7 +28,7 @@ from appliance.show.puppets import (
     puppet_problems,
     require_each_joint_once,
 )
-from appliance.show.section import MOST_PUPPETS, Section, key, part, refusal, refuse_repeats
+from appliance.show.section import MOST_PUPPETS, Section, each_name_once, key, part, refusal
 from appliance.show.sound import StringsConfig
 from appliance.show.springs import SpringsConfig, springs_by_name
 from appliance.show.validation import validated
@@ -78,15 +78,7 @@ class ShowConfig(Section):
     def _each_joint_once(cls, hands: list[HandConfig]) -> list[HandConfig]:
         return require_each_joint_once(hands)
 
-    @field_validator("puppets")
-    @classmethod
-    def _each_puppet_once(cls, puppets: list[PuppetConfig]) -> list[PuppetConfig]:
-        refuse_repeats(
-            [puppet.name for puppet in puppets],
-            "Two puppets are called '{value}'.",
-            "Give one another name.",
-        )
-        return puppets
+    _each_puppet_once = field_validator("puppets")(each_name_once("puppets"))
 
     @model_validator(mode="after")
     def _one_primary(self) -> ShowConfig:
@@ -97,15 +89,7 @@ class ShowConfig(Section):
             )
         return self
 
-    @field_validator("springs")
-    @classmethod
-    def _each_setting_once(cls, springs: list[SpringsConfig]) -> list[SpringsConfig]:
-        refuse_repeats(
-            [setting.name for setting in springs],
-            "Two settings of springs are called '{value}'.",
-            "Give one another name.",
-        )
-        return springs
+    _each_setting_once = field_validator("springs")(each_name_once("settings of springs"))
 
     @model_validator(mode="after")
     def _springs_as_set(self) -> ShowConfig:
@@ -127,15 +111,8 @@ class ShowConfig(Section):
                 )
         return self
 
-    @field_validator("looks")
-    @classmethod
-    def _each_look_once(cls, looks: list[LookConfig]) -> list[LookConfig]:
-        refuse_repeats(
-            [look.name for look in looks], "Two looks are called '{value}'.", "Give one another name."
-        )
-        return looks
-
-    _each_card_once = field_validator("cards")(each_card_once)
+    _each_look_once = field_validator("looks")(each_name_once("looks"))
+    _each_card_once = field_validator("cards")(each_name_once("cards"))
 
     @property
     def cast(self) -> tuple[PuppetStart, ...]:
