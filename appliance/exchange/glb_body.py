@@ -23,7 +23,7 @@ from appliance.pose.t_pose import shortest_turn
 BODY_FILE = "body.glb"
 MOST_TRIANGLES = 60_000
 _TRIANGLES = 4  # glTF's mode of a primitive
-_WELD = 1e-5  # of the height: vertices that are split where textures meet are one
+_WELD = 1e-5  # share of the height: vertices that are split where textures meet are one
 _DAMAGED = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError)
 
 
@@ -149,7 +149,7 @@ def _fitted(figure: _Figure, skeleton: Skeleton) -> BodyMesh:
         if missing := missing_roles(roles):
             raise ExchangeError(
                 figure.path,
-                f"Of {what} no joint is named as {', '.join(missing)}. Name the bones as Mixamo, VRM or "
+                f"No joint of {what} is named as {', '.join(missing)}. Name the bones as Mixamo, VRM or "
                 "Unreal do, then export again.",
             )
     anatomy = anatomy_of(skeleton)
@@ -238,7 +238,7 @@ def _laid_on(
         above = (joint for joint in skeleton.ancestors(ours)[1:] if joint in turns)
         turn = turns.get(next(above, -1), quaternion.IDENTITY)
         root, laid = places[start[ours]], targets[ours]
-        if ours in trunk:  # of one piece: where spines are divided differently, pieces would overlap
+        if ours in trunk:  # all in one piece: where spines are divided differently, pieces would overlap
             (root, laid), child = below, top
         elif ours in skeleton.feet:
             turn, child = quaternion.IDENTITY, None  # soles stay level, whatever way the shin leans

@@ -27,7 +27,7 @@ class Moments(NamedTuple):
     """N moments of couples: what one dancer had danced (N, 16, F), and moves of the other, each with the 3
     steps before it (N, 1 + 12, 11, F): its own, then others that its improviser could have danced there.
 
-    codes (N, C): of its own moves. takes (N,): numbers of the takes.
+    codes (N, C): its moves. takes (N,): numbers of the takes.
     """
 
     led: Numbers

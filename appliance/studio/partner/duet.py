@@ -14,7 +14,7 @@ from appliance.dancer.step_memory import StepMemory
 from appliance.dancer.turns import answerer_leads
 from appliance.pose.recording import Recording
 
-LEAD_IN = 100  # ticks of its own recording before the partner goes on by itself
+LEAD_IN = 100  # ticks of its recording before the partner goes on by itself
 FADE_S = 0.5
 
 

@@ -37,7 +37,7 @@ Pairs = Sequence[tuple[Take, Take]]
 
 @dataclass(frozen=True)
 class DuetOptions:
-    """What to measure, and for how many minutes to train before; 0: not at all."""
+    """Recordings to measure, and minutes of training before that; 0: none."""
 
     recordings: Path
     show: Path
