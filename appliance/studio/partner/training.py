@@ -133,8 +133,8 @@ def train_answers(
         if step % LOOK_EVERY == 0:
             nats, other = nats_of(average, apart, device)
             told(
-                f"step {step}: loss {float(loss):.3f}; kept apart: {nats:.3f} nats, {other:.3f} with another "
-                "moment's steps"
+                f"step {step}: loss {float(loss.detach()):.3f}; kept apart: {nats:.3f} nats, {other:.3f} "
+                "with another moment's steps"
             )
             if nats < least:
                 best, least, least_other = copy.deepcopy(average), nats, other
@@ -231,10 +231,10 @@ def train(
             _follow(average, scorer, step)
         if step % LOOK_EVERY == 0:
             found, shuffled = found_of(average, apart, device)
-            learned.history.append((step, float(loss), found, shuffled))
+            learned.history.append((step, float(loss.detach()), found, shuffled))
             told(
-                f"step {step}: loss {float(loss):.3f}; kept apart: finds {100 * found:.1f} % of the moves, "
-                f"{100 * shuffled:.1f} % with another moment's steps"
+                f"step {step}: loss {float(loss.detach()):.3f}; kept apart: finds {100 * found:.1f} % of the "
+                f"moves, {100 * shuffled:.1f} % with another moment's steps"
             )
             if found - shuffled > learned.found - learned.found_shuffled:
                 learned.scorer, learned.found = copy.deepcopy(average).cpu().eval(), found
