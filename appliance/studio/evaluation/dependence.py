@@ -36,7 +36,7 @@ class Dependence(NamedTuple):
 
 
 def dependence(first: Array, second: Array, joints: Sequence[str]) -> Dependence:
-    """How far one dance depends on the other: both (T, M, 4), headings removed. NaN for dances of less than 8 s."""
+    """How far one dance depends on another, both (T, M, 4), headings removed. NaN below 8 s."""
     one, two = _kernels(first, joints), _kernels(second, joints)
     count = min(one.shape[-1], two.shape[-1])
     if count < 3 * AWAY:
