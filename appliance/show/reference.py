@@ -151,11 +151,17 @@ def _shown(value: Any) -> str:
     if isinstance(value, list) and value and isinstance(value[0], BaseModel):
         return "one receiver with the defaults below"
     if isinstance(value, tuple | list):
-        return f"`[{', '.join(part if isinstance(part, str) else f'{part:g}' for part in value)}]`"
+        return f"`{_listed(value)}`"
     if isinstance(value, str) and value.startswith("#"):  # without quotes YAML takes it for a comment
         return f"`'{value}'`"
     words = {None: "null", True: "true", False: "false", "": '""'}
     return f"`{words[value] if isinstance(value, bool) or value in (None, '') else value}`"
+
+
+def _listed(value: Any) -> str:
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(_listed, value))}]"
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 if __name__ == "__main__":

@@ -12,10 +12,26 @@ BOWED_SAMPLES = 32  # from one push of the bow to the next: 1500 a second at 48 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
+Scale = Annotated[
+    list[Annotated[int, Field(ge=0, le=11)]], Field(min_length=1, max_length=12), Field(strict=False)
+]
+
+
 class StringsConfig(Section):
     """Strings that the dance plays: one for each bone, driven by its motion, coupled where bones meet."""
 
     cues: list[Name] = key("Cues in which they sound; []: always.", [], length=(0, 200))
+    preset: Literal["strings", "voices", "percussion"] = key(
+        "strings: bowed and struck; voices: bowed, with the resonances of a mouth; percussion: struck bars.",
+        "strings",
+    )
+    harmonies: list[Scale] = key(
+        "Scales, semitones above the base. Each cue of the show has the next one, and a figure that is down "
+        "on the floor the one after that; rising, it has its own again.",
+        [[0, 2, 4, 7, 9], [0, 3, 5, 7, 10], [0, 2, 5, 7, 9]],
+        length=(1, 8),
+    )
+    attacks: float = key("How loud starts of moves and footfalls are struck.", 0.5, within=(0, 1))
     base_hz: float = key("Pitch of the longest bone; shorter ones are higher.", 110.0, within=(30, 1000))
     partials: int = key("How many partials each string has.", 6, within=(1, 12))
     brightness: float = key("How loud each partial is beside the one below it.", 0.6, within=(0, 1))

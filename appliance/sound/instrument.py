@@ -1,4 +1,4 @@
-"""The instrument: poses in, sound out: strings, master, limiter."""
+"""The instrument: poses in, sound out: strings, their harmony, attacks, master, limiter."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.show.sound import SoundConfig, StringsConfig
+from appliance.sound.onsets import Onsets
 from appliance.sound.strings import STEP, Samples, Strings, around
 
 FULL_M_S = 3.0  # speed of a bone's end against its start at which its string is bowed fully
@@ -15,53 +16,91 @@ LONGEST_S = 0.1  # between two poses; a longer gap has no speed
 CEILING = 0.9
 _RECOVERS_S = 0.5  # in which the limiter lets go
 _FOLLOWS_S = 0.03  # in which the bowing follows the dance
+# Strings that decay in three seconds grow and fall slowly. So their loudness follows the dance: up within
+# the first of these, down within the second, to the share that is still heard of a string at rest.
+_RISES_S, _FALLS_S, _RINGS = 0.015, 0.06, 0.12
+_DOWN, _UP = 0.6, 0.7  # height of the root on the floor, and up again; shares of the tallest so far
 
 
 class Instrument:
     """Strings of one skeleton on the loudspeakers of one box. Deterministic: the same poses give the same
     samples. dance() and level may come from another thread than render().
 
-    level: 0..1, master and fades; reached within one block, evenly. 0 stops the strings.
+    level: 0..1, master and fades; reached within one block, evenly. 0 stops the strings. cue: place of the
+    present cue among those of the show, which chooses the harmony.
     """
 
     def __init__(self, skeleton: Skeleton, strings: StringsConfig, sound: SoundConfig) -> None:
-        self.strings = Strings(skeleton, strings, sound.rate)
-        self.level = 0.0
+        self._harmonies = [Strings(skeleton, strings, sound.rate, scale=scale) for scale in strings.harmonies]
+        self.level, self.cue = 0.0, 0
+        self._tallest_m, self._is_down = 0.0, False
         self._rate = sound.rate
         self._pan = around(self.strings.places, sound.channels)
-        self._wanted = np.zeros(len(self.strings.bones))
-        self._drive = self._wanted.copy()
+        self._onsets = Onsets(skeleton, self.strings.bones)
+        count = len(self.strings.bones)
+        self._wanted, self._drive, self._loud, self._strikes = np.zeros((4, count))
         self._level_now, self._limit = 0.0, 1.0
         self._before: tuple[float, Samples] | None = None
+
+    @property
+    def strings(self) -> Strings:
+        """The strings of the present harmony."""
+        return self._harmonies[(self.cue + self._is_down) % len(self._harmonies)]
 
     def dance(self, positions: Array, seconds: float) -> None:
         """A pose's positions (J, 3), metres, at a time."""
         ends, starts = self.strings.bones[:, 1], self.strings.bones[:, 0]
         bones = positions[ends].astype(float) - positions[starts]
         if self._before is not None and 0.0 < seconds - self._before[0] <= LONGEST_S:
-            speed = np.linalg.norm(bones - self._before[1], axis=1) / (seconds - self._before[0])
+            elapsed_s = seconds - self._before[0]
+            speed = np.linalg.norm(bones - self._before[1], axis=1) / elapsed_s
             self._wanted = np.minimum(speed / FULL_M_S, 1.0) ** 1.5
+            self._strikes = self._strikes + self._onsets.strikes(speed, positions, seconds, elapsed_s)
         self._before = seconds, bones
+        height_m = float(positions[0, 1])
+        self._tallest_m = max(self._tallest_m, height_m)
+        self._is_down = height_m < (_UP if self._is_down else _DOWN) * self._tallest_m
 
     def rest(self) -> None:
         """No pose comes: the strings ring out."""
         self._wanted, self._before = np.zeros_like(self._wanted), None
+        self._onsets.begin_anew()
 
     def render(self, frames: int) -> NDArray[np.float32]:
         """The next samples (frames, channels), within -1..1; frames: a multiple of STEP."""
-        steps, level = frames // STEP, self.level
-        share = 1.0 - np.exp(-STEP / (_FOLLOWS_S * self._rate))
-        drive = np.empty((steps, len(self._drive)))
-        for step in range(steps):
-            self._drive = self._drive + share * (self._wanted - self._drive)
-            drive[step] = self._drive
-        sound = self.strings.render(drive, self._pan)
+        steps, level, played = frames // STEP, self.level, self.strings
+        strikes, self._strikes = self._strikes, np.zeros_like(self._strikes)
+        if strikes.any():
+            played.strike(strikes)
+        drive, loud = self._follow(steps, strikes)
+        sound = played.render(drive, self._pan, loud)
+        for other in self._harmonies:
+            if other is not played and other.rings:  # a harmony that was left rings out
+                sound += other.render(np.zeros_like(drive), self._pan, loud)
         sound *= np.linspace(self._level_now, level, frames + 1)[1:, None]
         if level == 0.0 and self._level_now == 0.0:
-            self.strings.still()
+            for each in self._harmonies:
+                each.still()
         self._level_now = level
         peak = float(np.abs(sound).max(initial=0.0))
         before, wanted = self._limit, min(1.0, CEILING / max(peak, 1e-9))
         self._limit = min(wanted, before + frames / (_RECOVERS_S * self._rate))
         sound *= np.linspace(before, self._limit, frames + 1)[1:, None]
         return np.clip(sound, -1.0, 1.0).astype(np.float32)
+
+    def _follow(self, steps: int, strikes: Samples) -> tuple[Samples, Samples]:
+        """How strongly strings are bowed (steps, B) and how loud they are (steps + 1, B), after the dance."""
+        times = (_FOLLOWS_S, _RISES_S, _FALLS_S)
+        bows, rises, falls = (1.0 - np.exp(-STEP / (time_s * self._rate)) for time_s in times)
+        drive = np.empty((steps, len(self._drive)))
+        loud = np.empty((steps + 1, len(self._drive)))
+        loud[0] = self._loud
+        struck = strikes > 0.0
+        for step in range(steps):
+            self._drive = self._drive + bows * (self._wanted - self._drive)
+            drive[step] = self._drive
+            wanted = _RINGS + (1.0 - _RINGS) * np.minimum(np.sqrt(self._wanted) * 1.5, 1.0)
+            wanted = np.where(struck, 1.0, wanted)
+            self._loud = self._loud + np.where(wanted > self._loud, rises, falls) * (wanted - self._loud)
+            loud[step + 1] = self._loud
+        return drive, loud

@@ -77,6 +77,7 @@ class Sound:
         self._say, self._fallbacks = say, fallbacks
         self._strings, self._entrance = StringsConfig(), Entrance()
         self._fades: dict[str, float] = {}
+        self._places: dict[str, int] = {}
         self._generation: int | None = None
         self._tick, self._seen_at = -1, 0.0
         self._trouble = ""
@@ -86,7 +87,9 @@ class Sound:
         frame = self._stage.newest(now)
         if self._stage.generation != self._generation and self._stage.facts is not None:
             self._generation = self._stage.generation
-            self._fades = {str(cue["name"]): float(cue["fade_s"]) for cue in self._stage.facts.cues}
+            cues = self._stage.facts.cues
+            self._fades = {str(cue["name"]): float(cue["fade_s"]) for cue in cues}
+            self._places = {str(cue["name"]): place for place, cue in enumerate(cues)}
             self._begin(self._stage.facts.show_directory)
             self._changes_at = now if self.instrument is None else now + CHANGE_S
         if now >= self._changes_at:
@@ -107,6 +110,7 @@ class Sound:
         state = self._show_state.read()
         entered = self._entrance.share(state.cue, self._strings.cues, self._fades, now)
         loud = state.level(now) * state[STRINGS].level(now) * entered
+        self.instrument.cue = self._places.get(state.cue, 0)
         self.instrument.level = loud * min(max(1.0 - (age_s - LOST_S) / FADE_S, 0.0), 1.0)
 
     def render(self, frames: int, show_state: ShowState) -> NDArray[np.float32]:

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose.skeleton import Skeleton
 from appliance.show.sound import BOWED_SAMPLES, StringsConfig
-from appliance.show.string_pitches import decays, string_pitches
+from appliance.show.string_pitches import PENTATONIC, decays, string_pitches
 
 Samples = NDArray[np.floating[Any]]
 
 STEP = BOWED_SAMPLES
+_SILENT = 1e-5
 _HIGHEST = 0.45  # fraction of the sample rate
+_BAR = (1.0, 2.756, 5.404, 8.933, 13.344, 18.638)  # partials of a bar with free ends (Fletcher and Rossing)
+_MOUTH = ((650.0, 80.0), (1080.0, 90.0), (2650.0, 120.0))  # formants of a sung "a": hertz, width (Fant 1960)
+
+
+class Preset(NamedTuple):
+    """bow, strike: how loud; decay: factor on the show's; ratios: of the partials, () harmonic."""
+
+    bow: float
+    strike: float
+    decay: float = 1.0
+    ratios: tuple[float, ...] = ()
+    formants: tuple[tuple[float, float], ...] = ()
+
+
+PRESETS = {
+    "strings": Preset(1.0, 1.0),
+    "voices": Preset(1.6, 0.3, 0.5, formants=_MOUTH),
+    "percussion": Preset(0.05, 2.0, 0.25, ratios=_BAR),
+}
 
 
 class Strings:
@@ -27,24 +48,33 @@ class Strings:
     bones (B, 2): joints from and to; hertz (B,): pitches; place (B,): angle around the stage, radians.
     """
 
-    def __init__(self, skeleton: Skeleton, config: StringsConfig, rate: int, seed: int = 0) -> None:
-        self.bones, self.hertz = string_pitches(skeleton, config.base_hz)
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        config: StringsConfig,
+        rate: int,
+        seed: int = 0,
+        scale: Sequence[int] = PENTATONIC,
+    ) -> None:
+        preset = PRESETS[config.preset]
+        self.bones, self.hertz = string_pitches(skeleton, config.base_hz, scale)
         count = len(self.bones)
         self.places: Samples = np.arange(count) * (2 * np.pi / max(count, 1))
         self._random = np.random.default_rng(seed)
         meet = (self.bones[:, None, :, None] == self.bones[None, :, None, :]).any(axis=(2, 3))
         frequencies, shares, gains = [], [], []
-        for partial in range(1, config.partials + 1):
+        partials = preset.ratios[: config.partials] or range(1, config.partials + 1)
+        for number, partial in enumerate(partials):
             stiffness = np.diag((2 * np.pi * partial * self.hertz) ** 2)
             ties = config.coupling * np.sqrt(np.outer(np.diag(stiffness), np.diag(stiffness))) * meet
             np.fill_diagonal(ties, 0.0)
             squares, vectors = np.linalg.eigh(stiffness + np.diag(ties.sum(axis=1)) - ties)
             frequencies.append(np.sqrt(np.maximum(squares, 1.0)))
             shares.append(vectors)
-            gains.append(np.full(count, config.brightness ** (partial - 1)))
+            gains.append(_formed(partial * self.hertz, preset.formants) * config.brightness**number)
         turning = np.concatenate(frequencies)
         audible = turning < 2 * np.pi * _HIGHEST * rate
-        decay = decays(turning, turning.min(), config.decay_s)
+        decay = decays(turning, turning.min(), config.decay_s * preset.decay)
         poles = (-decay + 1j * turning) / rate
         self.frequencies = turning / (2 * np.pi)
         self._from_strings = np.concatenate(shares, axis=1) * np.concatenate(gains) * audible
@@ -52,15 +82,26 @@ class Strings:
         self._state = np.zeros(len(turning), complex)
         self._ahead = np.exp(poles * STEP)
         self._ringing = np.exp(np.outer(poles, np.arange(STEP)))
-        self._loudness = config.volume * np.sqrt(decay / rate * STEP)
+        self._loudness = preset.bow * config.volume * np.sqrt(decay / rate * STEP)
+        self._strike = preset.strike * config.attacks * config.volume
 
     def still(self) -> None:
         """Stop all strings at once."""
         self._state[:] = 0.0
 
-    def render(self, drive: Samples, pan: Samples) -> Samples:
+    @property
+    def rings(self) -> bool:
+        """Whether anything is to be heard of them."""
+        return float(np.abs(self._state).max(initial=0.0)) > _SILENT
+
+    def strike(self, strength: Samples) -> None:
+        """Strike strings once, each as strongly as (B,) says, 0..1."""
+        self._state = self._state + 1j * self._strike * (strength @ self._from_strings)
+
+    def render(self, drive: Samples, pan: Samples, loud: Samples | None = None) -> Samples:
         """The next samples (steps x STEP, channels): drive (steps, B) is how strongly each string is bowed,
-        0..1; pan (B, channels) how loud it is on each loudspeaker.
+        0..1; pan (B, channels) how loud it is on each loudspeaker; loud (steps + 1, B): a factor on that at
+        the start of each step and at the end of the last, evenly between; None: 1.
         """
         steps = len(drive)
         pushes = self._random.choice((-1.0, 1.0), drive.shape) * drive
@@ -69,10 +110,26 @@ class Strings:
         for step in range(steps):
             states[step] = self._state = self._state + 1j * pushes[step]
             self._state = self._state * self._ahead
-        weights = pan.T @ self._to_strings
-        sounds = (weights[:, None, :] * states).reshape(-1, states.shape[1]) @ self._ringing
-        sound: Samples = sounds.real.reshape(len(weights), -1).T
-        return sound
+        if loud is None:
+            weights = (pan.T @ self._to_strings)[:, None, :]
+            return self._sounding(weights * states).reshape(pan.shape[1], -1).T
+        weights = (pan.T[:, None, :] * loud) @ self._to_strings  # (channels, steps + 1, modes)
+        before, after = self._sounding(weights[:, :-1] * states), self._sounding(weights[:, 1:] * states)
+        sound: Samples = before + (after - before) * (np.arange(STEP) / STEP)
+        return sound.reshape(pan.shape[1], -1).T
+
+    def _sounding(self, states: Samples) -> Samples:
+        """Samples (channels, steps, STEP) of states (channels, steps, modes) at each step's start."""
+        sound: Samples = (states.reshape(-1, states.shape[2]) @ self._ringing).real
+        return sound.reshape(*states.shape[:2], STEP)
+
+
+def _formed(hertz: Samples, formants: Sequence[tuple[float, float]]) -> Samples:
+    """Gains (B,) of partials at these frequencies behind a mouth's resonances; 1 without any."""
+    if not formants:
+        return np.ones(len(hertz))
+    gains: Samples = sum((1.0 / np.hypot(1.0, (hertz - at) / width) for at, width in formants), np.zeros(1))
+    return 0.15 + gains
 
 
 def around(places: Samples, channels: int) -> Samples:
