@@ -175,6 +175,8 @@ def _session(path: Path) -> tuple[onnxruntime.InferenceSession, dict[str, str]]:
         inputs = {value.name: value.shape for value in session.get_inputs()}
         outputs = {value.name for value in session.get_outputs()}
         facts: dict[str, str] = session.get_modelmeta().custom_metadata_map  # its words need be no text
+    except MemoryError:  # not the file's fault
+        raise
     except Exception as error:  # onnxruntime has a separate class for every kind of damage
         raise PuppetError(
             f"{path}: onnxruntime cannot read this network ({_short(error)}). {_CURE}"

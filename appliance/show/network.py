@@ -47,6 +47,8 @@ def inspect_network(path: Path, skeleton_joints: Sequence[str]) -> tuple[list[st
         facts: dict[str, str] = session.get_modelmeta().custom_metadata_map  # its words need be no text
         inputs = {port.name: port for port in session.get_inputs()}
         outputs = {port.name: port for port in session.get_outputs()}
+    except MemoryError:  # not the file's fault
+        raise
     except Exception as error:  # onnxruntime has its own exception for each way to be broken
         why = (str(error) or type(error).__name__).splitlines()[0][:120]
         return [], [(f"This cannot be read as a network ({why}).", COPY_AGAIN)]

@@ -6,10 +6,14 @@ import contextlib
 import os
 import select
 import signal
+import subprocess
+import sys
 
 import pytest
 
+from appliance.cli import run_with_timeout as run_with_timeout_module
 from appliance.cli.run_with_timeout import TimedOutError, run_with_timeout
+from appliance.release.choice import EMBEDDED_SHOW
 
 PATIENCE_S = 20.0
 
@@ -44,3 +48,21 @@ def test_a_child_that_has_not_left_its_parent_s_group_is_ended_too(monkeypatch: 
         os.close(reading)
         with contextlib.suppress(OSError):
             os.kill(children[0], signal.SIGKILL)
+
+
+def test_the_default_show_fits_into_the_least_limit() -> None:
+    """The limit of a computer with 2 GB, where shows with all their networks had been refused."""
+    done = _check_with(run_with_timeout_module._LEAST_MEMORY_BYTES)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_lack_of_memory_is_not_taken_for_a_damaged_file() -> None:
+    done = _check_with(300 << 20)
+    assert done.returncode != 0
+    assert "takes more memory" in done.stderr and "cannot be read" not in done.stderr
+
+
+def _check_with(most_bytes: int) -> subprocess.CompletedProcess[str]:
+    """`bunraku check` of the default show where a process may allocate so much."""
+    command = ["prlimit", f"--data={most_bytes}", sys.executable, "-m", "appliance.cli", "check"]
+    return subprocess.run([*command, "--show", str(EMBEDDED_SHOW)], capture_output=True, text=True)

@@ -163,5 +163,5 @@ def _hints(
             f"{done.was}, or: bunraku sensors revoke {done.was}{' --anyway' if was_worn else ''}"
         )
     if not done.identity.imu_id:
-        hints.append("It finds no IMU: look at the wires between the board and the IMU (docs/build-a-wearable.md).")
+        hints.append("It finds no IMU: look at the wires between board and IMU (docs/build-a-wearable.md).")
     return hints

@@ -63,6 +63,8 @@ class MotionNetwork:
             self._take_facts(facts)
             self.places = [list(skeleton_joints).index(name) for name in self.joints]
             self.ground = _ground(facts.get("bunraku.map", ""), self.latent)
+        except MemoryError:  # not the file's fault
+            raise
         except Exception as error:  # onnxruntime has its own exception for each way to be broken
             why = (str(error) or type(error).__name__).splitlines()[0][:120]
             raise MotionNetworkError(f"This cannot be read as a network of motion ({why}).") from None
