@@ -83,9 +83,19 @@ def test_an_error_is_one_line(tmp_path: Path) -> None:
 
 def test_play_loads_neither_parser_nor_simulation_nor_other_processes() -> None:
     """Loading modules prolongs the black stage after a crash."""
-    words = "import sys, appliance.start, appliance.cli.play; print(*sorted(sys.modules))"
-    ran = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
-    loaded = set(ran.stdout.split())
+    loaded = loaded_by("appliance.start", "appliance.cli.play")
     needless = {"typer", "rich", "click", "hw_sim", "matplotlib", "onnx", "torch", "subprocess"}
     needless |= {f"appliance.{name}" for name in ("cli.emulation", "cli.app", "cli.companions", "projector")}
     assert not loaded & needless
+
+
+def test_beside_its_companions_play_loads_no_web_server() -> None:
+    """Only the page's own process needs it: 12 MB of locked memory."""
+    loaded = loaded_by("appliance.cli.play", "appliance.cli.control", "appliance.cli.console")
+    assert "aiohttp" not in loaded and "ssl" not in loaded
+
+
+def loaded_by(*modules: str) -> set[str]:
+    words = f"import sys, {', '.join(modules)}; print(*sorted(sys.modules))"
+    ran = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
+    return set(ran.stdout.split())

@@ -29,7 +29,7 @@ from appliance.cli.page_address import address, address_of, open_console_port
 from appliance.cli.phones import offer_phones, out_of_phones_reach, phone_names
 from appliance.console.devices import Devices
 from appliance.console.settings import WHERE, Settings
-from appliance.console.update import pending_code
+from appliance.console.update_code import pending_code
 from appliance.show.config_error import NotAskedForError, Problem
 from appliance.stage.stage_error import StageError
 

@@ -20,10 +20,10 @@ from aiohttp import web
 
 from appliance.console.body import said
 from appliance.console.guard import Guard
+from appliance.console.update_code import CODE_FILE
 
 FOLDER = "update"  # in the runtime folder: the package, its signature, and `install` once it is wanted
 WANTED, RUNS = "install", "installing"  # bunraku-update.service renames one to the other
-CODE_FILE = "console.update"  # in the runtime folder: the code for the test card
 STICK = Path("/media/bunraku/bunraku/release")
 KEYS = Path("/opt/bunraku/current/keys")
 VALID_S = 600.0
@@ -207,13 +207,6 @@ class Update:
         self._code = None
         with contextlib.suppress(OSError):
             self._card.unlink(missing_ok=True)
-
-
-def pending_code(runtime: Path) -> str:
-    """The code for the test card; "": none is asked for."""
-    with contextlib.suppress(OSError):
-        return (runtime / CODE_FILE).read_text()
-    return ""
 
 
 def _letters() -> str:

@@ -11,7 +11,8 @@ import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestClient, TestServer
 
-from appliance.console.update import CODE_FILE, FOLDER, TRIES, WANTED, Update, pending_code
+from appliance.console.update import FOLDER, TRIES, WANTED, Update
+from appliance.console.update_code import CODE_FILE, pending_code
 
 DEB = "bunraku_0.3.0_arm64.deb"
 
