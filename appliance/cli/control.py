@@ -126,7 +126,7 @@ def foreign_ports(box: BoxConfig) -> tuple[ForeignPort, ...]:
             tuple(
                 SourceSettings(
                     *(one.name, one.from_, one.address or "", one.values or "", one.axes or ""),
-                    *(one.facing or "", one.bone or ""),
+                    *(one.facing or "", one.bone or "", one.drifts),
                 )
                 for one in sensors
             ),

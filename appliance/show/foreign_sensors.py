@@ -50,6 +50,11 @@ class ForeignSensorConfig(Section):
         "for z-up, z for the others.",
         None,
     )
+    drifts: bool = key(
+        "false for optical and magnetic trackers, whose heading does not drift: it is never corrected. "
+        "Inertial ones drift, a phone, SlimeVR and mocopi among them.",
+        True,
+    )
     bone: str | None = key("Bone or tracker, like LeftLowerArm or l_low_arm.", None, length=(1, 64))
 
     @property
@@ -66,7 +71,7 @@ class ForeignSensorConfig(Section):
     def _of_use(self) -> ForeignSensorConfig:
         program = self.program
         has_bones = program is not None and program.has_bones
-        useless = ["host", "port", "senders", "axes", "facing"] if program is None else []
+        useless = ["host", "port", "senders", "axes", "facing", "drifts"] if program is None else []
         useless += ["address", "values"] if program is None or has_bones else []
         useless += [] if has_bones else ["bone"]
         for name in useless:

@@ -38,7 +38,7 @@ class _Listener:
         self.settings = settings
         self.is_mocopi = any(one.program == "mocopi" for one in settings.sensors)
         self.sensors: list[tuple[OscSource | BoneSource, ForeignSensor]] = [
-            (one.source(), ForeignSensor(one.name, one.program, door)) for one in settings.sensors
+            (one.source(), ForeignSensor(one.name, one.program, door, one.drifts)) for one in settings.sensors
         ]
         self.port: Port | None = None
         self.trouble = ""

@@ -46,8 +46,10 @@ class ForeignSensor:
     Counts: `invalid` orientations, and readings that were `thinned`.
     """
 
-    def __init__(self, name: str, source: str, door: Door) -> None:
+    def __init__(self, name: str, source: str, door: Door, drifts: bool = True) -> None:
+        """drifts: whether its heading does; an optical tracker's does not, and is never corrected."""
         self.name, self.source = name, source
+        self._flags = wire.HAS_PROFILE | (0 if drifts else wire.IS_NDOF)
         self.counts: Counter[str] = Counter()
         self.taps = 0
         self._door = door
@@ -93,7 +95,7 @@ class ForeignSensor:
             wire.Reading(
                 *(self._device_id, boot.nonce, boot.session, sequence, int(now * 1e6) % (1 << 32)),
                 (w, x, y, z),
-                *(_CALIBRATED, battery, wire.ROUND_TRIP_UNKNOWN, self.taps % 256, 0, wire.HAS_PROFILE),
+                *(_CALIBRATED, battery, wire.ROUND_TRIP_UNKNOWN, self.taps % 256, 0, self._flags),
             )
         )
 
@@ -111,7 +113,7 @@ class ForeignSensor:
             self._send(
                 wire.Hello(
                     *(self._device_id, boot.nonce, 0, sequence, wire.WIRE_HASH, *_NO_FIRMWARE),
-                    *(self._battery, wire.HAS_PROFILE),
+                    *(self._battery, self._flags),
                     imu_id=imu_id,
                 )
             )

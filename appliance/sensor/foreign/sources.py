@@ -117,6 +117,7 @@ class SourceSettings:
     axes: str = ""
     facing: str = ""
     bone: str = ""
+    drifts: bool = True
 
     def source(self) -> OscSource | BoneSource:
         """A source that reads it."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from appliance.sensor import wire
 from appliance.sensor.foreign.door import FILE, Door, foreign_key, open_door
 from appliance.sensor.foreign.foreign_sensor import ForeignSensor
 from appliance.sensor.keys import SensorKey
@@ -52,6 +53,13 @@ class Pair:
 def pair(tmp_path: Path) -> Iterator[Pair]:
     with closing(Pair(tmp_path)) as pair:
         yield pair
+
+
+def test_a_tracker_that_does_not_drift_says_so_as_a_wearable_with_a_magnetometer_does(pair: Pair) -> None:
+    assert not pair.tick(20)[-1].flags & wire.IS_NDOF
+    pair.phone.close()
+    pair.phone = ForeignSensor(ARM, "phone", Door(pair.folder), drifts=False)
+    assert pair.tick(200)[-1].flags & wire.IS_NDOF  # SensorBinding.correct_heading leaves it alone
 
 
 def test_its_readings_are_those_of_a_wearable(pair: Pair) -> None:
