@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+_FEWEST, _GRID_S, _LONGEST_LAG_S, _SMOOTH_S, _ALIKE = 50, 0.002, 0.3, 0.08, 0.8  # of `lag_ms`
 Floats = NDArray[np.float64]
 
 BEFORE_STEP_S = 0.1  # the joint's orientation before a step is its mean over this long
@@ -147,6 +148,42 @@ def response_ms(step_times: Sequence[float], shown: Sequence[Shown]) -> Floats:
         if len(beyond):
             found.append(1000.0 * (times[during][beyond[0]] - moment))
     return np.array(found)
+
+
+def lag_ms(readings: Sequence[SentReading], shown: Sequence[Shown]) -> float | None:
+    """How late what is shown follows a hand that dances, ms; None: it does not follow.
+
+    The shift at which the hand's turning speed and that of the shown joint are most alike (the greatest
+    correlation; neutral pose and mounting do not matter to it).
+    """
+    sent = sorted({reading.sequence: reading for reading in readings}.values())
+    hand = [(reading.sampled_at, reading.orientation) for reading in sent]
+    seen = [(one.arrived_at, tuple(one.joint)) for one in shown]
+    if min(len(hand), len(seen)) < _FEWEST:
+        return None
+    begin, end = max(hand[0][0], seen[0][0]), min(hand[-1][0], seen[-1][0]) - _LONGEST_LAG_S
+    grid = np.arange(begin, end, _GRID_S)
+    if len(grid) < _FEWEST:
+        return None
+    wanted = _speeds(hand, grid)
+    lags = np.arange(0.0, _LONGEST_LAG_S, _GRID_S)
+    alike = np.array([np.corrcoef(wanted, _speeds(seen, grid + lag))[0, 1] for lag in lags])
+    best = int(np.argmax(alike))
+    if not 0 < best < len(lags) - 1 or alike[best] < _ALIKE:
+        return None
+    before, peak, after = alike[best - 1 : best + 2]
+    return float(1000.0 * (lags[best] + _GRID_S * 0.5 * (before - after) / (before - 2.0 * peak + after)))
+
+
+def _speeds(turned: Sequence[tuple[float, Sequence[float]]], grid: Floats) -> Floats:
+    """Degrees a second at times (N,) of an orientation at its own times: smoothed over _SMOOTH_S."""
+    times = np.array([at for at, _ in turned])
+    rotations = _continuous(np.array([rotation for _, rotation in turned]))
+    first, last = grid - _SMOOTH_S / 2.0, grid + _SMOOTH_S / 2.0
+    here = [np.stack([np.interp(at, times, part) for part in rotations.T], -1) for at in (first, last)]
+    steps = np.linalg.norm(here[1] - here[0], axis=-1)
+    speeds: Floats = np.degrees(2.0 * steps) / _SMOOTH_S
+    return speeds
 
 
 def percentiles(values: Floats, which: Mapping[str, float]) -> dict[str, float | None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
@@ -88,11 +89,11 @@ def measure(
             print(f"Killing and starting the box {times} times ...", flush=True)
             page.tell(phase="restarts", times=times)
             restarts = run_restarts(setting, times)
-            seen = None
+            seen = []
             if light:
                 print(f"Watching the projector's pictures for {free_s:g} s ...", flush=True)
-                seen = run(setting, light_course(free_s))
-            evidence = Evidence(locked, free, power_ons, restarts, firmware, seen)
+                seen = [run(setting, course) for course in light_courses(free_s)]
+            evidence = Evidence(locked, free, power_ons, restarts, firmware, *seen)
     except (ProbeError, OSError, ValueError) as error:
         message = sentence(error) if isinstance(error, OSError) else None
         print(f"bunraku measure: {message or error}", file=sys.stderr)
@@ -132,9 +133,10 @@ def power_on_course(seconds: float, powered_s: float) -> Course:
     return Course("power-ons", (powered_s + REBOOT_S) * power_ons, seed=3, reboot_every_s=powered_s)
 
 
-def light_course(seconds: float) -> Course:
-    """In phase, with the projector; the phrase stands still but for the first seconds."""
-    return Course("light", seconds, seconds - 2.0, drift_ppm=LOCKED_DRIFT_PPM, seed=4, projects=True)
+def light_courses(seconds: float) -> tuple[Course, Course]:
+    """In phase, with the projector: a hand that steps, one that dances; the phrase soon stands still."""
+    steps = Course("light", seconds, seconds - 2.0, drift_ppm=LOCKED_DRIFT_PPM, seed=4, projects=True)
+    return steps, replace(steps, name="light-dance", dances=True)
 
 
 def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool) -> Setting:

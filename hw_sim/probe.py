@@ -48,7 +48,8 @@ STEADY_S = 1.0  # how long the box dances with the sensor before it is killed
 class Course:
     """Plan of one run. In its last `standing_s` the phrase stands still, so that only steps show.
 
-    projects: a projector shows the dance on the screen, and its pictures are watched.
+    projects: a projector shows the dance on the screen, and its pictures are watched. dances: the hand
+    dances, in place of steps.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Course:
     seed: int = 1
     reboot_every_s: float | None = None
     projects: bool = False
+    dances: bool = False
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,7 @@ def run_restarts(setting: Setting, times: int) -> list[Restart]:
 
 def _options(course: Course) -> list[str]:
     options = ["--seed", str(course.seed), "--drift-ppm", str(course.drift_ppm)]
+    options += ["--motion", "dance"] if course.dances else []
     return options + (["--reboot-every", str(course.reboot_every_s)] if course.reboot_every_s else [])
 
 

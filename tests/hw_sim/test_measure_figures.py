@@ -12,6 +12,7 @@ from hw_sim.latency import (
     Frame,
     Restart,
     SentReading,
+    lag_ms,
     missing_frames,
     percentiles,
     power_on_s,
@@ -19,8 +20,9 @@ from hw_sim.latency import (
     steps,
     transport,
 )
-from hw_sim.motions import about
+from hw_sim.motions import about, dance, multiply
 from hw_sim.probe import Run
+from hw_sim.screen import Picture
 
 AXIS = (0.0, 1.0, 0.0)
 STEP_S = 0.6
@@ -202,3 +204,22 @@ def test_each_limit_fails_by_itself(change: dict[str, Any], words: str) -> None:
     failed = [line for line in table(figures, verdict(figures)) if line.startswith("FAIL")]
     assert failed
     assert any(words in line for line in failed)
+
+
+@pytest.mark.parametrize("late_s", [0.03, 0.055, 0.09])
+def test_the_lag_of_a_dancing_hand_is_found_whatever_its_neutral_pose(late_s: float) -> None:
+    hand, other = dance(3), np.array([0.5, -0.5, 0.5, 0.5])
+    sent = [SentReading(n, 10.0 + 0.02 * n, 10.0 + 0.02 * n, hand(0.02 * n)) for n in range(300)]
+    at_s = 10.05 + np.arange(220) / 40.0
+    shown = [
+        Picture(float(at), np.array(multiply(tuple(other), hand(float(at) - late_s - 10.0)))) for at in at_s
+    ]
+    assert lag_ms(sent, shown) == pytest.approx(1000.0 * late_s, abs=2.0)
+
+
+def test_a_joint_that_does_its_own_dance_has_no_lag() -> None:
+    hand, another = dance(3), dance(4)
+    sent = [SentReading(n, 10.0 + 0.02 * n, 10.0 + 0.02 * n, hand(0.02 * n)) for n in range(300)]
+    shown = [Picture(10.0 + n / 40.0, np.array(another(n / 40.0))) for n in range(240)]
+    assert lag_ms(sent, shown) is None
+    assert lag_ms(sent[:3], shown) is None
