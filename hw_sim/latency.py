@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-_FEWEST, _GRID_S, _LONGEST_LAG_S, _SMOOTH_S, _ALIKE = 50, 0.002, 0.3, 0.08, 0.8  # of `lag_ms`
+_FEWEST, _GRID_S, _LONGEST_LAG_S, _SMOOTH_S, _ALIKE = 50, 0.002, 0.3, 0.08, 0.8  # for `lag_ms`
 Floats = NDArray[np.float64]
 
 BEFORE_STEP_S = 0.1  # the joint's orientation before a step is its mean over this long

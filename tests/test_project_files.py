@@ -50,7 +50,7 @@ def test_a_workflow_has_few_rights_a_limit_and_pinned_actions(workflow: Path) ->
     document = yaml.safe_load(workflow.read_text())
     assert document["permissions"] == {"contents": "read"}
     for job in document["jobs"].values():
-        assert 0 < job["timeout-minutes"] <= 120
+        assert 0 < job["timeout-minutes"] <= 240  # an arm64 machine in software takes hours
         assert job["runs-on"] == "ubuntu-24.04"
     for step in steps(workflow):
         used = step.get("uses", "x@v1")

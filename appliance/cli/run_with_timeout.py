@@ -13,8 +13,8 @@ from collections.abc import Callable
 from appliance.box.parent_death import end_with
 
 CHECK_S = 30.0  # for a show: some seconds on a slow box
-# Of what a process allocates, more than it uses: the default show with all its networks allocates 560 MB
-# and uses 130. The limit stops a network that takes everything.
+# The limit counts allocated memory: the default show with all its networks allocates 560 MB and uses 130. It
+# stops a network that takes everything.
 _OF_ALL_MEMORY, _LEAST_MEMORY_BYTES = 0.4, 800 << 20
 
 

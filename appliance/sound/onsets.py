@@ -12,7 +12,7 @@ from appliance.pose.skeleton import Skeleton
 Floats = NDArray[np.float64]
 SUDDEN_M_S = 0.6  # by so much a bone is faster than it was on average: a move starts
 FULL_M_S = 2.5  # and by so much, or a foot that falls as fast, strikes fully
-_MEAN_S = 0.2  # of that average
+_MEAN_S = 0.2  # window of that average
 _REST_S = 0.2  # from one strike of a string to its next
 _FALLS_M_S, _STANDS_M_S = 0.3, 0.1  # a landing: faster downwards than the first, then slower than the second
 _LOW_M = 0.12  # above where a foot stands: higher up it stops in the air
