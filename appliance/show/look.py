@@ -44,7 +44,7 @@ class CameraConfig(Section):
     follow: float = key(
         "How closely it follows: 1 keeps the dancer in the middle, 0 lets the dancer travel; "
         "before an arm leaves the picture it moves or draws back.",
-        0.75,
+        1.0,
         within=(0, 1),
     )
     sweep_deg: float = key("How far drift sways to either side.", 16.0, within=(0, 90))

@@ -62,6 +62,31 @@ def test_no_joint_leaves_the_picture(dance: Recording, config: CameraConfig, asp
             assert np.abs(joints).max() < 0.97
 
 
+@pytest.mark.parametrize(
+    ("aspect", "in_middle", "sizes"), [(16 / 9, 1.0, 1.2), (4 / 3, 1.0, 1.2), (9 / 16, 0.95, 1.4)]
+)
+def test_figure_stays_in_the_middle_third_and_of_one_size(
+    dance: Recording, aspect: float, in_middle: float, sizes: float
+) -> None:
+    """Share of pictures with the middle of the joints in the middle third both ways; largest to smallest size
+    of a standing figure. A camera that lets the dancer travel does worse, so the limits can be missed."""
+
+    def framed(config: CameraConfig) -> tuple[float, float]:
+        middles, heights = [], []
+        for time_s in np.arange(1.5, dance.seconds, 0.5):
+            moment = moment_of(dance, float(time_s))
+            at, joints = seen(moment, config, aspect)
+            middles.append(0.5 * (joints.min(axis=0) + joints.max(axis=0)))
+            root = np.append(moment.puppets[0].positions[0] / HEIGHT, 1.0)
+            heights.append(1.0 / float((at.projection @ root)[3]))
+        return float((np.abs(middles) < 1 / 3).all(axis=1).mean()), max(heights) / min(heights)
+
+    share, ratio = framed(CameraConfig())
+    assert share >= in_middle and ratio < sizes
+    travelling = framed(CameraConfig(follow=0.0))
+    assert travelling[0] < in_middle and travelling[1] > sizes
+
+
 def test_a_jump_of_the_phrase_is_still_in_the_picture(dance: Recording) -> None:
     """Where a phrase starts over the dancer is elsewhere from one tick to the next."""
     moment = moment_of(dance, 20.0)
