@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ssl
 import time
+from typing import Any
 
 import pytest
 
@@ -46,7 +47,14 @@ def test_a_kept_cue_is_in_the_show_that_the_box_dances(dancing: Box, device: Dev
     """What reads the show, its map and its copy runs in the page's own sandbox, too."""
     device.await_that(lambda: device.ask("/api/me")[1]["rehearsal"], "no rehearsal")
     assert device.ask("/api/map")[0] in (200, 404), "404: a show without a map, in its own words"
-    status, words = device.ask("/api/cue", {"name": "found"})
+    answers: list[tuple[int, Any]] = []
+
+    def knows_the_settings() -> bool:
+        answers.append(device.ask("/api/cue", {"name": "found"}))
+        return answers[-1][0] != 409
+
+    device.await_that(knows_the_settings, "the page knows no settings of the stage")
+    status, words = answers[-1]
     assert status == 200, words
     status, answer = device.ask("/api/cue/dance", {})
     assert (status, answer.get("problems")) == (200, []), answer

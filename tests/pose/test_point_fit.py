@@ -84,11 +84,11 @@ def off(layout: str, rng: random.Random) -> dict[str, tuple[list[float], list[fl
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_the_pose_comes_back_from_its_points(layout: str, rng: random.Random) -> None:
-    """Limbs point where they pointed within a tenth of a degree; hips and chest within 25 degrees (95 %), as
+    """Limbs point where they pointed within a tenth of a degree; hips and chest within 35 degrees (95 %), as
     no point says how the spine is shared between them. A T-pose and the pose before are far off.
     """
     for part, (fitted, t_pose, before) in off(layout, rng).items():
-        most = 25.0 if part in ("Hips", "Chest") else 0.1
+        most = 35.0 if part in ("Hips", "Chest") else 0.1
         assert np.percentile(fitted, 95) < most, part
         if part not in ("Hips", "Chest"):
             assert np.mean(t_pose) > 100.0 * np.mean(fitted) and np.mean(before) > 20.0 * np.mean(fitted), (
