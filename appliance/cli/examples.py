@@ -85,12 +85,20 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     "experiment": ("bunraku experiment --out out/experiment",),
     "granular": ("bunraku granular my_show/checkpoint.pt --out phrase.bvh --seconds 60",),
     "improvise": (
+        "bunraku improvise --show default --out continued.bvh",
         "bunraku improvise my_show/checkpoint.pt --out phrase.bvh",
         "bunraku improvise my_show/checkpoint.pt --out next.bvh --prompt take.bvh --from 12",
     ),
-    "vary": ("bunraku vary phrase.bvh --model out/sequence/checkpoint.pt --out out/variations",),
-    "map": ("bunraku map takes/solo_3.bvh --model out/pose/checkpoint.pt --out out/map",),
+    "vary": (
+        "bunraku vary --show default --out out/variations",
+        "bunraku vary phrase.bvh --model out/sequence/checkpoint.pt --out out/variations",
+    ),
+    "map": (
+        "bunraku map --show default --out out/map",
+        "bunraku map takes/solo_3.bvh --model out/pose/checkpoint.pt --out out/map",
+    ),
     "path": (
+        "bunraku path --show default --wobble 0.3 1 --out wobble.bvh",
         "bunraku path phrase.bvh --model out/pose/checkpoint.pt --out wobble.bvh --wobble 0.1 0.5",
         "bunraku path --model out/pose/checkpoint.pt --out drawn.bvh --draw map.svg",
     ),

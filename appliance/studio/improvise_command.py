@@ -11,6 +11,7 @@ from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.clear_errors import INTERRUPTED, clear_errors
+from appliance.studio.model_or_show import OfShow
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -28,6 +29,7 @@ def improvise(
         Path | None,
         typer.Option(help="checkpoint.pt of bunraku train --model improviser, instead of training one."),
     ] = None,
+    show: OfShow = None,
     recordings: Annotated[
         Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
     ] = None,
@@ -54,9 +56,22 @@ def improvise(
 
     The improviser is stored beside the phrase. If its training was stopped, the same command continues it.
     A trained one dances at once, and another --seed gives another phrase. With --prompt it continues a
-    recording. The published network (--model, lstm-mixtures) makes no endless phrase: it continues the
+    recording. With --show the show's improviser continues --prompt, or a moment of the show's phrase.
+    The published network (--model, lstm-mixtures) makes no endless phrase: it continues the
     prompt, or a recorded moment that --seed chooses.
     """
+    if show is not None:
+        others = (
+            "checkpoint",
+            "model",
+            "recordings",
+            "minutes",
+            "steps",
+            "dances",
+            "dance_minutes",
+            "threads",
+        )
+        refuse_idle(context, others, "with --show, whose improviser is trained and continues a phrase")
     if model is not None:
         refuse_idle(context, ("minutes", "steps"), "with --model, which is trained already")
     elif steps:
@@ -66,23 +81,29 @@ def improvise(
     else:
         refuse_idle(context, ("dances", "dance_minutes"), "with --prompt")
     with clear_errors("improvise"):
-        from appliance.studio.improviser import improvisation
-        from appliance.studio.improviser.phrase import PhraseOptions
+        from appliance.studio.improviser.improvise_options import ImproviseOptions, PhraseOptions
 
-        done = improvisation.run(
-            improvisation.ImproviseOptions(
-                checkpoint=checkpoint,
-                out=out,
-                recordings=recordings,
-                model=model,
-                minutes=minutes,
-                steps=steps,
-                threads=threads,
-                phrase=PhraseOptions(seconds, seed, temperature, dances, dance_minutes),
-                prompt=prompt,
-                prompt_end=prompt_end,
-                reading=reading,
-            )
+        options = ImproviseOptions(
+            checkpoint=checkpoint,
+            out=out,
+            recordings=recordings,
+            model=model,
+            minutes=minutes,
+            steps=steps,
+            threads=threads,
+            phrase=PhraseOptions(seconds, seed, temperature, dances, dance_minutes),
+            prompt=prompt,
+            prompt_end=prompt_end,
+            reading=reading,
+            show=show,
         )
+        if show is not None:
+            from appliance.studio.improviser.continuing import continue_of_show
+
+            continue_of_show(options)
+            return
+        from appliance.studio.improviser import improvisation
+
+        done = improvisation.run(options)
     if not done:
         raise typer.Exit(INTERRUPTED)

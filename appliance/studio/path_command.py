@@ -11,10 +11,11 @@ from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.clear_errors import clear_errors
+from appliance.studio.model_or_show import OfShow, require_either
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
-Model = Annotated[Path, typer.Option(help="checkpoint.pt of bunraku train --model pose.")]
+Model = Annotated[Path | None, typer.Option(help="checkpoint.pt of bunraku train --model pose.")]
 Moved = Annotated[
     Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
 ]
@@ -24,11 +25,13 @@ Moved = Annotated[
 @reading_options
 def path(
     context: typer.Context,
-    model: Model,
     out: Annotated[Path, typer.Option(help="The dance, a BVH file; its figures and picture lie beside it.")],
     phrase: Annotated[
-        Path | None, typer.Argument(help="BVH of the phrase that wobbles.", show_default=False)
+        Path | None,
+        typer.Argument(help="BVH of the phrase that wobbles.", show_default="the phrase of --show"),
     ] = None,
+    model: Model = None,
+    show: OfShow = None,
     wobble: Annotated[
         tuple[float, float] | None,
         typer.Option(
@@ -50,7 +53,9 @@ def path(
 
     A phrase's own path with a wobble, or a line that you draw over the map that bunraku map writes.
     """
-    if (wobble is None) == (draw is None) or (phrase is None) != (wobble is None):
+    require_either(context, model, show)
+    has_phrase = phrase is not None or (show is not None and draw is None)
+    if (wobble is None) == (draw is None) or has_phrase != (wobble is not None):
         raise typer.BadParameter("Give a PHRASE with --wobble AMPLITUDE FREQUENCY, or --draw FILE.")
     if wobble is not None and not (0 <= wobble[0] <= 5 and 0 < wobble[1] <= 10):
         raise typer.BadParameter("--wobble takes an amplitude of 0 to 5 and a frequency up to 10 Hz.")
@@ -59,14 +64,19 @@ def path(
     with clear_errors("path"):
         from appliance.studio.pose_space.path import PathOptions, run
 
-        run(PathOptions(model, out, phrase, recordings, wobble, draw, seed, start, seconds, reading))
+        run(PathOptions(model, out, show, phrase, recordings, wobble, draw, seed, start, seconds, reading))
 
 
 @app.command(name="map")
 @reading_options
 def map_(
-    files: Annotated[list[Path], typer.Argument(help="BVH recordings to lay over the map.")],
-    model: Model,
+    context: typer.Context,
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(help="BVH recordings to lay over the map.", show_default="the phrase of --show"),
+    ] = None,
+    model: Model = None,
+    show: OfShow = None,
     out: Annotated[
         Path, typer.Option(help="Folder for the page, the pictures and the sheet to draw on.")
     ] = Path("out/map"),
@@ -80,7 +90,10 @@ def map_(
     PCA, the pose autoencoder and, where umap-learn is installed, UMAP side by side; a page to turn in a
     browser, without a network; with two recordings of the same phrase their distance over time.
     """
+    require_either(context, model, show)
+    if not files and show is None:
+        raise typer.BadParameter("Give the recordings to lay over the map, or --show for its phrase.")
     with clear_errors("map"):
         from appliance.studio.pose_space.pose_map import MapOptions, run
 
-        run(MapOptions(model, out, tuple(files), recordings, seconds, reading))
+        run(MapOptions(model, out, tuple(files or ()), show, recordings, seconds, reading))

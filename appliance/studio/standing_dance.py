@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from appliance.dancer.grounding import Floor, Grounding, survey
 from appliance.dancer.material.steps import floor_under
 from appliance.pose import quaternion
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
@@ -44,18 +45,33 @@ def excerpt_of(
     return replace(excerpt, roots=roots)
 
 
-def standing(poses: Poses, given: Recording | None, dataset: Dataset, progress: Progress = iter) -> Recording:
+def standing(
+    poses: Poses, given: Recording | None, dataset: Dataset, progress: Progress = iter, is_quick: bool = False
+) -> Recording:
     """Poses (T, M, 4) of the moving joints with all joints, on the path of a recording or on the spot.
 
     The feet are planted in a cycle: danced there and back, a dance is one. progress: through the steps.
+    is_quick: they stand as the stage stands them, tick by tick, which takes no torch.
     """
     dance = on_the_spot(poses, dataset) if given is None else _on_its_path(poses, given, dataset)
+    if is_quick:
+        return as_on_stage(dance, survey(dance if given is None else given), progress)
     there_and_back = replace(
         dance,
         poses=quaternion.continuous(np.concatenate([dance.poses, dance.poses[::-1]])),
         roots=np.concatenate([dance.roots, dance.roots[::-1]]),
     )
     return plant_feet(there_and_back, progress=progress).excerpt(0.0, len(poses) / FPS)
+
+
+def as_on_stage(dance: Recording, floor: Floor, progress: Progress = iter) -> Recording:
+    """The dance as the box stands it on the floor of a recording that is no shorter: root, feet, arms."""
+    grounding, free = Grounding(dance.skeleton, floor), np.zeros(len(dance.skeleton), dtype=np.float32)
+    poses, roots = (each.astype(np.float32) for each in (dance.poses, dance.roots))
+    for tick in progress(range(len(dance))):
+        grounding.ground_pose(poses[tick], roots[tick], float(floor.lifts[tick]), None, free)
+        poses[tick], roots[tick] = grounding.pose, grounding.root
+    return replace(dance, poses=quaternion.continuous(poses.astype(float)), roots=roots.astype(float))
 
 
 def on_the_spot(poses: Poses, dataset: Dataset) -> Recording:

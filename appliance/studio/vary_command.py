@@ -12,6 +12,7 @@ from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.clear_errors import clear_errors
+from appliance.studio.model_or_show import OfShow, require_either
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -28,10 +29,14 @@ class Region(StrEnum):
 @reading_options
 def vary(
     context: typer.Context,
-    model: Annotated[Path, typer.Option(help="checkpoint.pt of bunraku train --model sequence.")],
     phrase: Annotated[
-        Path | None, typer.Argument(help="BVH of the phrase; left out with --free.", show_default=False)
+        Path | None,
+        typer.Argument(help="BVH of the phrase; left out with --free.", show_default="the phrase of --show"),
     ] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="checkpoint.pt of bunraku train --model sequence.")
+    ] = None,
+    show: OfShow = None,
     out: Annotated[
         Path, typer.Option(help="Folder for the variations, their strip and their figures.")
     ] = Path("out/variations"),
@@ -69,9 +74,11 @@ def vary(
     """Make variations of a phrase: other timing and expression, or something new with an element kept.
 
     The phrase becomes a point of a model that knows what this dancer does in two and a half seconds; noise
-    moves the point ('Beyond Imitation'). Each variation is a BVH file that plays in a show.
+    moves the point ('Beyond Imitation'). Each variation is a BVH file that plays in a show. With --show the
+    show's own network does it at once, without a training.
     """
-    if (phrase is None) != free:
+    require_either(context, model, show)
+    if (phrase is not None and free) or (phrase is None and not free and show is None):
         raise typer.BadParameter("Give a PHRASE, or --free for samples without one.")
     if free:
         refuse_idle(context, ("mix", "share", "region", "start", "seconds"), "without a PHRASE")
@@ -86,6 +93,8 @@ def vary(
         run(
             VaryOptions(
                 model=model,
+                show=show,
+                is_free=free,
                 out=out,
                 phrase=phrase,
                 recordings=recordings,

@@ -13,8 +13,9 @@ from appliance.dancer.material import latent_paths
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.coded_windows import decoded, encoded
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back, once
+from appliance.studio.granular.granular import cycle, fed_back, once
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, untrained
 

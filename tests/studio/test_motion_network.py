@@ -14,10 +14,10 @@ from appliance.dancer.material.motion_network import MotionNetwork, MotionNetwor
 from appliance.pose import quaternion
 from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.coded_windows import encoded
 from appliance.studio.export import improviser_network as export
 from appliance.studio.export.improviser_network import export_improviser
 from appliance.studio.export.motion_network import write_motion_network
-from appliance.studio.granular.granular import encoded
 from appliance.studio.improviser.improviser import Improviser
 from appliance.studio.improviser.moves import MovesShape
 from appliance.studio.studio_error import StudioError

@@ -10,36 +10,9 @@ import numpy as np
 import torch
 
 from appliance.dancer.blending import Blending
-from appliance.dancer.material.latent_paths import Latents
 from appliance.pose import quaternion
-from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.evaluation.coders import Poses
-
-
-@torch.no_grad()
-def decoded(
-    autoencoder: Autoencoder, path: Latents, facing: Array | None = None, is_raw: bool = False
-) -> Poses:
-    """Latents (W, Z) -> windows (W, T, M, 4); facing: (W, 4), left out: ahead.
-
-    is_raw: quaternions as the network gives them, the longer the more certain it is.
-    """
-    decode = autoencoder.decode_raw if is_raw else autoencoder.decode
-    windows = decode(torch.from_numpy(path))
-    if facing is not None:
-        windows = autoencoder.with_heading(windows, torch.from_numpy(facing.astype(np.float32)))
-    made: Poses = windows.numpy()
-    return made
-
-
-@torch.no_grad()
-def encoded(autoencoder: Autoencoder, windows: Poses) -> tuple[Latents, Array]:
-    """Windows (W, T, M, 4) -> latents (W, Z), and where each of them faces (W, 4)."""
-    given = torch.from_numpy(windows)
-    facing = autoencoder.facing(given)
-    latents: Latents = autoencoder.encode(autoencoder.without_heading(given, facing)).numpy()
-    return latents, facing.numpy()
 
 
 def once(windows: Poses, hop: int) -> Poses:

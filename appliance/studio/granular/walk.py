@@ -13,10 +13,11 @@ from appliance.dancer.material import latent_paths
 from appliance.pose import quaternion
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.coded_windows import decoded, encoded
 from appliance.studio.dance_files import write_dance
 from appliance.studio.data.dataset import FPS, Dataset, Take
 from appliance.studio.evaluation.coders import Poses, load_checkpoint
-from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back, once
+from appliance.studio.granular.granular import cycle, fed_back, once
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 from rich.console import Console
 
-from appliance.dancer.material.steps import Steps, floor_under
-from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
-from appliance.pose.recording import Recording
+from appliance.dancer.material.steps import Steps
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.dance_files import write_dance
-from appliance.studio.data.dataset import FPS, Dataset, window_starts
+from appliance.studio.data.dataset import Dataset
 from appliance.studio.disk_room import require_room
-from appliance.studio.evaluation.coders import MovedJoints, TorchCoder, load_puppet, load_state
+from appliance.studio.evaluation.coders import TorchCoder, load_puppet, load_state
+from appliance.studio.improviser.continuing import continue_prompt
+from appliance.studio.improviser.improvise_options import ImproviseOptions, PhraseOptions
+from appliance.studio.improviser.improviser import Networks
 from appliance.studio.improviser.improviser_training import (
     ImproviserSettings,
     ImproviserTraining,
@@ -30,35 +30,16 @@ from appliance.studio.improviser.learning import (
     steps_of_dataset,
     train_until_done,
 )
-from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
-from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
+from appliance.studio.improviser.phrase import make_phrase, verdict
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSettings, load_pose_improviser
-from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
+from appliance.studio.improviser.prompt import MovesFollower
+from appliance.studio.improviser.steps import WindowCoder
 from appliance.studio.model_uses import IMPROVISER
-from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
 
 Say = Callable[[str], None]
-PROMPT_S = 3.0  # seconds of a recording, where the published improviser gets no prompt
-
-
-@dataclass(frozen=True)
-class ImproviseOptions:
-    """The command line of bunraku improvise. checkpoint: of a puppet; model: of a trained improviser."""
-
-    checkpoint: Path | None
-    out: Path
-    recordings: Path | None = None
-    model: Path | None = None
-    minutes: float = 12.0
-    steps: int = 0
-    threads: int = 0
-    phrase: PhraseOptions = field(default_factory=PhraseOptions)
-    prompt: Path | None = None
-    prompt_end: float | None = None  # seconds of the prompt; None: all of it
-    reading: ReadingOptions = AS_THE_FILES_SAY
 
 
 def run(options: ImproviseOptions) -> bool:
@@ -94,7 +75,9 @@ def run(options: ImproviseOptions) -> bool:
             return False
         improviser, settings, learned = training.averaged, asdict(training.settings), training.step
     if options.prompt is not None:
-        continue_prompt(options, MovesFollower(coder.autoencoder, improviser), coder, dataset, say)
+        continue_prompt(
+            options, MovesFollower(WindowCoder(coder.autoencoder), Networks(improviser)), coder, dataset, say
+        )
         return True
     phrase, natural = make_phrase(coder.autoencoder, improviser, dataset, steps, options.phrase, say)
     report: dict[str, Any] = {
@@ -118,36 +101,6 @@ def _require_no_loop(options: ImproviseOptions) -> None:
             f"{options.model} needs no dancer and makes no endless phrase: a CHECKPOINT, --dances and "
             "--dance-minutes do nothing. Leave them out."
         )
-
-
-def continue_prompt(
-    options: ImproviseOptions, follower: Follower, moves: MovedJoints, dataset: Dataset, say: Say
-) -> None:
-    """The prompt and what the improviser dances after it, with a report and a picture.
-
-    Without a prompt it goes on from a recorded moment, which is cut away: the seed chooses it.
-    """
-    end = 1e9 if options.prompt_end is None else options.prompt_end
-    prompt = (
-        _recorded_moment(dataset, options.phrase.seed)
-        if options.prompt is None
-        else excerpt_of(options.prompt, 0.0, end, moves, dataset, options.reading)
-    )
-    asked = options.phrase
-    made = continued(follower, dataset, prompt, asked.seconds, asked.temperature, asked.seed)
-    figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
-    dance, words = made.dance, f"the prompt ends at {made.joined_s:.1f} s"
-    if options.prompt is None:
-        dance, figures, words = dance.excerpt(made.joined_s), {}, "after a recorded moment"
-    natural = measure(dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
-    report = {"phrase": asdict(asked), **figures, "naturalness": natural.as_json()}
-    write_dance(options.out, dance, f"{options.out.stem}: {words}", report, rows=3)
-    seam = (
-        f" The largest step of a joint around there is {made.seam:.1f} degrees, {made.usual:.1f} are usual "
-        "in the prompt."
-    )
-    Console().print(naturalness_table({options.out.stem: natural}))
-    say(f"{options.out}: {dance.seconds:.1f} s; {words}.{seam if figures else ''}")
 
 
 def improviser_file(out: Path) -> Path:
@@ -180,19 +133,6 @@ def _puppet(
             "checkpoint.pt as the argument, or train again with --puppet."
         )
     return coder, puppet_state, puppet
-
-
-def _recorded_moment(dataset: Dataset, seed: int) -> Recording:
-    """A few seconds of a training take, its floor at height 0."""
-    rng, frames = np.random.default_rng(seed), round(PROMPT_S * FPS)
-    starts = [(take, first) for take in dataset.training for first in window_starts(take, window=frames)]
-    if not starts:
-        raise StudioError(f"No recording has {PROMPT_S:g} s without a capture error. Give a --prompt.")
-    take, first = starts[int(rng.integers(len(starts)))]
-    moment = take.recording.excerpt(first / FPS, (first + frames) / FPS)
-    roots = moment.roots.copy()
-    roots[:, 1] -= floor_under(moment)
-    return replace(moment, roots=roots)
 
 
 def _training(

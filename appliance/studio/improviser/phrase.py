@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -11,15 +11,17 @@ import torch
 from appliance.dancer.loop import turns_about_y, yaws
 from appliance.dancer.material.carrying import smoothed
 from appliance.dancer.material.improvising import MOVE
-from appliance.dancer.material.steps import HOP, Steps, danced_again, motion_of
+from appliance.dancer.material.steps import Steps, danced_again, motion_of
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import FPS, Dataset
 from appliance.studio.improviser.footing import plant_feet
+from appliance.studio.improviser.improvise_options import PhraseOptions
 from appliance.studio.improviser.improviser import Improviser
 from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
+from appliance.studio.improviser.prompt import PRIMER, STEPS_S
 from appliance.studio.improviser.steps import WindowCoder
 from appliance.studio.improviser.stretches import best_stretches
 from appliance.studio.studio_error import StudioError
@@ -27,21 +29,6 @@ from appliance.studio.studio_error import StudioError
 SEAM_S = 0.8  # length of the crossfade from the end to the start
 STAGE_M = 3.6  # width and depth of the root's path; arms and steps need the rest of 4 m
 STROLL_FRAMES = 401  # slower motion than this is the way over the stage, not steps
-PRIMER = 35  # steps of a recording that the improviser continues: 2.8 s
-STEPS_S = FPS / HOP
-
-
-@dataclass(frozen=True)
-class PhraseOptions:
-    """How to make a phrase."""
-
-    seconds: float = 90.0
-    seed: int = 1
-    temperature: float = 1.2
-    dances: int = 16
-    minutes: float = 4.0  # length of each dance
-    finalists: int = 4
-    settling: int = 250  # iterations of gradient descent that plant the feet
 
 
 def make_phrase(

@@ -7,22 +7,19 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-import torch
 
 from appliance.dancer.loop import Placement, smooth, turns_about_y, yaws
-from appliance.dancer.material.improvising import BEFORE, MOVE
-from appliance.dancer.material.steps import HOP, Steps, danced_again, motion_of, steps_of
+from appliance.dancer.material.improvising import BEFORE, MOVE, Choreographer, improvised
+from appliance.dancer.material.steps import HOP, Coder, Steps, danced_again, motion_of, steps_of
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset
-from appliance.studio.improviser.improviser import Improviser
-from appliance.studio.improviser.phrase import PRIMER, STEPS_S
-from appliance.studio.improviser.steps import WindowCoder
 from appliance.studio.standing_dance import standing
 from appliance.studio.studio_error import StudioError
 
+PRIMER = 35  # steps of a recording that the improviser continues: 2.8 s
+STEPS_S = FPS / HOP
 KNOWN = 5  # the prompt's last steps, decoded again by this network so that the motion can be faded over
 AROUND_S = 0.3  # on either side of the join, where a seam would show
 
@@ -54,14 +51,14 @@ class Follower(Protocol):
 class MovesFollower:
     """Ours: goes on in the latents of its autoencoder, move by move."""
 
-    autoencoder: Autoencoder
-    improviser: Improviser
+    coder: Coder
+    networks: Choreographer
 
     def follow(
         self, prompt: Recording, dataset: Dataset, seconds: float, temperature: float, seed: int
     ) -> tuple[Recording, int, int]:
         """See Follower. Raises StudioError for a prompt that is too short."""
-        coder, moving = WindowCoder(self.autoencoder), list(dataset.moving)
+        coder, moving = self.coder, list(dataset.moving)
         steps = steps_of(coder, prompt, moving)
         if len(steps) < BEFORE + MOVE:
             least = HOP * (BEFORE + MOVE + 1) + WINDOW
@@ -69,9 +66,9 @@ class MovesFollower:
                 f"The prompt has {len(prompt) / FPS:.1f} s; the improviser continues from {least / FPS:.1f} "
                 "s or more. Give a longer one, or a later --from."
             )
-        primer = torch.tensor(steps.features[-PRIMER:])[None]
+        primer = np.asarray(steps.features[-PRIMER:], np.float32)[None]
         moves = math.ceil(seconds * STEPS_S / MOVE)
-        danced = self.improviser.improvise(primer, moves, temperature, seed)[0].numpy()
+        danced = improvised(self.networks, primer, moves, temperature, seed)[0]
         together = Steps.of_features(np.concatenate([steps.features[-KNOWN:], danced]))
         poses, roots = motion_of(coder, together, prompt.poses[-1], moving)
         poses = danced_again(coder, poses, moving)
@@ -80,15 +77,24 @@ class MovesFollower:
 
 
 def continued(
-    follower: Follower, dataset: Dataset, prompt: Recording, seconds: float, temperature: float, seed: int
+    follower: Follower,
+    dataset: Dataset,
+    prompt: Recording,
+    seconds: float,
+    temperature: float,
+    seed: int,
+    is_quick: bool = False,
 ) -> Continuation:
-    """prompt: at 50 Hz, its floor at height 0. Raises StudioError where it is too short."""
+    """prompt: at 50 Hz, its floor at height 0; is_quick: see standing.
+
+    Raises StudioError where the prompt is too short.
+    """
     moving = list(dataset.moving)
     motion, first, fade = follower.follow(prompt, dataset, seconds, temperature, seed)
     made = _placed(motion, prompt, first)
     count = min(first + len(made), first + fade + round(seconds * FPS))
     whole = _joined(prompt, made, first, fade, count)
-    planted = standing(whole.poses[:, moving].astype(np.float32), whole, dataset)
+    planted = standing(whole.poses[:, moving].astype(np.float32), whole, dataset, is_quick=is_quick)
     dance = _joined(whole, _placed(_from(planted, first), whole, first), first, fade, count)
     return Continuation(dance, (first + fade) / FPS, *_seam(dance, prompt, first, fade, moving))
 

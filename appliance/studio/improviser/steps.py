@@ -10,10 +10,10 @@ from appliance.dancer.material.steps import HOP, Steps, steps_of
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.coded_windows import decoded, encoded
 from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.data.mirror import asymmetry, mirrored
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.granular.granular import decoded, encoded
 
 
 @dataclass(frozen=True)

@@ -7,24 +7,27 @@ Figure 2: with them, the paths of a phrase would not be continuous).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from appliance.dancer.material.latent_paths import Latents
 from appliance.pose.quaternion import Array
-from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.coded_windows import decoded, encoded
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.granular.granular import decoded, encoded
+
+if TYPE_CHECKING:
+    from appliance.studio.coded_windows import Network
 
 
-def latents_of(autoencoder: Autoencoder, poses: Array) -> tuple[Latents, Array]:
+def latents_of(network: Network, poses: Array) -> tuple[Latents, Array]:
     """Poses (T, M, 4) -> latents (T, Z) and headings (T, 4)."""
-    return encoded(autoencoder, poses.astype(np.float32)[:, None])
+    return encoded(network, poses.astype(np.float32)[:, None])
 
 
-def poses_of(autoencoder: Autoencoder, latents: Latents, facing: Array | None = None) -> Poses:
+def poses_of(network: Network, latents: Latents, facing: Array | None = None) -> Poses:
     """Latents (T, Z) -> poses (T, M, 4); facing (T, 4), left out: ahead."""
-    made: Poses = decoded(autoencoder, latents, facing)[:, 0]
+    made: Poses = decoded(network, latents, facing)[:, 0]
     return made
 
 
@@ -51,11 +54,18 @@ class PoseMap:
             :dimensions
         ]
         signs = np.sign(directions[np.arange(len(directions)), np.abs(directions).argmax(axis=1)])
-        directions = signs[:, None] * directions
+        return PoseMap.along(
+            latents, figures, latents.astype(np.float64).mean(axis=0), signs[:, None] * directions
+        )
+
+    @staticmethod
+    def along(latents: Latents, figures: Array, middle: Array, directions: Array) -> PoseMap:
+        """A map whose middle (Z,) and directions (D, Z) are known, such as a show's."""
+        values, shapes = (each - each.mean(axis=0) for each in (latents.astype(np.float64), figures))
         seen = values @ directions.T
         left = shapes - seen @ np.linalg.lstsq(seen, shapes, rcond=None)[0]
         explained = 1 - float(left.var(axis=0).sum() / max(float(shapes.var(axis=0).sum()), 1e-12))
-        return PoseMap(latents.astype(np.float64).mean(axis=0), directions, explained)
+        return PoseMap(middle, directions, explained)
 
     def points(self, latents: Latents) -> Array:
         """(T, Z) -> (T, D)."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from appliance.dancer.material.pose_paths import even_path, wobbled
+from appliance.levers.sources import PATH
 from appliance.pictures.filmstrip import Strip, draw_strips
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.dance_files import write_recording, write_report
@@ -17,12 +18,12 @@ from appliance.studio.evaluation.dance_figures import degrees_apart, energy
 from appliance.studio.evaluation.nearest import reference_of, without_heading
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
+from appliance.studio.opened_model import open_either
 from appliance.studio.pose_space.drawing import read_line
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.pose_space.latent_poses import latents_of, poses_of
 from appliance.studio.progress import doing, shown
 from appliance.studio.standing_dance import excerpt_of, standing
-from appliance.studio.trained_on import open_model
 
 COLUMNS = 8  # in a strip
 
@@ -31,8 +32,9 @@ COLUMNS = 8  # in a strip
 class PathOptions:
     """The command line of bunraku path. wobble: amplitude and Hz; draw: a line over the map, SVG or CSV."""
 
-    model: Path
+    model: Path | None
     out: Path
+    show: Path | None = None
     phrase: Path | None = None
     recordings: Path | None = None
     wobble: tuple[float, float] | None = None
@@ -46,22 +48,23 @@ class PathOptions:
 def run(options: PathOptions) -> None:
     """Walk, decode, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = open_model("pose", options.model, options.recordings, console, options.reading)
-    autoencoder, moving = coder.autoencoder, list(dataset.moving)
-    given = None
-    if options.phrase is not None:
-        given = excerpt_of(options.phrase, options.start, options.seconds, coder, dataset, options.reading)
+    opened = open_either(PATH, options.model, options.show, options.recordings, console, options.reading)
+    network, dataset, moving = opened.network, opened.dataset, list(opened.dataset.moving)
+    given, phrase = None, options.phrase or (None if options.wobble is None else opened.phrase)
+    if phrase is not None:
+        given = excerpt_of(phrase, options.start, options.seconds, opened.moved, dataset, options.reading)
     if given is not None and options.wobble is not None:
-        latents, facing = latents_of(autoencoder, given.poses[:, moving])
-        poses = poses_of(autoencoder, wobbled(latents, *options.wobble, options.seed), facing)
+        latents, facing = latents_of(network, given.poses[:, moving])
+        poses = poses_of(network, wobbled(latents, *options.wobble, options.seed), facing)
     else:
         assert options.draw is not None, "the command asks for a phrase with a wobble, or a drawing"
         line = even_path(read_line(options.draw), round(options.seconds * FPS))
-        ground = Ground.of(autoencoder, dataset)
-        poses = poses_of(autoencoder, ground.pose_map.latents(line))
+        ground = Ground.of(network, dataset)
+        poses = poses_of(network, ground.pose_map.latents(line))
         if ground.reach.is_dead:
             console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
-    whole = standing(poses, given, dataset, partial(shown, words="planting the feet", console=console))
+    progress = partial(shown, words="planting the feet", console=console)
+    whole = standing(poses, given, dataset, progress, opened.is_of_show)
     write_recording(options.out, whole)
     with doing("measuring the dance and the recordings", console):
         reference = reference_of(dataset.training, dataset.moving_names)

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from appliance.levers.sources import PATH
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS
+from appliance.studio.opened_model import open_either
 from appliance.studio.pose_space import map_pictures
 from appliance.studio.pose_space.drawing import UNITS
 from appliance.studio.pose_space.ground import Ground
@@ -25,7 +27,6 @@ from appliance.studio.pose_space.projections import WITHOUT_UMAP, Projection, pr
 from appliance.studio.progress import doing
 from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
-from appliance.studio.trained_on import open_model
 
 PAGE_EVERY = 2  # poses from one to the next on the page
 MOST_PAGE_POSES = 6000
@@ -36,9 +37,10 @@ MOST_KNOWN = 3000  # recorded poses that the page shows as dots
 class MapOptions:
     """The command line of bunraku map. Two files: two versions of a phrase, which are compared."""
 
-    model: Path
+    model: Path | None
     out: Path
     files: tuple[Path, ...]
+    show: Path | None = None
     recordings: Path | None = None
     seconds: float = 60.0
     reading: ReadingOptions = AS_THE_FILES_SAY
@@ -47,17 +49,18 @@ class MapOptions:
 def run(options: MapOptions) -> None:
     """Project, compare, draw; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = open_model("pose", options.model, options.recordings, console, options.reading)
-    autoencoder, moving = coder.autoencoder, list(dataset.moving)
-    if len({file.stem for file in options.files}) < len(options.files):
+    opened = open_either(PATH, options.model, options.show, options.recordings, console, options.reading)
+    network, dataset, moving = opened.network, opened.dataset, list(opened.dataset.moving)
+    files = options.files or (() if opened.phrase is None else (opened.phrase,))
+    if len({file.stem for file in files}) < len(files):
         raise StudioError("Two of the recordings have the same name. Give each once.")
     recordings = {
-        file.stem: excerpt_of(file, 0.0, options.seconds, coder, dataset, options.reading)
-        for file in options.files
+        file.stem: excerpt_of(file, 0.0, options.seconds, opened.moved, dataset, options.reading)
+        for file in files
     }
     with doing("laying the recordings over the map", console):
-        ground = Ground.of(autoencoder, dataset)
-        found = projections(autoencoder, list(recordings.values()), moving, ground.pose_map)
+        ground = Ground.of(network, dataset)
+        found = projections(network, list(recordings.values()), moving, ground.pose_map)
     options.out.mkdir(parents=True, exist_ok=True)
     with doing("drawing the pictures", console):
         map_pictures.draw_projections(options.out / "projections.png", list(recordings), found)

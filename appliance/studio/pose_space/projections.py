@@ -8,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.improviser.naturalness import figure_shapes
 from appliance.studio.pose_space.latent_poses import PoseMap, latents_of
+
+if TYPE_CHECKING:
+    from appliance.studio.coded_windows import Network
 
 WITHOUT_UMAP = "UMAP is left out: umap-learn is not installed here. Add it with: pip install umap-learn"
 MOST_NEIGHBOURS_OF = 4000  # figures that UMAP is fitted to
@@ -39,12 +42,12 @@ class Projection:
 
 
 def projections(
-    autoencoder: Autoencoder, recordings: Sequence[Recording], moving: Sequence[int], pose_map: PoseMap
+    network: Network, recordings: Sequence[Recording], moving: Sequence[int], pose_map: PoseMap
 ) -> list[Projection]:
     """Two numbers a pose by every method, for recordings at 50 Hz; the autoencoder's only without heading."""
     level = [figure_shapes(one, moving) for one in recordings]
     turned = [_shapes_with_heading(one, moving) for one in recordings]
-    latents = [latents_of(autoencoder, one.poses[:, list(moving)])[0] for one in recordings]
+    latents = [latents_of(network, one.poses[:, list(moving)])[0] for one in recordings]
     found = [
         Projection("PCA, heading kept", _principal(turned)),
         Projection("PCA, heading removed", _principal(level)),

@@ -11,18 +11,20 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from appliance.levers.sources import VARY
 from appliance.pictures.filmstrip import Strip, draw_strips
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.studio.dance_files import write_recording, write_report
-from appliance.studio.data.dataset import FPS, Dataset
+from appliance.studio.data.dataset import FPS
 from appliance.studio.data.regions import regions_of
-from appliance.studio.evaluation.coders import Poses, TorchCoder
+from appliance.studio.evaluation.coders import Poses
 from appliance.studio.evaluation.dance_figures import energy
 from appliance.studio.evaluation.nearest import Reference, reference_of
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
+from appliance.studio.opened_model import OpenedModel, open_either
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.progress import doing, shown
 from appliance.studio.standing_dance import excerpt_of, standing
@@ -35,11 +37,16 @@ COLUMNS = 8  # in a strip
 
 @dataclass(frozen=True)
 class VaryOptions:
-    """The command line of bunraku vary. phrase: a BVH file; None: only samples from the prior."""
+    """The command line of bunraku vary. model or show; phrase: a BVH file; None: the show's own.
 
-    model: Path
+    is_free: only samples from the prior.
+    """
+
+    model: Path | None
     out: Path
+    show: Path | None = None
     phrase: Path | None = None
+    is_free: bool = False
     recordings: Path | None = None
     sigma: float = 0.5
     count: int = 8
@@ -69,16 +76,17 @@ class Figures:
 def run(options: VaryOptions) -> None:
     """Vary, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = open_model("sequence", options.model, options.recordings, console, options.reading)
+    opened = open_either(VARY, options.model, options.show, options.recordings, console, options.reading)
+    dataset, phrase = opened.dataset, None if options.is_free else options.phrase or opened.phrase
     with doing("measuring the recordings", console):
         reference = reference_of(dataset.training, dataset.moving_names)
         yardstick = Yardstick.of(dataset.training, dataset.moving)
     given = (
         None
-        if options.phrase is None
-        else excerpt_of(options.phrase, options.start, options.seconds, coder, dataset, options.reading)
+        if phrase is None
+        else excerpt_of(phrase, options.start, options.seconds, opened.moved, dataset, options.reading)
     )
-    danced = _dances(options, coder, dataset, given)
+    danced = _dances(options, opened, given)
     options.out.mkdir(parents=True, exist_ok=True)
     figures, strips, natural = {}, [], {}
     if given is not None:
@@ -88,7 +96,9 @@ def run(options: VaryOptions) -> None:
         strips.append(Strip(given.poses, given.roots, "phrase"))
     for number, (name, poses) in enumerate(danced.items(), 1):
         words = f"{number} of {len(danced)}: planting the feet of {name}"
-        whole = standing(poses, given, dataset, partial(shown, words=words, console=console))
+        whole = standing(
+            poses, given, dataset, partial(shown, words=words, console=console), opened.is_of_show
+        )
         write_recording(options.out / f"{name}.bvh", whole)
         figures[name] = measured(
             poses, None if given is None else given.poses[:, list(dataset.moving)], reference
@@ -97,7 +107,7 @@ def run(options: VaryOptions) -> None:
         strips.append(Strip(whole.poses, whole.roots, name, behind=strips[0] if given is not None else None))
     if options.on_map is not None:
         _draw_on_map(options, given, danced, console)
-    title = _words(options)
+    title = _words(options, phrase)
     with doing("drawing variations.png", console):
         picture = options.out / "variations.png"
         draw_strips(picture, dataset.skeleton, strips, FPS, title, COLUMNS, options.start)
@@ -137,28 +147,27 @@ def _draw_on_map(
     ground.draw(options.out / "map.png", paths)
 
 
-def _dances(
-    options: VaryOptions, coder: TorchCoder, dataset: Dataset, given: Recording | None
-) -> dict[str, Poses]:
+def _dances(options: VaryOptions, opened: OpenedModel, given: Recording | None) -> dict[str, Poses]:
     """(T, M, 4) of the moving joints by name."""
-    autoencoder, seeds = coder.autoencoder, range(options.seed, options.seed + options.count)
+    network, dataset = opened.network, opened.dataset
+    seeds = range(options.seed, options.seed + options.count)
     if given is None:
-        return {f"sample_{seed}": variations.sampled(autoencoder, options.sigma, seed) for seed in seeds}
+        return {f"sample_{seed}": variations.sampled(network, options.sigma, seed) for seed in seeds}
     moving = list(dataset.moving)
     own = given.poses[:, moving].astype(np.float32)
-    phrase = variations.encode_phrase(autoencoder, own)
+    phrase = variations.encode_phrase(network, own)
     if options.mix is not None:
         other = excerpt_of(
-            options.mix, options.start, options.seconds, coder, dataset, options.reading
+            options.mix, options.start, options.seconds, opened.moved, dataset, options.reading
         ).poses[:, moving]
         made = {
             "mixed": variations.mixed(
-                autoencoder, phrase, variations.encode_phrase(autoencoder, other), options.share, 1
+                network, phrase, variations.encode_phrase(network, other), options.share, 1
             )
         }
     else:
         made = {
-            f"variation_{seed}": variations.varied(autoencoder, phrase, options.sigma, seed) for seed in seeds
+            f"variation_{seed}": variations.varied(network, phrase, options.sigma, seed) for seed in seeds
         }
     if not options.regions:
         return made
@@ -174,13 +183,13 @@ def _only(poses: Poses, own: Poses, changed: list[int]) -> Poses:
     return whole
 
 
-def _words(options: VaryOptions) -> str:
+def _words(options: VaryOptions, phrase: Path | None) -> str:
     where = f", {' and '.join(options.regions)} alone" if options.regions else ""
-    if options.phrase is None:
+    if phrase is None:
         return f"samples from the prior, spread {options.sigma:g}"
     if options.mix is not None:
-        return f"{options.phrase.stem} with {options.share:.0%} of {options.mix.stem}{where}"
-    return f"{options.phrase.stem}, varied by {options.sigma:g} sigma{where}"
+        return f"{phrase.stem} with {options.share:.0%} of {options.mix.stem}{where}"
+    return f"{phrase.stem}, varied by {options.sigma:g} sigma{where}"
 
 
 def _table(figures: dict[str, Figures], title: str) -> Table:

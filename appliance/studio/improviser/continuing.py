@@ -1,0 +1,90 @@
+"""`bunraku improvise` continues a prompt, or a recorded moment, by an improviser of the studio or a show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+
+import numpy as np
+from rich.console import Console
+
+from appliance.dancer.material.improviser_network import ImproviserNetwork
+from appliance.dancer.material.steps import floor_under
+from appliance.levers.sources import IMPROVISE
+from appliance.pose.recording import Recording
+from appliance.studio.dance_files import write_dance
+from appliance.studio.data.dataset import FPS, Dataset, window_starts
+from appliance.studio.evaluation.coders import MovedJoints
+from appliance.studio.improviser.improvise_options import ImproviseOptions
+from appliance.studio.improviser.naturalness import Yardstick, measure
+from appliance.studio.improviser.naturalness_table import naturalness_table
+from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
+from appliance.studio.opened_model import open_show
+from appliance.studio.standing_dance import excerpt_of
+from appliance.studio.studio_error import StudioError
+
+Say = Callable[[str], None]
+PROMPT_S = 3.0  # seconds of a recording, where an improviser that makes no endless phrase gets no prompt
+
+
+def continue_of_show(options: ImproviseOptions) -> None:
+    """What the improviser of a show dances after the prompt or the show's phrase. Raises StudioError."""
+    assert options.show is not None
+    console, opened = Console(stderr=True), open_show(IMPROVISE, options.show)
+    network = opened.network
+    assert isinstance(network, ImproviserNetwork)
+
+    def say(message: str) -> None:
+        console.print(message, highlight=False, soft_wrap=True)
+
+    follower = MovesFollower(network, network)
+    continue_prompt(options, follower, network, opened.dataset, say, is_quick=True)
+
+
+def continue_prompt(
+    options: ImproviseOptions,
+    follower: Follower,
+    moves: MovedJoints,
+    dataset: Dataset,
+    say: Say,
+    is_quick: bool = False,
+) -> None:
+    """The prompt and what the improviser dances after it, with a report and a picture.
+
+    Without a prompt it goes on from a recorded moment, which is cut away: the seed chooses it. is_quick: see
+    standing.
+    """
+    end = 1e9 if options.prompt_end is None else options.prompt_end
+    prompt = (
+        _recorded_moment(dataset, options.phrase.seed)
+        if options.prompt is None
+        else excerpt_of(options.prompt, 0.0, end, moves, dataset, options.reading)
+    )
+    asked = options.phrase
+    made = continued(follower, dataset, prompt, asked.seconds, asked.temperature, asked.seed, is_quick)
+    figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
+    dance, words = made.dance, f"the prompt ends at {made.joined_s:.1f} s"
+    if options.prompt is None:
+        dance, figures, words = dance.excerpt(made.joined_s), {}, "after a recorded moment"
+    natural = measure(dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
+    report = {"phrase": asdict(asked), **figures, "naturalness": natural.as_json()}
+    write_dance(options.out, dance, f"{options.out.stem}: {words}", report, rows=3)
+    seam = (
+        f" The largest step of a joint around there is {made.seam:.1f} degrees, {made.usual:.1f} are usual "
+        "in the prompt."
+    )
+    Console().print(naturalness_table({options.out.stem: natural}))
+    say(f"{options.out}: {dance.seconds:.1f} s; {words}.{seam if figures else ''}")
+
+
+def _recorded_moment(dataset: Dataset, seed: int) -> Recording:
+    """A few seconds of a training take, its floor at height 0."""
+    rng, frames = np.random.default_rng(seed), round(PROMPT_S * FPS)
+    starts = [(take, first) for take in dataset.training for first in window_starts(take, window=frames)]
+    if not starts:
+        raise StudioError(f"No recording has {PROMPT_S:g} s without a capture error. Give a --prompt.")
+    take, first = starts[int(rng.integers(len(starts)))]
+    moment = take.recording.excerpt(first / FPS, (first + frames) / FPS)
+    roots = moment.roots.copy()
+    roots[:, 1] -= floor_under(moment)
+    return replace(moment, roots=roots)

@@ -1,0 +1,89 @@
+"""A show's own networks in the studio: vary, path, map and improvise without a training and without torch."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.levers.sources import PATH
+from appliance.pose.bvh import read_bvh
+from appliance.show.bundle import default_show_path
+from appliance.studio.improviser.naturalness import standing_of
+from appliance.studio.opened_model import open_show
+from appliance.studio.pose_space.ground import Ground
+from tests.studio.conftest import bunraku
+
+WITHOUT_TORCH = """
+import sys
+sys.modules["torch"] = None
+from appliance.studio.commands import app
+app(sys.argv[1:])
+"""
+
+
+def test_a_shows_networks_dance_where_torch_is_not_installed(tmp_path: Path) -> None:
+    commands = (
+        ["vary", "--count", "1", "--seconds", "3", "--out", tmp_path / "varied"],
+        ["path", "--wobble", "0.3", "1", "--seconds", "2", "--out", tmp_path / "wobble.bvh"],
+        ["map", "--seconds", "4", "--out", tmp_path / "map"],
+        ["improvise", "--seconds", "2", "--out", tmp_path / "more.bvh"],
+    )
+    for command in commands:
+        words = [str(each) for each in (*command, "--show", "default")]
+        done = subprocess.run([sys.executable, "-c", WITHOUT_TORCH, *words], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    made = ("varied/phrase.bvh", "varied/variation_1.bvh", "wobble.bvh", "more.bvh")
+    phrase, varied, wobble, more = (read_bvh(tmp_path / name) for name in made)
+    assert len(phrase) == 150 and len(wobble) == 100 and len(more) > 50
+    assert varied.skeleton.same_joints(phrase.skeleton)
+    assert (tmp_path / "map" / "map.png").exists() and (tmp_path / "map" / "map.html").exists()
+    figures = json.loads((tmp_path / "varied" / "variations.json").read_text())["figures"]
+    assert figures["phrase"]["nearest"] < 0.1 < figures["variation_1"]["nearest"]
+
+
+def test_feet_stand_as_on_stage_and_not_as_the_network_leaves_them(tmp_path: Path) -> None:
+    """The null product: the same poses on the phrase's unchanged path slide several times as fast."""
+    options = ["--show", "default", "--seconds", 6, "--count", 1, "--sigma", 1]
+    result = bunraku("vary", *options, "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    phrase, varied = (read_bvh(tmp_path / f"{name}.bvh") for name in ("phrase", "variation_1"))
+    stood = standing_of(varied).slide_cm_s
+    null = standing_of(replace(varied, roots=phrase.roots[: len(varied)])).slide_cm_s
+    assert stood < 0.5 * null
+    assert np.isfinite(varied.poses).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["vary"], "Give --show"),
+        (["vary", "--show", "default", "--model", "x.pt"], "Give --show"),
+        (["vary", "--show", "martial"], "has no sequence.onnx"),
+        (["path", "--show", "martial", "--wobble", "0.3", "1"], "has no pose.onnx"),
+        (["path", "phrase.bvh", "--show", "default"], "--wobble AMPLITUDE FREQUENCY"),
+        (["improvise", "--show", "martial"], "has no improviser.onnx"),
+        (["improvise", "--show", "default", "--minutes", "3"], "--minutes"),
+        (["vary", "--show", "default", "--recordings", "x"], "--recordings"),
+        (["map", "--show", "nowhere"], "There is no such show folder"),
+    ],
+)
+def test_a_show_that_cannot_do_it_is_told(arguments: list[str], words: str, tmp_path: Path) -> None:
+    result = bunraku(*arguments, "--out", tmp_path / "out.bvh")
+    assert result.exit_code == 2 and words in " ".join(result.stderr.split()), result.output
+
+
+def test_the_map_is_the_one_that_the_show_has_on_stage(tmp_path: Path) -> None:
+    opened = open_show(PATH, default_show_path())
+    ground = Ground.of(opened.network, opened.dataset)
+    middle, directions, low, high = opened.network.ground
+    np.testing.assert_array_equal(ground.pose_map.middle, middle)
+    np.testing.assert_array_equal(ground.pose_map.directions, directions)
+    assert not ground.reach.is_dead and 0 < ground.pose_map.explained <= 1
+    inside = (ground.known >= low) & (ground.known <= high)
+    assert inside.mean() > 0.7
