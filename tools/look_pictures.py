@@ -23,6 +23,7 @@ SIZE = 864, 486
 ADDRESS = "https://192.168.0.12:8443"
 HELD, COLOURS = "lShldr", 256
 UPRIGHT, TOGETHER_S = (320, 400), 49.6  # for the four looks side by side
+STROKES_S, STROKES_STEP_S, SMALL = 30.0, 0.2, (192, 108)  # the dance whose strokes ink's paper has kept
 SHOW = default_show_path()
 Turns = dict[str, tuple[tuple[float, float, float], float]]  # joint: axis, degrees
 _DOWN: Turns = {"lShldr": ((0, 0, 1), -72), "rShldr": ((0, 0, 1), 72)}
@@ -67,9 +68,12 @@ def draw_looks(folder: Path) -> list[Path]:
     holds = np.zeros(len(recording.skeleton), np.float32)
     holds[recording.skeleton.index(HELD)] = 1.0
     with offscreen(size) as ctx:
-        renderer = Renderer(ctx, recording.skeleton, {name: look for name, (look, _) in PICTURES.items()})
+        looks = {name: look for name, (look, _) in PICTURES.items()}
+        renderer = Renderer(ctx, recording.skeleton, looks, keeps_strokes=True)
         for name, (_, time_s) in PICTURES.items():
             moment = moment_of(recording, time_s, holds if name == "strings" else None)
+            for earlier in np.arange(time_s - STROKES_S, time_s, STROKES_STEP_S) if name == "ink" else ():
+                draw_still(ctx, renderer, moment_of(recording, float(earlier)), name, SMALL)
             image = shrink(draw_still(ctx, renderer, moment, name, size))
             paths.append(folder / f"look-{name}.png")
             Files.fromarray(image).save(paths[-1], optimize=True)

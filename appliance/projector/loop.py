@@ -59,6 +59,7 @@ class Painter(Protocol):
 
 
 MakePainter = Callable[[moderngl.Context, Skeleton, Looks, Path], Painter]
+KEEPING: MakePainter = partial(Renderer, keeps_strokes=True)
 
 
 class Projector:
@@ -72,7 +73,7 @@ class Projector:
         show_state: ShowStateReader,
         controls: Controls,
         say: Callable[[str], None],
-        make_painter: MakePainter = Renderer,
+        make_painter: MakePainter = KEEPING,
     ) -> None:
         self._gl, self._config, self._make_painter = gl, config, make_painter
         self._reader, self._show_state, self._controls, self._say = reader, show_state, controls, say

@@ -45,6 +45,14 @@ class Poses:
         away = self.each_root[0] - self.roots[0]
         return float(np.hypot(away[:, 0], away[:, 2]).max())
 
+    def of_figure(self, figure: int) -> Poses:
+        """One of the figures."""
+        if self.figures == 1:
+            return self
+        count = self.positions.shape[1] // self.figures
+        own = slice(figure * count, (figure + 1) * count)
+        return Poses(self.positions[:, own], self.world[:, own])
+
     @property
     def each_root(self) -> Floats:
         """(ROWS, figures, 3)."""

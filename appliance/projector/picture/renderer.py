@@ -43,7 +43,8 @@ class Renderer:
     """Owns what the looks need on the GPU; draws any of them into a framebuffer, or right onto the wall.
 
     looks: by name, at least one, in the show's order; show: its folder, which has the body's surface.
-    The same moment makes the same picture, whatever was drawn before.
+    The same moment makes the same picture, whatever was drawn before; with keeps_strokes ink's paper also
+    shows the strokes of the pictures before it.
     """
 
     def __init__(
@@ -52,11 +53,15 @@ class Renderer:
         skeleton: Skeleton,
         looks: Mapping[str, LookConfig],
         show: Path | None = None,
+        keeps_strokes: bool = False,
     ) -> None:
         self._looks = looks
         self._easel = Easel(ctx, skeleton, show)
         styles = dict.fromkeys(look.style for look in looks.values())
-        self._styles = {style: _LOOKS[style](self._easel) for style in styles}
+        self._styles: dict[Style, _Look] = {
+            style: Ink(self._easel, keeps_strokes) if style == "ink" else _LOOKS[style](self._easel)
+            for style in styles
+        }
 
     def draw(
         self,

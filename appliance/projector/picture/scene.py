@@ -173,6 +173,11 @@ class Easel:
             leaders.append(leader)
         return leaders
 
+    def weigh(self, of: Callable[[Poses], Floats]) -> None:
+        """Bring a number of each joint onto the GPU, in place of how far it follows. of: a figure's poses."""
+        for textures, one in zip(self._figures, self._poses, strict=False):
+            textures.led.write(of(one))
+
     def draw_figure(self, figure: int, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
         """Draw what belongs to one of the figures. drawn: as Drawing takes it."""
         drawing.draw({"back": 0.0} | inputs | self._figures[figure].inputs, *drawn)

@@ -12,12 +12,22 @@ out vec3 normal;
 out vec3 skin;
 out float open;
 out float mark;
+#ifdef BRUSH
+uniform highp sampler2D led;  // how hard the brush is pressed at each joint
+uniform float swell;
+out float pressed;
+#endif
 
 void main() {
     mat2x4 by = blended(in_joints, in_weights, row);
     place = moved(by, in_position);
     normal = turned(by, 2.0 * in_normal.xyz - 1.0);
     skin = in_position;
+#ifdef BRUSH
+    pressed = 0.0;
+    for (int i = 0; i < 4; i++) pressed += in_weights[i] * texelFetch(led, ivec2(int(in_joints[i]), 0), 0).r;
+    place += normal * swell * (pressed - 0.4);
+#endif
     mark = held_at(in_joints, in_weights);
     open = 2.0 * in_normal.w - 1.0;
     gl_Position = projection * vec4(place, 1.0);

@@ -5,6 +5,9 @@ in vec3 normal;
 in vec3 skin;
 in float open;
 in float mark;
+#ifdef BRUSH
+in float pressed;  // a lifted brush leaves bristles with paper between them
+#endif
 uniform vec3 eye;
 uniform float level;
 uniform float hollow;
@@ -16,5 +19,9 @@ void main() {
     float wash = texture(noise, skin.xy * 1.3 + skin.z).r;
     float outline = pow(1.0 - facing, 1.6);
     float full = mix(1.0, 0.66 + 0.45 * outline + 0.35 * (wash - 0.5) + 0.25 * (1.0 - open), hollow);
+#ifdef BRUSH
+    vec2 hairs = abs(skin.x) > 0.12 ? vec2(0.5 * skin.x, 5.0 * skin.y + 3.0 * skin.z) : vec2(0.5 * skin.y, 5.0 * skin.x + 3.0 * skin.z);
+    full *= mix(0.30 + 1.1 * smoothstep(0.35, 0.65, texture(noise, hairs).b), 1.0, pressed);
+#endif
     colour = vec4(vec3(level * full), mark * level * full);
 }

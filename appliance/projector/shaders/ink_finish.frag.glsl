@@ -4,6 +4,9 @@ in vec2 uv;
 uniform sampler2D picture;
 uniform sampler2D wet_picture;
 uniform sampler2D paper;
+uniform sampler2D noise;
+uniform float aspect;
+uniform sampler2D kept;  // the evening's strokes: wet ones, and stains
 uniform vec2 reach;
 uniform vec3 figure_colour;
 uniform vec3 light_colour;
@@ -28,21 +31,26 @@ void main() {
 #else
     vec3 paper_colour = air_colour;
 #endif
-    vec3 blank = paper_colour * (0.95 + 0.10 * (sheet.r - 0.5) + 0.12 * rough), shown = blank;
+    vec3 blank = paper_colour * (0.95 + 0.10 * (sheet.r - 0.5) + 0.12 * rough);
+    vec2 at = uv + (sheet.rg - 0.5) * reach, old = texture(kept, at).rg * (0.85 + 0.6 * rough);
+    blank = mix(blank, mix(accent_colour, blank, 0.3), old.g);
+    vec3 shown = mix(blank, accent_colour, old.r);
 #ifndef FRAME
-    vec2 at = uv + (sheet.rg - 0.5) * reach;
     vec4 wet = texture(wet_picture, at);
     if (wet.r + wet.g + wet.b > 0.004) {
         vec4 ink = soft(at);
-        float full = 0.6 * wet.r + 0.4 * ink.r + 0.25 * rough, edge = max(0.06, 0.7 * fwidth(full));
+        vec4 damp = texture(noise, vec2(uv.x * aspect, uv.y) * 1.1);  // where the sheet drinks
+        float drinks = fog * 2.0 * smoothstep(0.50, 0.66, damp.g), near = smoothstep(0.0, 0.25, wet.r);
+        float full = 0.6 * wet.r + 0.4 * ink.r + 0.25 * rough + 0.40 * drinks * near;
+        float edge = max(0.06, 0.7 * fwidth(full));
         float body = smoothstep(0.36 - edge, 0.36 + edge, full);
         float dried = 1.0 - smoothstep(0.45, 0.8, wet.r);
         float covers = clamp(body * (ink.r + 0.15 * dried + 0.40 * rough + 0.04), 0.0, 1.0);
         float echo = smoothstep(0.02, 0.7, 0.55 * wet.g + 0.45 * ink.g) * (0.68 + 0.75 * rough);
         float stroke = ink.b * (0.85 + 0.6 * rough) * (1.0 - 0.6 * covers);
-        shown = mix(shown, light_colour, 0.35 * fog * wet.r * (1.0 - body));
+        shown = mix(shown, light_colour, fog * (0.35 + 0.8 * drinks) * wet.r * (1.0 - body));
         shown = mix(shown, mix(light_colour, blank, 0.35), clamp(echo, 0.0, 1.0));
-        shown = mix(shown, accent_colour, clamp(stroke, 0.0, 1.0));
+        shown = mix(shown, accent_colour, clamp(max(stroke - old.r, 0.0), 0.0, 1.0));
         float mark = clamp((wet.a + ink.a) / max(wet.r + ink.r, 0.01), 0.0, 1.0);
         shown = mix(shown, mix(figure_colour, held_colour, mark), covers);
     }

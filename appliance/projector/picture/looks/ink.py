@@ -1,13 +1,17 @@
-"""Ink: a brushed silhouette on paper, its echoes of the last second, and the strokes of hands and feet."""
+"""Ink: a brushed silhouette on paper, its echoes, strokes of hands and feet, splashes of sudden moves."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import moderngl
 import numpy as np
 
+from appliance.pose.anatomy import Anatomy
+from appliance.projector.picture.accents import accents, pressure
 from appliance.projector.picture.glow import Glow
+from appliance.projector.picture.kept_strokes import KeptStrokes
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.particles import traced
 from appliance.projector.picture.poses import ROW_S, ROWS
@@ -18,21 +22,29 @@ from appliance.show.look import LookConfig
 
 ECHOES = 5
 STROKES, BRUSH = 12, 0.026  # how many points of the body hold a brush, and how wide it is in figure heights
-WET = 180  # lines of the picture in which ink spreads
+WET = 110  # lines of the picture in which ink spreads
 PAPER_LINES = 400  # lines of the sheet, which is made once
-SPILL = 0.07  # share of the picture's height that ink reaches beyond the figure: brush, spreading and pull
+SPILL = 0.25  # share of the picture's height that ink reaches beyond the figure: splashes, spreading and pull
+SWELL = 0.012  # figure heights between the outlines of a pressed and of a lifted brush
+MOST_SPLASHES, DROPS = 8, 26
 PULL = 0.016  # fraction of the picture's height: how far fibres pull the ink
 
 
 class Ink:
     """Draws the figure of ink."""
 
-    def __init__(self, easel: Easel) -> None:
-        self._easel = easel
-        self._figure = easel.surface("body", "ink")
+    def __init__(self, easel: Easel, keeps: bool = False) -> None:
+        """keeps: the paper keeps the strokes of pictures drawn before, as long as time goes on."""
+        self._easel, self._keeps = easel, keeps
+        self._figure = easel.surface("body", "ink", parts=("BRUSH",))
         self._echo = easel.surface("body", "ink", coarse=True)
         strokes = traced(easel.body, easel.skeleton, easel.bind_positions, STROKES)
         self._strokes = easel.drawing("trail", "stroke", easel.vertices(strokes, instanced=True))
+        parts = (f"MOST {MOST_SPLASHES}", f"DROPS {DROPS}")
+        self._splashes = easel.drawing("splash", "splash", parts=parts)
+        anatomy = Anatomy(easel.skeleton)
+        self._ends = [anatomy.chain(first)[-1] for _, first in anatomy.limbs()]
+        self._kept = KeptStrokes(easel)
         self._glow = Glow(easel)
         self._sheet = easel.drawing("screen", "paper")
         self._made: dict[str, float] = {}
@@ -50,9 +62,17 @@ class Ink:
         picture.start()
         picture.keep("ra")
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        easel.draw_figures(self._figure, inputs | {"row": 0, "level": 1.0, "hollow": 1.0})
+        easel.weigh(pressure)
+        easel.draw_figures(self._figure, inputs | {"row": 0, "level": 1.0, "hollow": 1.0, "swell": SWELL})
+        lay = None
         if look.trail_s > 0:
-            self._leave_traces(scene, look.trail_s, inputs, picture)
+            inputs |= self._brush(scene, look.trail_s)
+            self._leave_echoes(look.trail_s, inputs, picture)
+            picture.keep("b")
+            self._leave_strokes(scene, look.trail_s, inputs, picture, 0.9)
+            easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+            if self._keeps:
+                lay = partial(self._leave_strokes, scene, look.trail_s, inputs)
         picture.keep("rgba")
         picture.finish()
         wet = self._glow.spread(picture, "near glow", WET)
@@ -65,6 +85,7 @@ class Ink:
             "held_colour": np.sqrt(colours.held),
             "air_colour": np.sqrt(look.exposure * colours.background),
             "paper": self._paper(look, scene.aspect).texture,
+            "kept": self._kept.at(scene.time_s, scene.aspect, lay).texture,
             "texel": (1 / picture.size[0], 1 / picture.size[1]),
             "reach": (PULL / scene.aspect, PULL),
             "fog": look.fog,
@@ -83,10 +104,9 @@ class Ink:
             self._made = wanted
         return sheet
 
-    def _leave_traces(self, scene: Scene, trail_s: float, inputs: dict[str, Any], picture: Target) -> None:
-        """Echoes into green, brush strokes into blue; where some overlap the strongest stays."""
-        easel = self._easel
-        rows = min(ROWS, max(6, round(trail_s / ROW_S)))
+    def _leave_echoes(self, trail_s: float, inputs: dict[str, Any], picture: Target) -> None:
+        """Echoes into green; where some overlap the strongest stays."""
+        easel, rows = self._easel, _rows(trail_s)
         easel.ctx.enable_only(moderngl.BLEND)
         easel.ctx.blend_equation = moderngl.MAX, moderngl.MAX
         picture.keep("g")
@@ -98,16 +118,42 @@ class Ink:
                 "held": 0.0,
             }
             easel.draw_figures(self._echo, inputs)
-        picture.keep("b")
-        brush = max(2.0, BRUSH * scene.share_of_picture * picture.size[1])
-        inputs |= {
-            "pixel": (2 / picture.size[0], 2 / picture.size[1]),
-            "width": 0.5 * brush,
-            "rows": float(rows),
+
+    def _brush(self, scene: Scene, trail_s: float) -> dict[str, Any]:
+        """The shaders' inputs for strokes and splashes."""
+        found = [
+            one
+            for figure in range(scene.poses.figures)
+            for one in accents(scene.poses.of_figure(figure), self._ends, scene.time_s)
+        ][:MOST_SPLASHES]
+        none = MOST_SPLASHES - len(found)
+        return {
+            "rows": float(_rows(trail_s)),
             "row_s": ROW_S,
             "floor_side": 1.0,
-            "brightness": 0.9,
             "pressure": 1.0,
+            "lasts": trail_s,
+            "splash_at": [(*one.place.tolist(), one.strength) for one in found] + none * [(0.0,) * 4],
+            "splash_way": [(*one.way.tolist(), float(one.seed)) for one in found] + none * [(0.0,) * 4],
+            "splash_age": [one.age_s for one in found] + none * [0.0],
         }
-        easel.draw_figures(self._strokes, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
-        easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+
+    def _leave_strokes(
+        self, scene: Scene, trail_s: float, inputs: dict[str, Any], into: Target, brightness: float
+    ) -> None:
+        """Brush strokes and splashes; where some overlap the strongest stays."""
+        height = scene.share_of_picture * into.size[1]
+        inputs = inputs | {
+            "pixel": (2 / into.size[0], 2 / into.size[1]),
+            "width": 0.5 * max(2.0, BRUSH * height),
+            "height": height,
+            "brightness": brightness,
+        }
+        rows = _rows(trail_s)
+        self._easel.draw_figures(self._strokes, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
+        if any(strength for *_, strength in inputs["splash_at"]):
+            self._splashes.draw(inputs, moderngl.TRIANGLE_STRIP, 4, MOST_SPLASHES * DROPS)
+
+
+def _rows(trail_s: float) -> int:
+    return min(ROWS, max(6, round(trail_s / ROW_S)))
