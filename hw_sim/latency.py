@@ -9,7 +9,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-_FEWEST, _GRID_S, _LONGEST_LAG_S, _SMOOTH_S, _ALIKE = 50, 0.002, 0.3, 0.08, 0.8  # for `lag_ms`
+_FEWEST, _GRID_S, _LONGEST_LAG_S, _SMOOTH_S = 50, 0.002, 0.3, 0.08  # for `lag_ms`
+_ALIKE = 0.5  # correlation at least: arms go only where arms can, so a joint is 0.7 to 0.8 like its hand
 Floats = NDArray[np.float64]
 
 BEFORE_STEP_S = 0.1  # the joint's orientation before a step is its mean over this long
