@@ -80,6 +80,8 @@ def draw_looks(folder: Path) -> list[Path]:
         renderer.release()
         paths.append(folder / "body.png")
         Files.fromarray(_body(ctx, recording)).save(paths[-1], optimize=True)
+        paths.append(folder / "look-melt.png")
+        Files.fromarray(_melt(ctx, recording)).save(paths[-1], optimize=True)
         paths.append(folder / "test-card.png")
         words = ("bunraku", f"page {ADDRESS}", "pin 482913", "1280x720 kmsdrm")
         Files.fromarray(test_card((1280, 720), words, ADDRESS)).save(paths[-1], optimize=True)
@@ -115,6 +117,17 @@ def _body(ctx: moderngl.Context, recording: Recording) -> Image:
         moment = moment_of(Recording(skeleton, pose, root, recording.fps), 0.0)
         size = UPRIGHT[0] * FINER * 3 // 4, UPRIGHT[1] * FINER
         pictures.append(shrink(draw_still(ctx, renderer, moment, str(angle), size)))
+    renderer.release()
+    return np.hstack(pictures)
+
+
+def _melt(ctx: moderngl.Context, recording: Recording) -> Image:
+    """From human to amorphous, in steps beside each other."""
+    looks = {str(melt): LookConfig(name=str(melt), vignette=0.2, melt=melt) for melt in (0.0, 0.35, 0.7, 1.0)}
+    renderer = Renderer(ctx, recording.skeleton, looks)
+    size = UPRIGHT[0] * FINER, UPRIGHT[1] * FINER
+    moment = moment_of(recording, PICTURES["plaster"][1])
+    pictures = [shrink(draw_still(ctx, renderer, moment, melt, size)) for melt in looks]
     renderer.release()
     return np.hstack(pictures)
 

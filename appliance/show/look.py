@@ -101,6 +101,11 @@ class LookConfig(Section):
     trail_s: float = key("How long movement leaves its trace, in seconds; 0: none.", 1.0, within=(0, 1.2))
     glow: float = key("How far light spills around bright areas.", 0.6, within=(0, 1))
     density: float = key("Number of strands, echoes or points; the grain of the ink.", 0.6, within=(0.1, 1))
+    melt: float = key(
+        "How amorphous the figure is: 0 a human body, 1 a lump whose surface swims. Not in lines.",
+        0.0,
+        within=(0, 1),
+    )
     vignette: float = key("How far the picture fades to black towards its edges.", 0.4, within=(0, 1))
     render_scale: float | None = key(
         "Resolution of the figure, relative to the picture; smaller is softer and takes "

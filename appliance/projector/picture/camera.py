@@ -89,10 +89,10 @@ def view(
 ) -> View:
     """The camera at time_s; mix 0: as in `before`, 1: as in `now`; aspect: the picture's width / height."""
     left, reached = (
-        _between(_stand(before, time_s, changes), _stand(now, time_s, changes), _eased(mix))
+        _between(_stand(before, time_s, changes), _stand(now, time_s, changes), eased(mix))
         for changes in (cued.before, cued.now)
     )
-    stand = _between(left, reached, _eased(cued.mix))
+    stand = _between(left, reached, eased(cued.mix))
     slope = float(np.tan(stand.lens / 2))
     slopes = (slope * aspect, slope) if aspect >= 1 else (slope, slope / aspect)
     distance = 0.5 / (stand.figure * min(slopes[1], UPRIGHT * slopes[0]))
@@ -110,7 +110,8 @@ def view(
     return View(aim + distance * back, across, up, back, slopes, centre[[0, 2]], stand.azimuth)
 
 
-def _eased(share: float) -> float:
+def eased(share: float) -> float:
+    """0 to 1, without a jolt at either end."""
     return share * share * (3 - 2 * share)
 
 

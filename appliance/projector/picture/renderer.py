@@ -10,7 +10,7 @@ import moderngl
 
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.moment import Moment
-from appliance.projector.picture.camera import NOT_CUED, CuedCamera, view
+from appliance.projector.picture.camera import NOT_CUED, CuedCamera, eased, view
 from appliance.projector.picture.looks.cloud import Cloud
 from appliance.projector.picture.looks.ink import Ink
 from appliance.projector.picture.looks.lines import Lines
@@ -75,7 +75,7 @@ class Renderer:
         """Draw onto `target`; mix 0: only look_before, 1: only look. Unknown names: the first look.
 
         While two looks cross-fade, the camera moves from one look's place to the other's, and both draw the
-        figure from there: its material changes, not its place.
+        figure from there, melted as far: its material changes, not its place or shape.
         """
         first = next(iter(self._looks.values()))
         now, before = self._looks.get(look, first), self._looks.get(look_before, first)
@@ -84,7 +84,9 @@ class Renderer:
         poses = together(each)
         wall = target if isinstance(target, Wall) else flat(target)
         seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect, cued)
-        scene = Scene(moment.time_s, seen, poses, wall.aspect)
+        melt = before.melt + eased(mix) * (now.melt - before.melt)
+        scene = Scene(moment.time_s, seen, poses, wall.aspect, melt)
+        easel.melt(melt, moment.time_s)
         easel.show(each, [puppet.holds for puppet in moment.puppets])
         layers = [(before, 1.0), (now, mix)] if 0.0 < mix < 1.0 else [(now if mix > 0 else before, 1.0)]
         for layer, opacity in layers:

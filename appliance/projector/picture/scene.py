@@ -38,16 +38,20 @@ WIDER, SPREAD_STEP, MOST_SPREAD = 1.2, 0.5, 5.0  # in a figure height from the m
 SHUTTER = 0.5  # rows of poses for which the shutter is open: 12 ms
 MOST_MOMENTS, BLUR_STEP = 4, 5.0  # pixels from one moment to the next
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
+LUMP = 0.2  # and a wholly amorphous one beyond that
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A moment of the dance as the camera sees it; time_s drives haze and dust."""
+    """A moment of the dance as the camera sees it; time_s drives haze and dust.
+
+    melt: how amorphous figures are, 0 to 1."""
 
     time_s: float
     view: View
     poses: Poses
     aspect: float
+    melt: float = 0.0
 
     @cached_property
     def inputs(self) -> dict[str, Any]:
@@ -104,7 +108,7 @@ class Scene:
         and upper edge, 0..1; margin: around it, of the picture's height."""
         places = self.poses.positions[:rows].reshape(-1, 3).astype(float)
         x, y, _, w = self.view.projection @ np.concatenate([places, np.ones((len(places), 1))], axis=1).T
-        flesh = 0.5 * FLESH / (np.abs(w) * np.array(self.view.slopes)[:, None])
+        flesh = 0.5 * (FLESH + LUMP * self.melt) / (np.abs(w) * np.array(self.view.slopes)[:, None])
         across, up = 0.5 + 0.5 * x / w, 0.5 + 0.5 * y / w
         low, high = np.stack([across, up]) - flesh, np.stack([across, up]) + flesh
         around = np.array([margin / self.aspect, margin])
@@ -152,6 +156,8 @@ class Easel:
         self._canvases: dict[str, Target] = {}
         self._buffers: list[moderngl.Buffer] = []
         self._drawings: list[Drawing] = []
+        self._melt: dict[str, Any] = {}
+        self.melt(0.0, 0.0)
         self._sheets: dict[tuple[str, ...], Drawing] = {}
         self._expose = self.drawing("screen", "expose")
 
@@ -173,6 +179,11 @@ class Easel:
             leaders.append(leader)
         return leaders
 
+    def melt(self, share: float, time_s: float) -> None:
+        """How amorphous figures are from now on, 0 to 1; time_s moves their surface."""
+        root = tuple(self.bind_positions[0].tolist())
+        self._melt = {"melt": share, "melt_time": time_s % 4096.0, "bind_root": root}
+
     def weigh(self, of: Callable[[Poses], Floats]) -> None:
         """Bring a number of each joint onto the GPU, in place of how far it follows. of: a figure's poses."""
         for textures, one in zip(self._figures, self._poses, strict=False):
@@ -180,7 +191,7 @@ class Easel:
 
     def draw_figure(self, figure: int, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
         """Draw what belongs to one of the figures. drawn: as Drawing takes it."""
-        drawing.draw({"back": 0.0} | inputs | self._figures[figure].inputs, *drawn)
+        drawing.draw({"back": 0.0} | self._melt | inputs | self._figures[figure].inputs, *drawn)
 
     def draw_figures(self, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
         """Draw what belongs to a figure once for each. drawn: as Drawing takes it."""

@@ -1,5 +1,6 @@
 // The body's surface in the pose of one row.
 #include skin
+#include melt
 #include held
 in vec3 in_position;
 in vec4 in_normal;  // w: how much light comes near
@@ -22,6 +23,7 @@ void main() {
     mat2x4 by = blended(in_joints, in_weights, row);
     place = moved(by, in_position);
     normal = turned(by, 2.0 * in_normal.xyz - 1.0);
+    melt_body(place, normal, row);
     skin = in_position;
 #ifdef BRUSH
     pressed = 0.0;

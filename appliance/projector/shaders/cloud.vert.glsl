@@ -1,5 +1,6 @@
 // A grain of the cloud: on the body, or on its way off it since it was left behind by a movement.
 #include skin
+#include melt
 #include held
 in vec3 in_position;
 in vec4 in_normal;
@@ -40,6 +41,7 @@ void main() {
     vec3 velocity = (place - before) / (1.5 * row_s);
     float age = back / life, age_s = back * row_s, speed = length(velocity);
     vec3 normal = turned(joint_at(in_joints.x, row), 2.0 * in_normal.xyz - 1.0);
+    melt_body(place, normal, row);
     vec3 drift = textureLod(noise, place.xy * 0.9 + in_chance.zw * 0.15 + time * 0.01, 0.0).rgb
                + textureLod(noise, place.zy * 1.7 - time * 0.013, 0.0).gbr - 1.0;
     float light_one = 1.0 - 0.6 * pow(in_chance.y, 10.0);  // large grains fall, small ones are carried away

@@ -1,0 +1,71 @@
+"""Melt: the passage from a human body to an amorphous one, in every look that has a surface."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import moderngl
+import numpy as np
+import pytest
+
+from appliance.pose.recording import Recording
+from appliance.projector.picture.scene import WHOLE, Scene
+from appliance.projector.still import draw_still, moment_of
+from appliance.show.look import LookConfig
+from tests.projector.golden_looks import AT_S, MEAN_LIMIT, SIZE, difference, renderer
+
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+WITH_SURFACE = ("plaster", "ink", "cloud", "veil", "strings")
+
+
+def melted(style: str, share: float) -> LookConfig:
+    return LookConfig.model_validate({"name": "x", "style": style, "melt": share, "trail_s": 0.0, "fog": 0.0})
+
+
+@pytest.mark.parametrize("style", WITH_SURFACE)
+def test_the_figure_melts_step_by_step(style: str, dance: Recording, gl: moderngl.Context) -> None:
+    """Each step changes the picture, and the whole way is longer than any step."""
+    looks = {str(share): melted(style, share) for share in SHARES}
+    with renderer(gl, dance.skeleton, looks) as made:
+        pictures = [draw_still(gl, made, moment_of(dance, AT_S), name, SIZE) for name in looks]
+    steps = [difference(a, b)[0] for a, b in pairwise(pictures)]
+    whole = difference(pictures[0], pictures[-1])[0]
+    assert min(steps) > 0.1 and max(steps) < whole < sum(steps)
+    assert pictures[-1].max() > 100
+
+
+def test_a_fade_of_looks_is_a_passage_of_the_shape(dance: Recording, gl: moderngl.Context) -> None:
+    """Halfway there is one half-melted figure, not two that shine through each other."""
+    looks = {str(share): melted("plaster", share) for share in (0.0, 0.5, 1.0)}
+    target = gl.framebuffer([gl.texture(SIZE, 4)])
+    with renderer(gl, dance.skeleton, looks) as made:
+        half = draw_still(gl, made, moment_of(dance, AT_S), "0.5", SIZE)
+        made.draw(moment_of(dance, AT_S), "1.0", "0.0", 0.5, target)
+        whole = draw_still(gl, made, moment_of(dance, AT_S), "1.0", SIZE)
+    faded = np.frombuffer(target.read(components=4), np.uint8).reshape(SIZE[1], SIZE[0], 4)[::-1, :, :3]
+    assert np.abs(faded.astype(int) - half).max() <= 2
+    assert difference(half, whole)[0] > MEAN_LIMIT
+
+
+def test_no_part_of_it_is_cut_off(
+    dance: Recording, gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last step is drawn where the joints are and a margin: the lump lies inside of it."""
+    with renderer(gl, dance.skeleton, {"x": melted("plaster", 1.0)}) as made:
+        moments = [moment_of(dance, float(time_s)) for time_s in np.arange(2.0, dance.seconds, 9.0)]
+        cut = [draw_still(gl, made, moment, "x", SIZE) for moment in moments]
+        monkeypatch.setattr(Scene, "box", lambda *_args, **_keys: WHOLE)
+        for before, moment in zip(cut, moments, strict=True):
+            assert np.abs(before.astype(int) - draw_still(gl, made, moment, "x", SIZE)).max() <= 2
+
+
+def test_its_surface_swims_while_the_dancer_stands_still(dance: Recording, gl: moderngl.Context) -> None:
+    """A human body does not."""
+    for share, moves in ((1.0, True), (0.0, False)):
+        with renderer(gl, dance.skeleton, {"x": melted("veil", share)}) as made:
+            moment = moment_of(dance, AT_S)
+            first = draw_still(gl, made, moment, "x", SIZE)
+            ago = [time_s + 1.0 for time_s in moment.trail_times]
+            moment.time_s, moment.trail_times = moment.time_s + 1.0, ago
+            later = draw_still(gl, made, moment, "x", SIZE)
+        assert (difference(first, later)[0] > 0.5) == moves
