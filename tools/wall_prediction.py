@@ -1,0 +1,114 @@
+"""Judges the projector's prediction on a dance: `python -m tools.wall_prediction JOURNAL`.
+
+JOURNAL: a folder that `bunraku play --emulate --journal JOURNAL` wrote. The display runs at 60 Hz; at each
+picture the predicted dance is compared with the dance as it then was.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from appliance.box.clock import TICK_S
+from appliance.cli.pictures import load_dance
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.projector.prediction import SPAN, Figure, Prediction
+
+PICTURES_HZ = 60.0
+STANDS_M_S = 0.05
+MILLISECONDS = (10.0, 20.0, 30.0, 40.0)
+
+
+class Wall(NamedTuple):
+    """What a wall shows: world rotations (N, J, 4) and positions (N, J, 3) at the pictures' times."""
+
+    world: Array
+    positions: Array
+
+    def at(self, times: Array, when: Array) -> Wall:
+        """At other times (M,), by straight lines between its own (N,)."""
+        before = np.clip(np.searchsorted(times, when, side="right") - 1, 0, len(times) - 2)
+        share = ((when - times[before]) / TICK_S)[:, None, None]
+        return Wall(*(part[before] * (1.0 - share) + part[before + 1] * share for part in self))
+
+
+def judged(dance: Recording, milliseconds: float) -> str:
+    """A row of the table: of the dance predicted by so much; 0: interpolated, one tick late."""
+    positions, world = dance.skeleton.forward_kinematics(dance.poses, dance.roots)
+    danced = Wall(_without_jumps(world), positions)
+    times = np.arange(len(dance)) * TICK_S
+    pictures = np.arange(1.0, times[-1] - 0.5, 1.0 / PICTURES_HZ)
+    truth = danced.at(times, pictures)
+    when = pictures - TICK_S  # a picture lies between the two newest frames
+    shown = _predicted(dance, danced, milliseconds / 1000.0 / TICK_S).at(times, when)
+    meant = danced.at(times, when + milliseconds / 1000.0)
+    rough, smooth = (np.sqrt(np.mean(np.diff(wall.positions, 2, axis=0) ** 2)) for wall in (shown, truth))
+    name = f"predicted by {milliseconds:g} ms" if milliseconds else "interpolated"
+    return (
+        f"| {name} | {_apart(shown, meant):.1f} | {_apart(shown, truth):.1f} | {rough / smooth:.2f} | "
+        f"{_slides(dance, shown, truth):.1f} |"
+    )
+
+
+def _predicted(dance: Recording, danced: Wall, ticks: float) -> Wall:
+    if not ticks:
+        return danced
+    figures = [
+        Figure(positions.astype(np.float32), world.astype(np.float32), np.zeros(len(world), np.float32))
+        for world, positions in zip(*danced, strict=True)
+    ]
+    predict = Prediction(dance.skeleton)
+    ahead = [
+        predict(figures[now], figures[max(now - SPAN, 0)], figures[max(now - 2 * SPAN, 0)], ticks)
+        for now in range(len(figures))
+    ]
+    world, positions = (np.array([one[part] for one in ahead], np.float64) for part in (1, 0))
+    return Wall(_without_jumps(world), positions)
+
+
+def _apart(one: Wall, other: Wall) -> float:
+    """95th percentile over joints and pictures, degrees."""
+    return float(
+        np.degrees(np.percentile(quaternion.angle_between(_unit(one.world), _unit(other.world)), 95))
+    )
+
+
+def _slides(dance: Recording, shown: Wall, truth: Wall) -> float:
+    """95th percentile of how fast feet move on the wall that stand, cm/s."""
+    feet = [place for place, name in enumerate(dance.skeleton.names) if name.endswith("Foot")]
+    speeds, seen = (
+        np.linalg.norm(np.diff(wall.positions[:, feet], axis=0), axis=-1) * PICTURES_HZ
+        for wall in (truth, shown)
+    )
+    return float(100.0 * np.percentile(seen[speeds < STANDS_M_S], 95))
+
+
+def _without_jumps(rotations: Array) -> Array:
+    signs = np.sign(np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True))
+    signs[signs == 0.0] = 1.0
+    return np.concatenate([rotations[:1], rotations[1:] * np.cumprod(signs, axis=0)])
+
+
+def _unit(rotations: Array) -> Array:
+    unit: Array = rotations / np.linalg.norm(rotations, axis=-1, keepdims=True)
+    return unit
+
+
+def print_table(journal: Path) -> None:
+    """The table of docs/notebook.md."""
+    dance = load_dance(journal).recordings[0]
+    print(
+        "| at 60 pictures a second | error of prediction | off the dance | roughness | standing feet, cm/s |"
+    )
+    print("|---|---|---|---|---|")
+    for milliseconds in (0.0, *MILLISECONDS):
+        print(judged(dance, milliseconds))
+
+
+if __name__ == "__main__":
+    print_table(Path(sys.argv[1]))
