@@ -65,6 +65,9 @@ def vary(
         Path | None,
         typer.Option(help="checkpoint.pt of a pose model: draws the variations as paths over its map."),
     ] = None,
+    same_timing: Annotated[
+        bool, typer.Option("--same-timing", help="Gestures come when they come in the phrase.")
+    ] = False,
     recordings: Annotated[
         Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
     ] = None,
@@ -81,11 +84,13 @@ def vary(
     if (phrase is not None and free) or (phrase is None and not free and show is None):
         raise typer.BadParameter("Give a PHRASE, or --free for samples without one.")
     if free:
-        refuse_idle(context, ("mix", "share", "region", "start", "seconds"), "without a PHRASE")
+        refuse_idle(
+            context, ("mix", "share", "region", "start", "seconds", "same_timing"), "without a PHRASE"
+        )
     if mix is None:
         refuse_idle(context, ("share",), "without --mix")
     else:
-        noise = ("sigma", "count", "seed")
+        noise = ("sigma", "count", "seed", "same_timing")
         refuse_idle(context, noise, "with --mix, which makes one dance and has no noise")
     with clear_errors("vary"):
         from appliance.studio.variations.vary import VaryOptions, run
@@ -107,6 +112,7 @@ def vary(
                 share=share,
                 regions=tuple(one.value for one in region or ()),
                 on_map=on_map,
+                keeps_timing=same_timing,
                 reading=reading,
             )
         )

@@ -11,12 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.levers.sources import PATH
+from appliance.levers.sources import PATH, VARY
 from appliance.pose.bvh import read_bvh
 from appliance.show.bundle import default_show_path
+from appliance.studio.evaluation.dance_figures import jerk
 from appliance.studio.improviser.naturalness import standing_of
 from appliance.studio.opened_model import open_show
 from appliance.studio.pose_space.ground import Ground
+from appliance.studio.variations import variations
+from appliance.studio.variations.timing import difference
 from tests.studio.conftest import bunraku
 
 WITHOUT_TORCH = """
@@ -57,6 +60,20 @@ def test_feet_stand_as_on_stage_and_not_as_the_network_leaves_them(tmp_path: Pat
     null = standing_of(replace(varied, roots=phrase.roots[: len(varied)])).slide_cm_s
     assert stood < 0.5 * null
     assert np.isfinite(varied.poses).all()
+
+
+def test_a_variation_goes_far_from_its_phrase_and_trembles_no_more() -> None:
+    """The null product is the network's own motion, which trembles without any noise."""
+    opened = open_show(VARY, default_show_path())
+    moving = list(opened.dataset.moving)
+    own = opened.dataset.training[0].recording.excerpt(0.0, 8.0).poses[:, moving].astype(np.float32)
+    phrase = variations.encode_phrase(opened.network, own)
+    for seed in range(3):
+        made = variations.varied(opened.network, phrase, 1.0, seed)
+        assert difference(phrase.poses, made).degrees > 6
+        assert jerk(made) <= 1.2 * jerk(phrase.poses)
+    assert jerk(phrase.known) > 1.5 * jerk(phrase.poses)
+    assert difference(phrase.poses, phrase.known).degrees > 4
 
 
 @pytest.mark.parametrize(

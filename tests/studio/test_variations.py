@@ -14,7 +14,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.studio.evaluation.coders import load_checkpoint
 from appliance.studio.variations import variations
-from appliance.studio.variations.timing import difference, warping_path
+from appliance.studio.variations.timing import difference, retimed, warping_path
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, swaying
 
@@ -92,10 +92,52 @@ def test_the_more_noise_the_further_from_the_phrase(model: Path) -> None:
     assert difference(again[0], again[2]).degrees > 0.5 * difference(own, again[0]).degrees > 0
 
 
+def test_without_noise_the_phrase_comes_back_and_not_the_networks_blur_of_it(model: Path) -> None:
+    coder, _ = load_checkpoint(model / "checkpoint.pt")
+    phrase = variations.encode_phrase(coder.autoencoder, phrase_of())
+    own = variations.varied(coder.autoencoder, phrase, 0.0, 1)
+    assert difference(phrase.poses, own).degrees < 0.05
+    assert difference(phrase.poses, phrase.known).degrees > 1  # the null product: decoded as it is
+
+
+def test_other_timing_is_the_same_way_at_other_times() -> None:
+    phrase = swaying(8.0)
+    late = retimed(phrase, 0.15, 3)
+    found = difference(phrase.poses, late.poses)
+    assert found.degrees > 1 and found.timing > 0.5  # warping takes it away: the form is the same
+    assert 0.02 < found.shift_s < 0.4
+    for end in (0, -1):
+        np.testing.assert_allclose(late.poses[end], phrase.poses[end], atol=1e-9)
+        np.testing.assert_allclose(late.roots[end], phrase.roots[end], atol=1e-9)
+    fastest = retimed(phrase, 9.0, 3)  # more than a body can: it never goes back in time
+    assert np.abs(np.diff(fastest.roots[:, 0])).max() < 1.35 * np.abs(np.diff(phrase.roots[:, 0])).max()
+    assert difference(phrase.poses, retimed(phrase, 0.15, 4).poses).degrees != found.degrees
+
+
+def test_at_0_the_file_is_the_phrase_and_at_a_quarter_its_timing_is_another(
+    model: Path, recordings: Path, tmp_path: Path
+) -> None:
+    def shares(*options: object) -> dict[str, dict[str, float]]:
+        words = ["--model", model / "checkpoint.pt", "--count", 1, "--out", tmp_path, *options]
+        result = bunraku("vary", recordings / "sway_0.bvh", *words)
+        assert result.exit_code == 0, result.output
+        found: dict[str, dict[str, float]] = json.loads((tmp_path / "variations.json").read_text())["figures"]
+        assert found["0_sigma"]["degrees"] < 0.05
+        return found
+
+    shares("--sigma", 0)
+    phrase, same = (read_bvh(tmp_path / f"{name}.bvh") for name in ("phrase", "variation_1"))
+    np.testing.assert_allclose(same.roots, phrase.roots[: len(same)], atol=1e-6)
+    assert np.degrees(quaternion.angle_between(same.poses, phrase.poses[: len(same)])).max() < 0.1
+    assert shares("--sigma", 0.25)["variation_1"]["timing"] > 0.3
+    kept = shares("--sigma", 0.25, "--same-timing")["variation_1"]
+    assert kept["timing"] < 0.2 and kept["jerk"] < 1.2
+
+
 def test_a_mixture_goes_from_one_phrase_to_the_other(model: Path) -> None:
     coder, _ = load_checkpoint(model / "checkpoint.pt")
     one, other = (variations.encode_phrase(coder.autoencoder, phrase_of(seed)) for seed in (0, 1))
-    ends = [variations.varied(coder.autoencoder, each, 0.0, 1) for each in (one, other)]
+    ends = [each.known for each in (one, other)]
     mixed = [variations.mixed(coder.autoencoder, one, other, share, 1) for share in (0.0, 0.5, 1.0)]
     assert difference(mixed[0], ends[0]).degrees < 0.1 and difference(mixed[2], ends[1]).degrees < 0.1
     apart = difference(*ends).degrees
@@ -126,13 +168,13 @@ def test_vary_writes_each_variation_its_figures_and_a_strip(
     )
     count = len(first)
     arm, belly = (phrase.skeleton.index(name) for name in ("lShldr", "abdomen"))
-    assert np.degrees(quaternion.angle_between(first.poses[:, arm], phrase.poses[:count, arm])).max() > 1
+    assert np.degrees(quaternion.angle_between(first.poses[:, arm], phrase.poses[:count, arm])).max() > 0.2
     assert np.degrees(quaternion.angle_between(first.poses[:, arm], second.poses[:, arm])).max() > 0.05
     np.testing.assert_allclose(
         quaternion.angle_between(first.poses[:, belly], phrase.poses[:count, belly]), 0, atol=2e-3
     )
     figures = json.loads((tmp_path / "variations.json").read_text())["figures"]
-    assert list(figures) == ["phrase", "variation_1", "variation_2"]
+    assert list(figures) == ["phrase", "0_sigma", "variation_1", "variation_2"]
     assert figures["variation_1"]["degrees"] > 0 and figures["phrase"]["nearest"] < 0.5
     assert (tmp_path / "variations.png").exists() and "arms alone" in result.output
     assert "2 of 2: planting the feet of variation_2 ..." in result.output

@@ -38,6 +38,14 @@ def largest_step(poses: Array) -> float:
     return float(_steps(poses).max())
 
 
+def jerk(poses: Array) -> float:
+    """Mean second difference of the joints' angular velocities, poses (T, M, 4), degrees a tick cubed."""
+    turns = quaternion.multiply(poses[1:], quaternion.inverse(poses[:-1]))
+    axes, angles = quaternion.to_axis_angle(turns)
+    velocities = axes * np.degrees(angles)[..., None]
+    return float(np.linalg.norm(np.diff(velocities, n=2, axis=0), axis=-1).mean())
+
+
 def roughness(poses: Array) -> float:
     """99th percentile of the angular acceleration over ticks and joints, degrees a tick squared.
 

@@ -28,7 +28,7 @@ PROMPT_S = 3.0  # seconds of a recording, where an improviser that makes no endl
 
 
 def continue_of_show(options: ImproviseOptions) -> None:
-    """What the improviser of a show dances after the prompt or the show's phrase. Raises StudioError."""
+    """The improviser of a show dances on after the prompt or the show's phrase. Raises StudioError."""
     assert options.show is not None
     console, opened = Console(stderr=True), open_show(IMPROVISE, options.show)
     network = opened.network

@@ -1,19 +1,22 @@
-"""How far a variation is from its phrase, and how much of that is timing: dynamic time warping."""
+"""Timing of a variation: a phrase at other times, and how much of a difference is timing (time warping)."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
 from appliance.studio.evaluation.nearest import without_heading
 
 REACH_S = 1.0  # a pose may be compared with one that is danced this much earlier or later
 FPS = 50.0
+WAVE_S = 2.5  # half a wave of a changed timing at least: a gesture, not a tremor
+MOST_RATE = 0.3  # how much faster or slower than the phrase
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,26 @@ class Difference:
     def timing(self) -> float:
         """Share of the difference that warping takes away, 0 to 1."""
         return 1 - self.warped / self.degrees if self.degrees > 1e-6 else 0.0
+
+
+def retimed(phrase: Recording, seconds: float, seed: int) -> Recording:
+    """The phrase at 50 Hz, its gestures earlier or later by `seconds` (root mean square), or by less, so that
+    none is faster than MOST_RATE allows; the first and last pose stay in their place.
+    """
+    count = len(phrase)
+    at = np.linspace(0.0, np.pi, count)
+    waves = max(1, round(count / FPS / WAVE_S))
+    sizes = np.random.default_rng([seed, waves]).standard_normal(waves)
+    lag = (sizes[:, None] * np.sin(np.arange(1, waves + 1)[:, None] * at)).sum(axis=0)
+    lag *= seconds * FPS / max(float(np.sqrt((lag**2).mean())), 1e-9)
+    lag *= min(1.0, MOST_RATE / max(float(np.abs(np.diff(lag)).max()), 1e-9))
+    ticks = np.clip(np.arange(count) + lag, 0.0, count - 1.0)
+    before = np.minimum(ticks.astype(int), max(count - 2, 0))
+    share = ticks - before
+    after = np.minimum(before + 1, count - 1)
+    poses = quaternion.slerp(phrase.poses[before], phrase.poses[after], share[:, None])
+    roots = phrase.roots[before] + share[:, None] * (phrase.roots[after] - phrase.roots[before])
+    return replace(phrase, poses=quaternion.continuous(poses), roots=roots)
 
 
 def difference(phrase: Array, variation: Array) -> Difference:

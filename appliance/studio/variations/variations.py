@@ -25,15 +25,25 @@ if TYPE_CHECKING:
     from appliance.studio.coded_windows import Network
 
 OVERLAP = 4  # windows that know a pose
+SMOOTH_FRAMES = (
+    25  # of what noise changes: its size stays (12.3 of 12.7 degrees), the decoder's trembling goes
+)
 
 
 @dataclass(frozen=True)
 class EncodedPhrase:
-    """A phrase as latents (W, Z) and headings (W, 4) of its windows; ticks: poses that they cover."""
+    """A phrase as latents (W, Z) and headings (W, 4) of its windows; poses (T, M, 4): those that they cover,
+    without sign jumps; known (T, M, 4): the same as the network decodes them, blurred.
+    """
 
     latents: Latents
     facing: Array
-    ticks: int
+    poses: Poses
+    known: Poses
+
+    @property
+    def ticks(self) -> int:
+        return len(self.poses)
 
 
 def encode_phrase(network: Network, poses: Array) -> EncodedPhrase:
@@ -48,20 +58,37 @@ def encode_phrase(network: Network, poses: Array) -> EncodedPhrase:
     starts = np.arange(0, len(poses) - length + 1, hop)
     whole = quaternion.continuous(poses).astype(np.float32)
     latents, facing = encoded(network, whole[starts[:, None] + np.arange(length)])
-    return EncodedPhrase(latents, facing, int(starts[-1]) + length)
+    known = _danced(network, latents, facing)
+    return EncodedPhrase(latents, facing, whole[: len(known)], known)
 
 
 def varied(network: Network, phrase: EncodedPhrase, sigma: float, seed: int) -> Poses:
-    """The phrase moved by noise of `sigma` standard deviations of the prior; 0: as the model knows it."""
+    """The phrase moved by noise of `sigma` standard deviations of the prior; 0: the phrase as it is.
+
+    Only what the noise changes in the network's motion is put on the phrase: what the network does not know
+    of the phrase stays in it.
+    """
     noise = np.random.default_rng(seed).standard_normal(phrase.latents.shape[1])
-    return _danced(network, phrase, phrase.latents + np.asarray(sigma * noise, dtype=np.float32))
+    moved = phrase.latents + np.asarray(sigma * noise, dtype=np.float32)
+    return put_on(phrase.poses, phrase.known, _danced(network, moved, phrase.facing))
+
+
+def put_on(poses: Poses, before: Poses, after: Poses) -> Poses:
+    """Poses (T, M, 4) turned as a motion is turned that goes from `before` to `after`, smoothed in time."""
+    change = quaternion.multiply(after, quaternion.inverse(before))
+    change = quaternion.continuous(np.where(change[:1, :, :1] < 0, -change, change))
+    weights = np.hanning(SMOOTH_FRAMES + 2)[1:-1]
+    padded = np.pad(change, ((SMOOTH_FRAMES // 2,) * 2, (0, 0), (0, 0)), mode="edge")
+    smooth = sum(w * padded[at : at + len(change)] for at, w in enumerate(weights / weights.sum()))
+    turned: Poses = quaternion.multiply(quaternion.normalize(smooth), poses).astype(np.float32)
+    return turned
 
 
 def mixed(network: Network, phrase: EncodedPhrase, other: EncodedPhrase, share: float, seed: int) -> Poses:
     """The phrase with a share of another one, as long as the shorter of them."""
     count = min(len(phrase.latents), len(other.latents))
     path = latent_paths.between(phrase.latents[:count], other.latents[:count], share, 0.0, seed)
-    return _danced(network, phrase, path)
+    return _danced(network, path, phrase.facing[:count])
 
 
 def sampled(network: Network, spread: float, seed: int) -> Poses:
@@ -75,9 +102,9 @@ def hop_of(network: Network) -> int:
     return max(1, window_of(network) // OVERLAP)
 
 
-def _danced(network: Network, phrase: EncodedPhrase, path: Latents) -> Poses:
+def _danced(network: Network, path: Latents, facing: Array) -> Poses:
     hop = hop_of(network)
-    windows = decoded(network, path, phrase.facing[: len(path)], is_raw=True)
+    windows = decoded(network, path, facing, is_raw=True)
     starts, ticks = np.arange(len(windows)) * hop, (len(windows) - 1) * hop + windows.shape[1]
     return hann_mean(aligned_windows(quaternion.continuous(windows, axis=1), starts, ticks), starts, ticks)
 

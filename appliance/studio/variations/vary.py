@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from rich.table import Table
 
 from appliance.levers.sources import VARY
 from appliance.pictures.filmstrip import Strip, draw_strips
+from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
@@ -20,7 +22,7 @@ from appliance.studio.dance_files import write_recording, write_report
 from appliance.studio.data.dataset import FPS
 from appliance.studio.data.regions import regions_of
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.evaluation.dance_figures import energy
+from appliance.studio.evaluation.dance_figures import energy, jerk
 from appliance.studio.evaluation.nearest import Reference, reference_of
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
@@ -30,9 +32,11 @@ from appliance.studio.progress import doing, shown
 from appliance.studio.standing_dance import excerpt_of, standing
 from appliance.studio.trained_on import open_model
 from appliance.studio.variations import variations
-from appliance.studio.variations.timing import difference
+from appliance.studio.variations.timing import difference, retimed
 
 COLUMNS = 8  # in a strip
+SAME = 1e-5  # difference of quaternions
+TIMING_S = 0.2  # how much earlier or later gestures come, from half a standard deviation on
 
 
 @dataclass(frozen=True)
@@ -57,13 +61,14 @@ class VaryOptions:
     share: float = 0.5
     regions: tuple[str, ...] = ()
     on_map: Path | None = None
+    keeps_timing: bool = False
     reading: ReadingOptions = AS_THE_FILES_SAY
 
 
 @dataclass(frozen=True)
 class Figures:
     """For a variation: degrees from the phrase, after time warping, the share of timing, from the nearest
-    recorded pose; energy of the phrase's. For a sample only the figures that need no phrase.
+    recorded pose; energy and jerk of the phrase's. For a sample only the figures that need no phrase.
     """
 
     nearest: float
@@ -71,6 +76,15 @@ class Figures:
     warped: float | None = None
     timing: float | None = None
     energy: float | None = None
+    jerk: float | None = None
+
+
+@dataclass(frozen=True)
+class _Danced:
+    """poses (T, M, 4) of the moving joints, and the recording on whose path and floor they stand."""
+
+    poses: Poses
+    path: Recording | None
 
 
 def run(options: VaryOptions) -> None:
@@ -94,10 +108,14 @@ def run(options: VaryOptions) -> None:
         moving = given.poses[:, list(dataset.moving)]
         figures["phrase"] = measured(moving, None, reference)
         strips.append(Strip(given.poses, given.roots, "phrase"))
-    for number, (name, poses) in enumerate(danced.items(), 1):
+        if options.mix is None:
+            own = variations.encode_phrase(opened.network, moving.astype(np.float32))
+            figures["0_sigma"] = measured(variations.varied(opened.network, own, 0.0, 0), moving, reference)
+    for number, (name, one) in enumerate(danced.items(), 1):
+        poses = one.poses
         words = f"{number} of {len(danced)}: planting the feet of {name}"
-        whole = standing(
-            poses, given, dataset, partial(shown, words=words, console=console), opened.is_of_show
+        whole = _untouched(poses, one.path, dataset.moving) or standing(
+            poses, one.path, dataset, partial(shown, words=words, console=console), opened.is_of_show
         )
         write_recording(options.out / f"{name}.bvh", whole)
         figures[name] = measured(
@@ -122,6 +140,15 @@ def run(options: VaryOptions) -> None:
     console.print(f"{options.out}: BVH of each, variations.png and variations.json.", highlight=False)
 
 
+def _untouched(poses: Poses, path: Recording | None, moving: Sequence[int]) -> Recording | None:
+    """The recording itself where the poses are its own: it stands already."""
+    if path is None:
+        return None
+    own = path.poses[: len(poses), list(moving)]
+    same = np.abs(quaternion.aligned(poses, own) - own).max() < SAME
+    return path.excerpt(0.0, len(poses) / FPS) if same else None
+
+
 def measured(poses: Array, phrase: Array | None, reference: Reference) -> Figures:
     """Figures of poses (T, M, 4) beside a phrase's."""
     nearest = float(reference.nearest(poses).mean())
@@ -130,12 +157,17 @@ def measured(poses: Array, phrase: Array | None, reference: Reference) -> Figure
     off = difference(phrase, poses)
     pace = energy(phrase[: len(poses)])
     return Figures(
-        nearest, off.degrees, off.warped, off.timing, energy(poses) / pace if pace > 1e-9 else None
+        nearest,
+        off.degrees,
+        off.warped,
+        off.timing,
+        energy(poses) / pace if pace > 1e-9 else None,
+        jerk(poses) / max(jerk(phrase[: len(poses)]), 1e-9),
     )
 
 
 def _draw_on_map(
-    options: VaryOptions, given: Recording | None, danced: dict[str, Poses], console: Console
+    options: VaryOptions, given: Recording | None, danced: dict[str, _Danced], console: Console
 ) -> None:
     """The link of both models: the phrase and its variations as a bundle of paths over the map of poses."""
     assert options.on_map is not None
@@ -143,37 +175,43 @@ def _draw_on_map(
     ground, paths = Ground.of(coder.autoencoder, dataset), {}
     if given is not None:
         paths["phrase"] = ground.path(given.poses[:, list(dataset.moving)])
-    paths |= {name: ground.path(poses) for name, poses in danced.items()}
+    paths |= {name: ground.path(one.poses) for name, one in danced.items()}
     ground.draw(options.out / "map.png", paths)
 
 
-def _dances(options: VaryOptions, opened: OpenedModel, given: Recording | None) -> dict[str, Poses]:
-    """(T, M, 4) of the moving joints by name."""
+def _dances(options: VaryOptions, opened: OpenedModel, given: Recording | None) -> dict[str, _Danced]:
+    """The dances by name."""
     network, dataset = opened.network, opened.dataset
     seeds = range(options.seed, options.seed + options.count)
     if given is None:
-        return {f"sample_{seed}": variations.sampled(network, options.sigma, seed) for seed in seeds}
+        return {
+            f"sample_{seed}": _Danced(variations.sampled(network, options.sigma, seed), None)
+            for seed in seeds
+        }
     moving = list(dataset.moving)
-    own = given.poses[:, moving].astype(np.float32)
-    phrase = variations.encode_phrase(network, own)
+
+    def encoded(recording: Recording) -> variations.EncodedPhrase:
+        return variations.encode_phrase(network, recording.poses[:, moving].astype(np.float32))
+
     if options.mix is not None:
         other = excerpt_of(
             options.mix, options.start, options.seconds, opened.moved, dataset, options.reading
-        ).poses[:, moving]
-        made = {
-            "mixed": variations.mixed(
-                network, phrase, variations.encode_phrase(network, other), options.share, 1
-            )
-        }
+        )
+        mixture = variations.mixed(network, encoded(given), encoded(other), options.share, 1)
+        made = {"mixed": _Danced(mixture, given)}
     else:
+        seconds = 0.0 if options.keeps_timing or options.regions else TIMING_S * min(1.0, 2 * options.sigma)
+        timed = {seed: retimed(given, seconds, seed) if seconds else given for seed in seeds}
         made = {
-            f"variation_{seed}": variations.varied(network, phrase, options.sigma, seed) for seed in seeds
+            f"variation_{seed}": _Danced(variations.varied(network, encoded(path), options.sigma, seed), path)
+            for seed, path in timed.items()
         }
     if not options.regions:
         return made
     regions = regions_of(dataset.skeleton, dataset.moving_names, "Omit --region.")
     changed = sorted(place for name in options.regions for place in getattr(regions, name))
-    return {name: _only(poses, own, changed) for name, poses in made.items()}
+    own = given.poses[:, moving].astype(np.float32)
+    return {name: replace(one, poses=_only(one.poses, own, changed)) for name, one in made.items()}
 
 
 def _only(poses: Poses, own: Poses, changed: list[int]) -> Poses:
@@ -195,7 +233,7 @@ def _words(options: VaryOptions, phrase: Path | None) -> str:
 def _table(figures: dict[str, Figures], title: str) -> Table:
     table = Table(title=title, box=SIMPLE_HEAD)
     table.add_column(no_wrap=True)
-    for name in ("from the phrase", "of that timing", "from recorded", "energy"):
+    for name in ("from the phrase", "of that timing", "from recorded", "energy", "jerk"):
         table.add_column(name, justify="right")
     for name, one in figures.items():
         table.add_row(
@@ -204,5 +242,6 @@ def _table(figures: dict[str, Figures], title: str) -> Table:
             "" if one.timing is None else f"{one.timing:.0%}",
             f"{one.nearest:.1f}°",
             "" if one.energy is None else f"{one.energy:.2f}",
+            "" if one.jerk is None else f"{one.jerk:.2f}",
         )
     return table
