@@ -93,6 +93,24 @@ LIT = """() => {
 
 
 @ON_BOTH
+def test_the_test_card_takes_the_place_of_the_dance_and_goes_again(
+    context: BrowserContext, hall: tuple[Box, Page, Node], wall: Projection
+) -> None:
+    _, page, _ = hall
+    tab = unlocked_tab(context, page, "picture")
+    button = tab.locator("#test_card")
+    expect(button).to_have_text(re.compile("Test card|Testbild|Mire"))
+    expect(tab.locator("#info")).to_have_text(re.compile("Figures|Zahlen|Chiffres"))
+    shown = []
+    for on in (True, False):
+        press(tab, "#test_card")
+        expect(button).to_have_attribute("aria-pressed", str(on).lower())
+        wall.await_picture(lambda picture, on=on: bool((picture > 240).all(axis=2).any()) == on)
+        shown.append(on)
+    assert shown == [True, False]
+
+
+@ON_BOTH
 def test_a_corner_follows_the_finger_on_the_wall(
     context: BrowserContext, hall: tuple[Box, Page, Node], wall: Projection
 ) -> None:

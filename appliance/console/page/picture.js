@@ -1,17 +1,18 @@
-// Picture: brightness, grid, test card, and corners that move on the wall as far as a finger moves here.
+// Picture: brightness, grid, test card, figures, and corners that move on the wall as far as a finger moves here.
 import { command, say } from "./device.js";
 import { byId, first } from "./elements.js";
 import { held } from "./hold.js";
 
 const CORNERS = [[0, 0], [1, 0], [1, 1], [0, 1]]; // in the projector's order, and where they are without any change
+const SWITCHES = ["grid", "test_card", "info"]; // what the projector calls them, and their addresses
 const STEP_S = 0.12, NUDGE = 0.002;
 const OWN_MS = 2500; // the projector tells once a second: until then this page's own change is the newest
 const before = []; // corners before each change made here, for undo
 let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]);
 
 export function initPicture() {
-  for (const [id, address] of [["grid", "/projector/grid"], ["info", "/projector/info"]]) {
-    byId(id).addEventListener("click", () => switchOn(id, address, byId(id).getAttribute("aria-pressed") !== "true"));
+  for (const id of SWITCHES) {
+    byId(id).addEventListener("click", () => switchOn(id, `/projector/${id}`, byId(id).getAttribute("aria-pressed") !== "true"));
   }
   held(byId("corners-reset"), () => change("/projector/corners/reset", [], CORNERS), (sentence) => say(sentence));
   byId("corners-undo").addEventListener("click", undo);
@@ -36,7 +37,7 @@ export function showPicture(value) {
   if (!wall?.corners || performance.now() < ownUntil) return;
   if (document.activeElement !== byId("brightness")) byId("brightness").value = Math.round(100 * wall.brightness);
   tellBrightness();
-  for (const id of ["grid", "info"]) byId(id).setAttribute("aria-pressed", String(wall[id]));
+  for (const id of SWITCHES) byId(id).setAttribute("aria-pressed", String(wall[id] === true));
   put(wall.corners);
 }
 

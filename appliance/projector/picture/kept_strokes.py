@@ -9,11 +9,11 @@ import moderngl
 from appliance.projector.picture.scene import Easel
 from appliance.projector.picture.targets import Target
 
-LINES = 400  # of the sheet
+LINES = 400  # the height of the sheet
 STEP_S = 0.4  # strokes are laid onto it so often
 WET, STAIN = 0.6, 0.2  # how much of a stroke it takes; strokes over each other make no darker one
-WET_LOSS = 4  # of 255 in a step: wet strokes are gone after 15 s
-STAIN_STEPS = 60  # for one of 255: stains are gone after 20 minutes
+WET_LOSS = 4  # shades that a step takes: wet strokes are gone after 15 s
+STAIN_STEPS = 60  # steps that take one shade of a stain: stains are gone after 20 minutes
 SHADES = 255.0
 _LESS = moderngl.FUNC_REVERSE_SUBTRACT, moderngl.FUNC_REVERSE_SUBTRACT
 
