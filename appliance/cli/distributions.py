@@ -24,7 +24,7 @@ DISTRIBUTIONS = (
         "studio",
         (
             *("convert", "retarget", "import", "inspect", "train", "evaluate", "export", "experiment"),
-            *("granular", "improvise", "vary", "map", "path", "duet"),
+            *("granular", "improvise", "vary", "map", "path", "duet", "compare-blind"),
         ),
     ),
 )

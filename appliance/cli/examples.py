@@ -103,6 +103,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
         "bunraku path --model out/pose/checkpoint.pt --out drawn.bvh --draw map.svg",
     ),
     "duet": ("bunraku duet couples --show my_show", "bunraku duet couples --show my_show --minutes 5"),
+    "compare-blind": (
+        "bunraku compare-blind mine.bvh other.bvh --pairs 20 --out study.html",
+        "bunraku compare-blind --votes votes-anna.json --votes votes-ben.json",
+    ),
     "version": ("bunraku version",),
 }
 ORDER = tuple(dict.fromkeys(path.split()[0] for path in EXAMPLES if path))
@@ -144,5 +148,6 @@ OTHER_WORDS: dict[str, tuple[str, ...]] = {
     "map": ("space", "pca", "umap", "embed"),
     "path": ("wobble", "line", "trace"),
     "duet": ("partner", "couple", "answer", "dependence"),
+    "compare-blind": ("study", "votes", "preference", "judge", "survey"),
     "version": ("about",),
 }

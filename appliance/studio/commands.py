@@ -16,6 +16,7 @@ from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.show.bundle import named_show
 from appliance.studio import (
+    compare_blind_command,
     duet_command,
     exchange_command,
     experiment_command,
@@ -289,3 +290,4 @@ app.add_typer(improvise_command.app)
 app.add_typer(vary_command.app)
 app.add_typer(path_command.app)
 app.add_typer(duet_command.app)
+app.add_typer(compare_blind_command.app)

@@ -102,5 +102,5 @@ def test_every_command_that_reads_recordings_takes_the_same_options() -> None:
     readers = {name for name, one in commands.items() if {part.name for part in one.params} >= READING}
     assert readers == {
         *("filmstrip", "convert", "retarget", "inspect", "train", "evaluate", "export", "experiment"),
-        *("granular", "improvise", "vary", "map", "path", "duet"),
+        *("granular", "improvise", "vary", "map", "path", "duet", "compare-blind"),
     }

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
     from appliance.studio.coded_windows import Network
 
 OVERLAP = 4  # windows that know a pose
-SMOOTH_FRAMES = (
-    25  # of what noise changes: its size stays (12.3 of 12.7 degrees), the decoder's trembling goes
-)
+SMOOTH_FRAMES = 25  # the noise's effect is smoothed: 12.3 of 12.7 degrees stay, trembling goes
 
 
 @dataclass(frozen=True)
