@@ -14,7 +14,8 @@ OfShow = Annotated[
     Path | None,
     typer.Option(
         callback=named_show,
-        help="Instead of --model: a show whose network does it untrained; 'default' comes with the box.",
+        metavar="SHOW",
+        help="Instead of --model: a show whose own network does it; 'default' comes with the box.",
     ),
 ]
 

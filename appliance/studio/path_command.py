@@ -72,9 +72,13 @@ def path(
 def map_(
     context: typer.Context,
     files: Annotated[
-        list[Path] | None,
-        typer.Argument(help="BVH recordings to lay over the map.", show_default="the phrase of --show"),
-    ] = None,
+        list[Path],
+        typer.Argument(
+            default_factory=list,
+            help="BVH recordings to lay over the map.",
+            show_default="the phrase of --show",
+        ),
+    ],
     model: Model = None,
     show: OfShow = None,
     out: Annotated[
@@ -96,4 +100,4 @@ def map_(
     with clear_errors("map"):
         from appliance.studio.pose_space.pose_map import MapOptions, run
 
-        run(MapOptions(model, out, tuple(files or ()), show, recordings, seconds, reading))
+        run(MapOptions(model, out, tuple(files), show, recordings, seconds, reading))

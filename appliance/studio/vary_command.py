@@ -45,7 +45,7 @@ def vary(
         typer.Option(
             min=0.0,
             max=10.0,
-            help="How far: 0.5 subtle, 1 to 2 inventive, beyond 3 it may break.",
+            help="How far: 0 the phrase itself, 0.5 subtle, 1 to 2 inventive, beyond 3 it may break.",
             show_default="0.5, with --free 1",
         ),
     ] = None,
