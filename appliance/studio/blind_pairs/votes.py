@@ -11,7 +11,7 @@ from pathlib import Path
 
 from appliance.studio.studio_error import StudioError
 
-Z = 1.959964  # of a normal distribution: 95 % lie within
+Z = 1.959964  # 95 % of a normal distribution lie within
 SIDES = ("left", "right")
 
 
