@@ -25,7 +25,7 @@ MILLISECONDS = (10.0, 20.0, 30.0, 40.0)
 
 
 class Wall(NamedTuple):
-    """What a wall shows: world rotations (N, J, 4) and positions (N, J, 3) at the pictures' times."""
+    """A wall's pictures: world rotations (N, J, 4) and positions (N, J, 3) at the pictures' times."""
 
     world: Array
     positions: Array
@@ -44,7 +44,7 @@ def judged(dance: Recording, milliseconds: float) -> str:
     times = np.arange(len(dance)) * TICK_S
     pictures = np.arange(1.0, times[-1] - 0.5, 1.0 / PICTURES_HZ)
     truth = danced.at(times, pictures)
-    when = pictures - TICK_S  # a picture lies between the two newest frames
+    when = pictures - TICK_S  # a picture is between the two newest frames
     shown = _predicted(dance, danced, milliseconds / 1000.0 / TICK_S).at(times, when)
     meant = danced.at(times, when + milliseconds / 1000.0)
     rough, smooth = (np.sqrt(np.mean(np.diff(wall.positions, 2, axis=0) ** 2)) for wall in (shown, truth))
