@@ -172,7 +172,8 @@ WEARABLES = """
     value.sensors = [worn, { ...worn, name: "spare-1", is_worn: false, neutral: "" }];
     value.generation += 1000;
     value.processes.push({ process: "projector", late: false });
-    value.wall = { corners: [[0, 0], [1, 0], [1, 1], [0, 1]], brightness: 1, grid: false, test_card: false, info: false };
+    const corners = [[0, 0], [1, 0], [1, 1], [0, 1]];
+    value.wall = { corners, brightness: 1, grid: false, test_card: false, info: false };
     hear.call(this, value);
     window.heard++;
   };
