@@ -55,9 +55,10 @@ def enter_realtime(priority: int) -> tuple[str, ...]:
     """Give the calling thread real-time settings; returns, in words, what could not be had. Never raises.
 
     Memory is locked as it is touched (ONFAULT): locking whole libraries and thread stacks would cost 100 MB
-    and more. Freed heap goes back first: a start that had to read the phrase's text leaves 15 MB. Threads started later are ordinary again (RESET_ON_FORK). The collector is frozen and disabled:
-    a collection on a large heap took up to 118 ms. The objects that a start leaves (0.7 MB) are frozen too:
-    scanning them would delay the first frame by 25 ms.
+    and more. Freed heap goes back first: a start that had to read the phrase's text leaves 15 MB. Threads
+    started later are ordinary again (RESET_ON_FORK). The collector is frozen and disabled: a collection on a
+    large heap took up to 118 ms. The objects that a start leaves (0.7 MB) are frozen too: scanning them would
+    delay the first frame by 25 ms.
     """
     share_the_interpreter()
     with contextlib.suppress(OSError, AttributeError):  # the C library of other systems has no such function
