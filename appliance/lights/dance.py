@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.motion_features import MotionFeatures
 from appliance.pose import quaternion
+from appliance.pose.roles import roles_of
 from appliance.pose.skeleton import Skeleton
 from appliance.show.light_rules import FEATURES, RuleConfig
 
@@ -20,6 +21,8 @@ PAUSE_S = 0.2  # without a new frame for this long, nothing moves
 # the next frame, at most this long; else heads tremble at 10 Hz and its harmonics.
 MOST_ON_S = 0.03
 FASTEST_M_S = 15.0  # no joint of a dancer is faster; a phrase that jumps is
+EYES_M = 0.08  # above the head's joint
+_FRONT, _ABOVE = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
 HELD = 0.1  # a joint that is held less firmly answers
 ROOT = 0
 _COORDINATE = {"across": 0, "height": 1, "depth": 2}
@@ -55,6 +58,11 @@ class Dance:
         self.body_speed = 0.0
         self.answer = 0.0  # mean degrees from the phrase, smoothed
         self._velocities = np.zeros((joints, 3))
+        self._head = roles_of(skeleton.names).get("head")
+        if self._head is not None:  # its own axes of where it looks and of what is up, while the body stands
+            _, standing = skeleton.forward_kinematics(skeleton.standing, np.zeros(3))
+            inverse = quaternion.inverse(standing[self._head])
+            self._forward, self._up = (quaternion.rotate(inverse, np.array(way)) for way in (_FRONT, _ABOVE))
         self._age_s = 0.0  # age of the newest frame since it left the stage
         self._features: MotionFeatures | None = None  # made when a rule first reads one
         self._felt: dict[str, float] = dict.fromkeys(FEATURES, 0.0)  # smoothed
@@ -93,6 +101,15 @@ class Dance:
     def place(self, joint: str | None) -> NDArray[np.float64]:
         """Position of a joint (None: the root), (3,) metres."""
         return self._now(ROOT if joint is None else self.skeleton.index(joint))
+
+    @property
+    def eyes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """The dancer's eyes, (3,) metres, and where they look, a unit vector; None: there is no head."""
+        if self._head is None:
+            return None
+        turned = self.world[self._head]
+        gaze, up = (np.asarray(quaternion.rotate(turned, way), float) for way in (self._forward, self._up))
+        return self._now(self._head) + EYES_M * up, gaze
 
     def _now(self, joint: int) -> NDArray[np.float64]:
         """The joint's position moved on to this pass, (3,) metres."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,9 @@ from appliance.lights.patch import Patch, Places, Values
 from appliance.show.light_rules import AIM, COLOUR, MappingConfig, RuleConfig
 
 Mask = NDArray[np.bool_]
+Array = NDArray[np.float64]
+SPARED_M = 0.35  # around the dancer's eyes
+SEES_WITHIN = math.radians(60.0)  # of the gaze: light from farther aside does not blind
 
 
 @dataclass(frozen=True)
@@ -127,13 +131,37 @@ class _Aim:
         self._joint, self._puppet = config.joint, config.puppet
         self._point = None if config.reads == "place" else np.array(config.at)
         self._offset = np.array(config.offset)
+        self._places = patch.heads.places[self.heads]
 
     def restart(self) -> None:
         """Nothing to reset: only the heads' own speed limits an aim."""
 
     def apply(self, dances: Dances, seconds: float, output: MappingOutput) -> None:
-        point = dances.of(self._puppet).place(self._joint) if self._point is None else self._point
-        output.aims[self.heads] = point + self._offset
+        dance = dances.of(self._puppet)
+        point = (dance.place(self._joint) if self._point is None else self._point) + self._offset
+        output.aims[self.heads] = point
+        if (eyes := dance.eyes) is not None:
+            for head, place in zip(self.heads, self._places, strict=True):
+                output.aims[head, 1] -= _below_eyes(place, point, *eyes)
+
+
+def _below_eyes(place: Array, point: Array, eyes: Array, gaze: Array) -> float:
+    """How much lower a head at `place` aims than at `point`, so that it does not blind the dancer, metres.
+
+    A beam that comes from where the dancer looks and would pass the eyes closer than SPARED_M goes below
+    them. Heads move no faster than they can, so that the beam swings there.
+    """
+    to_eyes, to_point = eyes - place, point - place
+    far = float(np.linalg.norm(to_eyes))
+    if far < SPARED_M or float(gaze @ to_eyes) > -math.cos(SEES_WITHIN) * far:
+        return 0.0
+    reach = float(to_point @ to_eyes) / far  # of the aim, along the way to the eyes
+    if reach <= 0.0:
+        return 0.0
+    off = to_point * (far / reach) - to_eyes  # where the beam passes, from the eyes
+    if math.hypot(float(off[0]), float(off[2])) > SPARED_M or abs(float(off[1])) > SPARED_M:
+        return 0.0
+    return (SPARED_M + float(off[1])) * reach / far
 
 
 _MIXES: dict[str, Callable[[Values, Values], Values]] = {

@@ -8,6 +8,7 @@ import pytest
 from appliance.levers.show_state import ShowState
 from appliance.lights.dance import MOST_ON_S, Dance
 from appliance.lights.patch import Patch
+from appliance.lights.rig import Rig
 from appliance.lights.usual_mapping import usual_mapping, with_usual_mapping
 from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.pose import quaternion
@@ -102,3 +103,41 @@ def test_a_stage_that_hangs_leaves_places_where_they_are() -> None:
         shown.append(float(made.dances.of(None).place("hand")[1]))
     assert shown[1] - shown[0] < 0.02
     assert shown[3] == pytest.approx(shown[0])
+
+
+@pytest.mark.parametrize(
+    ("place", "joint", "is_lowered"),
+    [
+        ((0.0, 4.0, 4.0), "head", True),  # from the front, into the face
+        ((0.0, 4.0, -4.0), "head", False),  # from behind
+        ((0.0, 4.0, 4.0), "lFoot", False),  # far below the eyes
+        ((5.0, 1.6, 0.0), "head", False),  # from the side
+    ],
+)
+def test_a_beam_from_the_front_passes_below_the_dancers_eyes(
+    place: tuple[float, float, float], joint: str, is_lowered: bool
+) -> None:
+    skeleton = load_show(EMBEDDED_SHOW).skeleton
+    head = {**HEAD, "place": list(place)}
+    config = LightsConfig.model_validate(
+        {
+            "fixtures": [head],
+            "mappings": [{"name": "one", "rules": [{"reads": "place", "joint": joint, "drives": "aim"}]}],
+        },
+        context={"joints": skeleton.names},
+    )
+    made = Rig(config, Patch(config.fixtures, None), skeleton)
+    made.safety = 0.0
+    puppet = PuppetFrame.of(len(skeleton))
+    positions, world = skeleton.forward_kinematics(skeleton.standing, np.array([0.0, 1.0, 0.0]))
+    puppet.positions[:], puppet.world[:] = positions, world
+    for tick in range(200):
+        made.render(JointFrame((puppet,), tick, tick * 0.02), 1, ShowState(), tick * 0.02)
+    eyes = made.dances.of(None).eyes
+    assert eyes is not None and eyes[1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
+    beam, to_eyes = made.patch.heads.beams()[0], eyes[0] - np.array(place)
+    passes = np.linalg.norm(np.cross(to_eyes, beam))
+    aimed = np.linalg.norm(np.cross(positions[skeleton.index(joint)] - np.array(place), beam))
+    assert (aimed > 0.1) == is_lowered
+    if is_lowered:
+        assert passes > 0.2
