@@ -18,7 +18,7 @@ from appliance.show.light_rules import AIM, COLOUR, MappingConfig, RuleConfig
 Mask = NDArray[np.bool_]
 Array = NDArray[np.float64]
 SPARED_M = 0.35  # around the dancer's eyes
-SEES_WITHIN = math.radians(60.0)  # of the gaze: light from farther aside does not blind
+SEES_WITHIN = math.radians(60.0)  # around the gaze: light from farther aside does not blind
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def _below_eyes(place: Array, point: Array, eyes: Array, gaze: Array) -> float:
     far = float(np.linalg.norm(to_eyes))
     if far < SPARED_M or float(gaze @ to_eyes) > -math.cos(SEES_WITHIN) * far:
         return 0.0
-    reach = float(to_point @ to_eyes) / far  # of the aim, along the way to the eyes
+    reach = float(to_point @ to_eyes) / far  # how far the aim is along the way to the eyes
     if reach <= 0.0:
         return 0.0
     off = to_point * (far / reach) - to_eyes  # where the beam passes, from the eyes
