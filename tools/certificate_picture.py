@@ -28,6 +28,7 @@ NOTES = {  # for each limit, in the order of the verdict: beginning of its words
     "box's restart": "The box is killed: so long from its new start to a led frame.",
     "the same": "The same, counted from the moment at which it was killed.",
     "hand to light": "From the hand to the picture on a screen.",
+    "dance to light": "The same for a hand that dances: the wall predicts it.",
 }
 WIDTH, LINE, TOP, PLOT = 1210, 54, 150, 392  # pixels; the first plot of the report is kept
 PAPER, INK, FAINT, GOOD, BAD = "#faf8f4", "#1d1d22", "#6b6b75", "#1f7a3f", "#b3261e"

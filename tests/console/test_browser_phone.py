@@ -154,7 +154,7 @@ def test_one_phone_is_a_sensor_and_another_takes_its_place_only_when_asked(
     expect(stranger.tab.locator("#phone-said")).to_contain_text(f"Another phone is {NAME} now.")
     press(stranger.tab, "#take-over")
     expect(stranger.tab.locator("#phone-said")).to_contain_text("no longer valid")
-    assert held(stage) == 1.0, "a used code took the joint away"
+    assert held(stage) > 0.9, "a used code took the joint away"  # it may still be fading in
     second = Phone(other, invited(page, OTHER))
     second.begin()
     wait_until(lambda: min(held(stage, OTHERS_JOINT), held(stage)) > 0.0)  # both at once

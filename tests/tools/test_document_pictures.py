@@ -61,6 +61,7 @@ def _figures() -> dict[str, object]:
         "late_ticks": 0,
         "missing_frames": 0,
         "rss_mb": 90.0,
+        "dance_to_light_ms": 45.0,
         "start_to_first_frame_s": 1.0,
         "firmware": False,
     }
