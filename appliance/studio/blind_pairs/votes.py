@@ -8,6 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from appliance.studio.studio_error import StudioError
 
@@ -97,9 +98,9 @@ def result_of(files: Sequence[Path]) -> Result:
     return Result(names, len(voters), Preference(first, votes), Preference(left, votes))
 
 
-def _read(file: Path) -> dict:  # type: ignore[type-arg]
+def _read(file: Path) -> dict[str, Any]:
     try:
-        facts = json.loads(file.read_text(encoding="utf-8"))
+        facts: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
         pairs = len(base64.b64decode(facts["key"], validate=True))
         chosen = [(vote["pair"], vote["chosen"]) for vote in facts["votes"]]
         sound = all(isinstance(pair, int) and 0 <= pair < pairs and side in SIDES for pair, side in chosen)
@@ -111,4 +112,4 @@ def _read(file: Path) -> dict:  # type: ignore[type-arg]
         raise StudioError(
             f"{file} has no votes of a page that bunraku compare-blind made. Download them at its end."
         ) from None
-    return facts  # type: ignore[no-any-return]
+    return facts

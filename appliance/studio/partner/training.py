@@ -111,12 +111,9 @@ def train_answers(
     answers.middle.copy_(flat.mean(0))
     answers.scale.copy_(1 / flat.std(0).clamp_min(1e-3))
     average = copy.deepcopy(answers)
+    descent = _Descent(answers, average, seconds, steps)
     best, least, least_other = copy.deepcopy(answers), math.inf, math.inf
-    optimizer = torch.optim.AdamW(answers.parameters(), lr=RATE, weight_decay=DECAY)
-    began, step = time.monotonic(), 0
-    while step < steps and (gone := (time.monotonic() - began) / seconds) < 1:
-        for group in optimizer.param_groups:
-            group["lr"] = RATE * min(1.0, (step + 1) / 100) * max(0.02, 1 - max(gone, step / steps))
+    while descent.goes_on():
         chosen = torch.randint(len(led), (BATCH,), device=device)
         seen = [
             part[chosen] + noise * torch.randn_like(part[chosen]) / answers.scale
@@ -124,12 +121,7 @@ def train_answers(
         ]
         mixture = Mixture.of(answers(*seen), answers.mixtures, NARROWEST_ANSWER)
         loss = mixture.negative_log_likelihood(codes[chosen]).mean()
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        optimizer.step()
-        step += 1
-        with torch.no_grad():
-            _follow(average, answers, step)
+        step = descent.learn(loss)
         if step % LOOK_EVERY == 0:
             nats, other = nats_of(average, apart, device)
             told(
@@ -139,6 +131,38 @@ def train_answers(
             if nats < least:
                 best, least, least_other = copy.deepcopy(average), nats, other
     return best.cpu().eval(), least, least_other
+
+
+class _Descent:
+    """Learns a network until its time or its steps are over: the rate rises in 100 steps and then falls.
+
+    average: becomes the network's running mean, which is what is looked at and kept.
+    """
+
+    def __init__(self, network: nn.Module, average: nn.Module, seconds: float, steps: int) -> None:
+        self._network, self._average, self._seconds, self._steps = network, average, seconds, steps
+        self._optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
+        self._began, self._step = time.monotonic(), 0
+
+    def goes_on(self) -> bool:
+        """Whether another step is due; its rate is set."""
+        gone = (time.monotonic() - self._began) / self._seconds
+        if self._step >= self._steps or gone >= 1:
+            return False
+        for group in self._optimizer.param_groups:
+            rise, fall = (self._step + 1) / 100, 1 - max(gone, self._step / self._steps)
+            group["lr"] = RATE * min(1.0, rise) * max(0.02, fall)
+        return True
+
+    def learn(self, loss: torch.Tensor) -> int:
+        """A step down this loss; how many that makes."""
+        self._optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        self._optimizer.step()
+        self._step += 1
+        with torch.no_grad():
+            _follow(self._average, self._network, self._step)
+        return self._step
 
 
 def _follow(average: nn.Module, network: nn.Module, step: int) -> None:
@@ -204,11 +228,9 @@ def train(
     scorer = Scorer(led.shape[-1]).to(device)
     scorer.learn_scale(led)
     average = copy.deepcopy(scorer)
-    optimizer = torch.optim.AdamW(scorer.parameters(), lr=RATE, weight_decay=DECAY)
-    learned, began, step = Learned(copy.deepcopy(average)), time.monotonic(), 0
-    while step < steps and (gone := (time.monotonic() - began) / seconds) < 1:
-        for group in optimizer.param_groups:
-            group["lr"] = RATE * min(1.0, (step + 1) / 100) * max(0.02, 1 - max(gone, step / steps))
+    descent = _Descent(scorer, average, seconds, steps)
+    learned = Learned(copy.deepcopy(average))
+    while descent.goes_on():
         chosen = torch.randint(len(led), (BATCH,), device=device)
         noisy = led[chosen] + NOISE * torch.randn_like(led[chosen]) / scorer.scale
         seen = moves[chosen] + NOISE * torch.randn_like(moves[chosen]) / scorer.scale
@@ -223,12 +245,7 @@ def train(
             + 0.5 * functional.cross_entropy(across, alike)
             + 0.5 * functional.cross_entropy(other, none)
         )
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        optimizer.step()
-        step += 1
-        with torch.no_grad():
-            _follow(average, scorer, step)
+        step = descent.learn(loss)
         if step % LOOK_EVERY == 0:
             found, shuffled = found_of(average, apart, device)
             learned.history.append((step, float(loss.detach()), found, shuffled))
