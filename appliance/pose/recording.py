@@ -53,15 +53,15 @@ class Recording:
             return replace(self, fps=fps)
         count = int(np.floor((len(self) - 1) * fps / self.fps + 1e-9)) + 1
         at = np.minimum(np.arange(count) * self.fps / fps, len(self) - 1)
-        return replace(self._between(at), fps=fps)
+        return replace(self.between(at), fps=fps)
 
     def spread(self, frames: NDArray[np.intp]) -> Recording:
         """The same poses as frames of these rising numbers; the figure turns evenly over those between."""
         if len(frames) < 2 or frames[-1] - frames[0] == len(frames) - 1:
             return self
-        return self._between(np.interp(np.arange(frames[0], frames[-1] + 1), frames, np.arange(len(frames))))
+        return self.between(np.interp(np.arange(frames[0], frames[-1] + 1), frames, np.arange(len(frames))))
 
-    def _between(self, at: NDArray[np.float64]) -> Recording:
+    def between(self, at: NDArray[np.float64]) -> Recording:
         """Poses at places among the frames: rotations by SLERP, positions straight between two."""
         before = np.minimum(at.astype(int), len(self) - 2)
         share = at - before

@@ -1,0 +1,1 @@
+"""Two dances compared: versions of one dance, aligned in time, and two periods of a practice."""
