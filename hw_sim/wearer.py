@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from appliance.pose.ease import ease
 from hw_sim.motions import IDENTITY, Motion, Quaternion, inverse, multiply, part_of
 
 EASE_S = 1.0  # from the rest pose into the motion
@@ -51,4 +52,4 @@ class Wearer:
         if not self._stand_still_s or elapsed_s >= EASE_S:
             return orientation
         share = elapsed_s / EASE_S
-        return multiply(orientation, part_of(self._way_back, 1.0 - share * share * (3.0 - 2.0 * share)))
+        return multiply(orientation, part_of(self._way_back, 1.0 - ease(share)))

@@ -12,6 +12,7 @@ from appliance.body.extremities import foot, hand
 from appliance.body.head import head, neck
 from appliance.body.volumes import Ball, Group, Loft, Slab, Step
 from appliance.pose.anatomy import LONG_BONE, Anatomy
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 
 _UP = np.array([0.0, 1.0, 0.0])
@@ -114,7 +115,7 @@ def _at(along: Array, table: Array) -> Array:
     low, high = table[left], table[right]
     curve: Array = (
         low * (1 + 2 * t) * (1 - t) ** 2
-        + high * t * t * (3 - 2 * t)
+        + high * ease(t)
         + step * (slopes[left] * t * (1 - t) ** 2 - slopes[right] * t * t * (1 - t))
     )
     return curve

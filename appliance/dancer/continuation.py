@@ -17,6 +17,7 @@ from appliance.dancer.material.partner_network import LED_STEPS, SEEN, PartnerNe
 from appliance.dancer.material.steps import HOP, MIDDLE, ROOT, WINDOW
 from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.dancer.step_memory import StepMemory
+from appliance.dancer.takeover import Takeover
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 
@@ -33,7 +34,7 @@ _HOME = 0.001  # metres a tick, by which it comes back to the phrase's own path
 _STEP_M = HOP * 0.02 * LED_M_S
 
 
-class Continuation:
+class Continuation(Takeover):
     """Poses and roots of a continued dance, laid over a phrase's window; once a tick.
 
     temperature, top_p: of the draws. follow: 1 answers, 0.5 does not care, 0 contrasts. goal: x, z in metres
@@ -42,7 +43,7 @@ class Continuation:
 
     SNAPSHOT = (
         *("temperature", "top_p", "follow", "delay_steps", "goal"),
-        *("_chosen", "_leaves", "_left", "_is_going", "_share", "_step", "_signs"),
+        *("_leaves", "_left", "_is_going", "_signs"),
         *("_rows", "_roots", "_head", "_end", "_steps", "_cells", "_turn", "_place", "_slope", "_home"),
         *("_work", "_codes", "_move", "_decoded"),
     )
@@ -55,10 +56,11 @@ class Continuation:
         window: int = WINDOW,
         tick_s: float = 0.02,
     ) -> None:
-        self._network, self._partner, self._tick_s, self._length = network, partner, tick_s, window
+        super().__init__(tick_s)
+        self._network, self._partner, self._length = network, partner, window
         self.temperature, self.top_p, self.follow, self.delay_steps = TEMPERATURE, TOP_P, FREE, 0
         self.goal: tuple[float, float] | None = None
-        self._chosen, self._leaves, self._is_going, self._share, self._step = False, False, False, 0.0, 1.0
+        self._leaves = self._is_going = False
         self._left = np.zeros(2)  # how far from the phrase's path the figure was left, x and z
         features, moving = network.features, len(network.places)
         self._rows = np.zeros((_ROWS, moving, 4), np.float32)
@@ -80,20 +82,10 @@ class Continuation:
         self._laid = np.zeros((window, moving, 4), np.float32)
         self._rise = (np.sin(np.pi * (np.arange(HOP) + 0.5) / WINDOW) ** 2)[:, None]
 
-    @property
-    def is_chosen(self) -> bool:
-        """Whether the figure goes on by itself, or is about to."""
-        return self._chosen
-
-    @property
-    def share(self) -> float:
-        """How much of what the puppet starts from it is, 0..1."""
-        return self._share * self._share * (3 - 2 * self._share)
-
     def choose(self, chosen: bool, fade_s: float) -> None:
         """Take over from the phrase, or give back to it where the figure stands, over fade_s."""
         self._leaves = self._chosen and not chosen
-        self._chosen, self._step = chosen, min(1.0, self._tick_s / max(fade_s, self._tick_s))
+        super().choose(chosen, fade_s)
 
     def lay_over(
         self,
@@ -124,7 +116,7 @@ class Continuation:
         if is_ready and self._share in (0.0, 1.0):
             alike = np.einsum("mk,mk->m", self._rows[self._head], window[0, self._network.places])
             self._signs[:] = np.copysign(1.0, alike)[:, None]
-        self._share = min(1.0, self._share + self._step) if goes else max(0.0, self._share - self._step)
+        self._fade(goes)
         if not self._share or not is_ready:
             self._is_going = self._is_going and self._chosen
             self._left *= max(0.0, 1.0 - _HOME / max(math.hypot(*self._left), _HOME))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from appliance.dancer.reading_head import ReadingHead
+from appliance.pose.ease import ease
 
 _HURRY = 25  # ticks that a long crossfade takes at most, once the next change waits for it
 
@@ -18,8 +19,7 @@ class Crossfade:
     def advance(self) -> float:
         """A tick on: how much of the entering head is there, 0 to 1."""
         self._tick += 1.0
-        share = self._tick / self._length
-        return share * share * (3 - 2 * share)
+        return ease(self._tick / self._length)
 
     def end_if_over(self) -> None:
         """The leaving head goes with the last tick."""

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from appliance.pose.ease import ease
+
 TICK_S = 0.02
 
 
@@ -36,7 +38,7 @@ class Glide:
             return False
         self._left[going] -= 1.0
         part = 1.0 - self._left / np.maximum(self._ticks, 1.0)
-        part *= part * (3.0 - 2.0 * part)
+        part = ease(part)
         roots = slice(self._roots)
         here = self._start + part * (self._end - self._start)
         start = np.sqrt(self._start[roots])

@@ -11,6 +11,7 @@ from appliance.dancer.foot_lock import JUMP_M, FootLock
 from appliance.dancer.forward_kinematics import Figure, soles_of
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
@@ -62,7 +63,7 @@ def survey(phrase: Recording) -> Floor:
 def lift(clearance: Array) -> Array:
     """The part of a height above the floor (metres) that is a jump: 0 to FLOOR_NOISE_M, all from JUMP_M."""
     share = np.clip((clearance - FLOOR_NOISE_M) / (JUMP_M - FLOOR_NOISE_M), 0.0, 1.0)
-    jumped: Array = clearance * share * share * (3 - 2 * share)
+    jumped: Array = clearance * ease(share)
     return jumped
 
 

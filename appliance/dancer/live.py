@@ -9,7 +9,9 @@ import numpy as np
 
 from appliance.dancer.extrapolation import Extrapolation
 from appliance.dancer.slerp import FloatArray, Slerp
+from appliance.dancer.takeover import Takeover
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from appliance.pose.possible import FARTHEST_M, most_step_m
 
 SILENT_S = 0.5  # after which the phrase plays on
@@ -19,7 +21,7 @@ _UNIT = 0.1  # a quaternion this far from unit length is invalid
 _JOINT_FADE_S = 0.5  # in which a joint goes over to the stream, or back to the phrase
 
 
-class Live:
+class Live(Takeover):
     """Lays a stream of poses over the phrase's window, fading in and out; once a tick.
 
     Poses come at any rate, and are interpolated between the last two: that costs one interval. The window's
@@ -35,13 +37,14 @@ class Live:
 
     SNAPSHOT = (
         *("_before", "_newest", "_present", "_root", "_offset", "_has_root", "_is_new", "_comes", "_came"),
-        *("_is_whole", "_arrival", "_interval_s", "_chosen", "_share", "_step", "_extrapolation"),
+        *("_is_whole", "_arrival", "_interval_s", "_extrapolation"),
     )
+    TIMES = ("_arrival",)
 
     jumps = 0
 
     def __init__(self, joints: int, window: int, tick_s: float = 0.02) -> None:
-        self._tick_s = tick_s
+        super().__init__(tick_s)
         self._slerp, self._over = Slerp(joints), Slerp(window * joints)
         self._extrapolation = Extrapolation(joints, window)
         self._is_new = np.ones((joints, 1), dtype=np.bool_)
@@ -58,17 +61,6 @@ class Live:
         self._offset = np.zeros(3, dtype=np.float32)
         self._has_root = False
         self._arrival, self._interval_s = -math.inf, 0.02
-        self._chosen, self._share, self._step = False, 0.0, 1.0
-
-    @property
-    def is_chosen(self) -> bool:
-        """Whether the show starts from it, heard or not."""
-        return self._chosen
-
-    @property
-    def share(self) -> float:
-        """How much of what the puppet starts from it is, 0..1."""
-        return self._share * self._share * (3 - 2 * self._share)
 
     @property
     def newest(self) -> FloatArray:
@@ -83,10 +75,6 @@ class Live:
     def silent_s(self, now: float) -> float:
         """Seconds since its last pose; infinite before the first."""
         return now - self._arrival
-
-    def choose(self, chosen: bool, fade_s: float) -> None:
-        """Take over from the phrase, or give back to it, over fade_s."""
-        self._chosen, self._step = chosen, min(1.0, self._tick_s / max(fade_s, self._tick_s))
 
     def hear(self, pose: FloatArray, root: FloatArray, arrival: float, phrase: FloatArray) -> bool:
         """A pose (J, 4) of local quaternions, its root (3,) in metres; False: no pose.
@@ -134,7 +122,7 @@ class Live:
     def lay_over(self, now: float, window: FloatArray, roots: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The window (T, J, 4) and the roots (T, 3) that the puppet starts from, of the phrase's own."""
         comes = self._chosen and self.silent_s(now) <= SILENT_S
-        self._share = min(1.0, self._share + self._step) if comes else max(0.0, self._share - self._step)
+        self._fade(comes)
         if not self._share:
             self._offset[:] = np.nan
             self._came[:] = self._comes
@@ -165,7 +153,7 @@ class Live:
         stays = (came == 0.0)[:, None]
         np.copyto(self._present, window[0], where=stays)
         self._is_new |= stays
-        np.multiply(came, came * (3.0 - 2.0 * came), out=self._follows)
+        self._follows[:] = ease(came)
         self._phrases_share[:] = 1.0 - self.share * self._follows
         return self._phrases_share.reshape(-1)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 
 # A loop whose path misses its own start by less than this share of the way that it went is closed: the miss
@@ -129,7 +130,7 @@ class Loop:
         """Write frames period..length: the excerpt's end crossfaded into its start, placed by the step."""
         end, begin = slice(self.period, self.length + 1), slice(0, self.fade + 1)
         weight = np.ones(self.fade + 1, dtype=np.float32)
-        weight[:-1] = smooth(np.arange(self.fade) / max(self.fade, 1))
+        weight[:-1] = ease(np.arange(self.fade) / max(self.fade, 1))
         entering, track = self.poses[begin].copy(), self.track[begin].copy()
         turn = turns_about_y(np.array(self.step.yaw)).astype(np.float32)
         entering[:, 0] = quaternion.multiply(turn, entering[:, 0])
@@ -157,12 +158,6 @@ def is_closed(poses: FloatArray, roots: FloatArray) -> bool:
     return bool(
         (turns[1] <= most_turn).all() and moves[1] <= CLOSED_STEP * max(moves[0], moves[2]) + CLOSED_M
     )
-
-
-def smooth(share: Array) -> Array:
-    """Smoothstep: 0..1 to 0..1 with slope 0 at both ends."""
-    eased: Array = share * share * (3 - 2 * share)
-    return eased
 
 
 def yaws(turns: Array) -> Array:

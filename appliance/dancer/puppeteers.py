@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from appliance.pose.turns import Vector, about, inverse, multiplied
 
 HOLD_S = 0.1  # seconds of silence after which a sensor's joint is released
@@ -41,6 +42,7 @@ class Puppeteer:
     """
 
     SNAPSHOT: tuple[str, ...] = ("weight", "enabled", "_target", "_presence", "_level", "_pulled_at")
+    TIMES: tuple[str, ...] = ("_pulled_at",)
 
     def __init__(self, joint: str, weight: float = 1.0) -> None:
         self.joint = joint
@@ -80,7 +82,7 @@ class Puppeteer:
             self._presence = max(0.0, self._presence - elapsed / GIVE_BACK_S)
         most = elapsed / TAKE_S
         self._level += min(max(self.weight - self._level, -most), most)
-        self._target.weight = self._level * self._presence * self._presence * (3 - 2 * self._presence)
+        self._target.weight = self._level * ease(self._presence)
         return self._target
 
     def _holds(self, now: float) -> bool:
@@ -114,6 +116,7 @@ class WornSensor(Puppeteer):
         "_measured_at",
         "_turn",
     )
+    TIMES = ("_heard_at", "_measured_at")
 
     def __init__(
         self, joint: str, weight: float = 1.0, joint_from_reading: NDArray[np.float32] | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from appliance.pose.ease import ease
 from appliance.show.light_rules import RuleConfig
 
 
@@ -15,7 +16,7 @@ def share(reading: float, ends: tuple[float, float]) -> float:
 def bent(rule: RuleConfig, value: float) -> float:
     """The rule's curve: 0..1 -> 0..1."""
     if rule.curve == "s":
-        return value * value * (3.0 - 2.0 * value)
+        return ease(value)
     if rule.curve == "gamma":
         return float(value**rule.gamma)
     if rule.curve == "points":

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from appliance.pose.body import Cones
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 
 
@@ -119,7 +120,7 @@ def floor_shadow(cones: Cones, floor: float, lift: float, frame: Frame) -> Array
         edge = np.clip((radius + softness - distance) / (2 * softness), 0, 1)
         strength = radius / (radius + 0.5 * softness)
         part = darkness[rows, columns]
-        np.maximum(part, strength * edge * edge * (3 - 2 * edge), out=part)
+        np.maximum(part, strength * ease(edge), out=part)
     return darkness
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.t_pose import humanoid_rest
 from appliance.pose.turns import (
@@ -63,7 +64,7 @@ class PointFit:
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
-        self._rest = _rest_points(skeleton)
+        self._rest = rest_points(skeleton)
         self._hinges = {side: (_elbow_hinge(self._rest, side), _BACK) for side in SIDES}
         self._twists: dict[str, float] = {}
 
@@ -206,10 +207,10 @@ class PointFit:
         if abs(radians) > _MOST_TWIST:
             radians -= math.copysign(math.tau, radians)
         self._twists[bone] = radians
-        return radians * share * share * (3.0 - 2.0 * share)
+        return radians * ease(share)
 
 
-def _rest_points(skeleton: Skeleton) -> dict[str, Vector]:
+def rest_points(skeleton: Skeleton) -> dict[str, Vector]:
     """Where the points would be on the figure in its T-pose, metres."""
     world = humanoid_rest(skeleton)
     places = quaternion.rotate(world[[max(parent, 0) for parent in skeleton.parents]], skeleton.offsets)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from appliance.pose.ease import ease
 from appliance.projector.picture.poses import ROW_S, ROWS, Floats, Poses
 
 OVER = 4  # rows over which a speed changes: 0.1 s; an accent is told from what came before and after
@@ -37,7 +38,7 @@ def accents(poses: Poses, joints: Sequence[int], time_s: float) -> list[Accent]:
         speeds = (places[:-2] - places[2:]) / (2 * ROW_S)
         changes = np.linalg.norm(speeds[:-OVER] - speeds[OVER:], axis=1)
         for row in range(OVER, len(changes) - OVER):
-            strength = _smooth((float(changes[row]) - SOFT) / (HARD - SOFT))
+            strength = ease(min(max((float(changes[row]) - SOFT) / (HARD - SOFT), 0.0), 1.0))
             if strength > 0.0 and changes[row] >= changes[row - OVER : row + OVER + 1].max():
                 at, age_s = row + OVER // 2 + 1, (row + OVER // 2 + 1 + share) * ROW_S
                 seed = (int(tick) - row) % 4096 * 64 + joint % 64
@@ -49,9 +50,4 @@ def pressure(poses: Poses) -> Floats:
     """(J,) 0 to 1: how hard a brush is pressed where each joint is; a fast one is lifted."""
     ways = np.linalg.norm(poses.positions[: min(RECENT, ROWS - 1)] - poses.positions[1 : RECENT + 1], axis=2)
     lifted = np.clip((ways.mean(axis=0) / ROW_S - SLOW) / (FAST - SLOW), 0.0, 1.0)
-    return np.asarray(1.0 - lifted * lifted * (3.0 - 2.0 * lifted), np.float32)
-
-
-def _smooth(share: float) -> float:
-    share = min(max(share, 0.0), 1.0)
-    return share * share * (3 - 2 * share)
+    return np.asarray(1.0 - ease(lifted), np.float32)

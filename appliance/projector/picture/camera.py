@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 from appliance.projector.picture.poses import ROWS, Poses
 from appliance.show.look import CameraConfig
@@ -89,10 +90,10 @@ def view(
 ) -> View:
     """The camera at time_s; mix 0: as in `before`, 1: as in `now`; aspect: the picture's width / height."""
     left, reached = (
-        _between(_stand(before, time_s, changes), _stand(now, time_s, changes), eased(mix))
+        _between(_stand(before, time_s, changes), _stand(now, time_s, changes), ease(mix))
         for changes in (cued.before, cued.now)
     )
-    stand = _between(left, reached, eased(cued.mix))
+    stand = _between(left, reached, ease(cued.mix))
     slope = float(np.tan(stand.lens / 2))
     slopes = (slope * aspect, slope) if aspect >= 1 else (slope, slope / aspect)
     distance = 0.5 / (stand.figure * min(slopes[1], UPRIGHT * slopes[0]))
@@ -108,11 +109,6 @@ def view(
     seen = (poses.positions.astype(float) - aim) @ np.stack([across, up, back]).T
     distance = _drawn_back(seen, distance, slopes)
     return View(aim + distance * back, across, up, back, slopes, centre[[0, 2]], stand.azimuth)
-
-
-def eased(share: float) -> float:
-    """0 to 1, without a jolt at either end."""
-    return share * share * (3 - 2 * share)
 
 
 def _stand(config: CameraConfig, time_s: float, changes: Changes) -> _Stand:

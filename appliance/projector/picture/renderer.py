@@ -8,9 +8,10 @@ from typing import Protocol
 
 import moderngl
 
+from appliance.pose.ease import ease
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.moment import Moment
-from appliance.projector.picture.camera import NOT_CUED, CuedCamera, eased, view
+from appliance.projector.picture.camera import NOT_CUED, CuedCamera, view
 from appliance.projector.picture.looks.cloud import Cloud
 from appliance.projector.picture.looks.ink import Ink
 from appliance.projector.picture.looks.lines import Lines
@@ -84,7 +85,7 @@ class Renderer:
         poses = together(each)
         wall = target if isinstance(target, Wall) else flat(target)
         seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect, cued)
-        melt = before.melt + eased(mix) * (now.melt - before.melt)
+        melt = before.melt + ease(mix) * (now.melt - before.melt)
         scene = Scene(moment.time_s, seen, poses, wall.aspect, melt)
         easel.melt(melt, moment.time_s)
         easel.show(each, [puppet.holds for puppet in moment.puppets])

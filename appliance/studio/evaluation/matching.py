@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 from appliance.studio.evaluation.nearest import Floats, without_heading
 
@@ -111,7 +112,7 @@ class _Fade:
         """A pose of the new moment (M, 4) with what is left of the cut; once a tick."""
         share = self._ticks / (FADE_TICKS + 1)
         self._ticks = max(0, self._ticks - 1)
-        left = quaternion.slerp(self._none, self._offset, np.full(len(pose), share * share * (3 - 2 * share)))
+        left = quaternion.slerp(self._none, self._offset, np.full(len(pose), ease(share)))
         faded: Floats = quaternion.multiply(left, pose).astype(np.float32)
         return faded
 

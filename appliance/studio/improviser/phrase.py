@@ -13,6 +13,7 @@ from appliance.dancer.material.carrying import smoothed
 from appliance.dancer.material.improvising import MOVE
 from appliance.dancer.material.steps import Steps, danced_again, motion_of
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
@@ -37,7 +38,7 @@ def make_phrase(
     dataset: Dataset,
     recorded: Sequence[Steps],
     options: PhraseOptions,
-    say: Callable[[str], None] = lambda words: None,
+    say: Callable[[str], None] = lambda message: None,
 ) -> tuple[Recording, Naturalness]:
     """Improvise several dances, take the stretches that close best, make them endless, keep the best.
 
@@ -100,8 +101,7 @@ def closed_loop(dance: Recording, first: int, last: int) -> Recording:
     level[:, 0] = quaternion.multiply(turns_about_y(-heading), level[:, 0])
     way = quaternion.rotate(turns_about_y(-heading[:-1]), np.diff(dance.roots, axis=0))
     turn = np.diff(heading)
-    share = (np.arange(fade) + 0.5) / fade
-    share = share * share * (3 - 2 * share)
+    share = ease((np.arange(fade) + 0.5) / fade)
 
     def faded(values: Array) -> Array:
         cycle = values[first:last].copy()

@@ -8,10 +8,11 @@ from typing import Protocol
 
 import numpy as np
 
-from appliance.dancer.loop import Placement, smooth, turns_about_y, yaws
+from appliance.dancer.loop import Placement, turns_about_y, yaws
 from appliance.dancer.material.improvising import BEFORE, MOVE, Choreographer, improvised
 from appliance.dancer.material.steps import HOP, Coder, Steps, danced_again, motion_of, steps_of
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset
@@ -115,7 +116,7 @@ def _placed(made: Recording, prompt: Recording, first: int) -> Recording:
 
 def _joined(before: Recording, made: Recording, first: int, fade: int, count: int) -> Recording:
     """`before` up to a frame, then faded over into what was made from that frame on."""
-    share = smooth((np.arange(fade) + 0.5) / fade)
+    share = ease((np.arange(fade) + 0.5) / fade)
     over = slice(first, first + fade)
     poses = np.concatenate(
         [
