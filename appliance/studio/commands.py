@@ -17,6 +17,7 @@ from appliance.pose.reading_options import ReadingOptions
 from appliance.show.bundle import named_show
 from appliance.studio import (
     compare_blind_command,
+    compare_command,
     duet_command,
     exchange_command,
     experiment_command,
@@ -290,4 +291,5 @@ app.add_typer(improvise_command.app)
 app.add_typer(vary_command.app)
 app.add_typer(path_command.app)
 app.add_typer(duet_command.app)
+app.add_typer(compare_command.app)
 app.add_typer(compare_blind_command.app)

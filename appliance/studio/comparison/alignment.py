@@ -7,13 +7,11 @@ the last one cost as much as a usual pair.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.data.dataset import FPS
 from appliance.studio.studio_error import StudioError
@@ -23,10 +21,10 @@ BAND = 15  # ticks on either side of what it found that the second one searches
 REACH_S = 10.0  # by which one of the dances may begin or end before the other
 DETOUR_DEGREES = 0.25  # what a step off the diagonal and a tick left out cost: of equal ways the straight one
 SMOOTH_S = 0.8  # of tempo: shorter changes are the ticks' own steps
+AT_ONCE = 64  # rows of costs: 64 by 1,500 of 20 joints take 60 MB
 EDGE_S = 0.5  # left out of the tempo at both ends, where the smoothing has one side only
 
 Places = NDArray[np.intp]
-CostRow = Callable[[int, Places], Array]
 
 
 @dataclass(frozen=True)
@@ -84,71 +82,61 @@ def align(teacher: Array, student: Array) -> Alignment:
 
     Raises StudioError where one is more than about twice as long as the other.
     """
-    coarse, low = [each[::COARSE] for each in (teacher, student)], np.zeros
-    usual = float(np.median([_costs(coarse[0][row], coarse[1]).min() for row in range(len(coarse[0]))]))
-    skip = usual + DETOUR_DEGREES
-    few = _warped(
-        lambda row, places: _costs(coarse[0][row], coarse[1][places]),
-        low(len(coarse[0]), dtype=int),
-        len(coarse[1]),
-        len(coarse[1]),
-        skip,
-    )
+    one, other = (each[::COARSE] for each in (teacher, student))
+    everywhere = np.broadcast_to(np.arange(len(other)), (len(one), len(other)))
+    costs = _costs(one, other, everywhere)
+    skip = float(np.median(costs.min(axis=1))) + DETOUR_DEGREES
+    few = COARSE * _warped(costs, np.zeros(len(one), dtype=int), len(other), skip, REACH_S * FPS / COARSE)
     rows = np.arange(len(teacher))
-    found = np.interp(rows, COARSE * few[:, 0], COARSE * few[:, 1])
-    found += np.minimum(rows - COARSE * few[0, 0], 0) + np.maximum(rows - COARSE * few[-1, 0], 0)
-    lows = np.clip(np.round(found).astype(int) - BAND, 0, max(0, len(student) - 2 * BAND - 1))
-    pairs = _warped(
-        lambda row, places: _costs(teacher[row], student[places]), lows, 2 * BAND + 1, len(student), skip
-    )
+    found = np.interp(rows, few[:, 0], few[:, 1])
+    found += np.minimum(rows - few[0, 0], 0) + np.maximum(rows - few[-1, 0], 0)
+    width = min(2 * BAND + 1, len(student))
+    lows = np.clip(np.round(found).astype(int) - BAND, 0, len(student) - width)
+    costs = _costs(teacher, student, lows[:, None] + np.arange(width))
+    pairs = _warped(costs, lows, len(student), skip, REACH_S * FPS)
     own = np.unique(pairs[:, 0])
     ticks = np.bincount(pairs[:, 0], pairs[:, 1])[own] / np.bincount(pairs[:, 0])[own]
     return Alignment(int(own[0]), np.clip(_smoothed(ticks), 0, len(student) - 1))
 
 
-def _warped(cost: CostRow, lows: Places, width: int, columns: int, skip: float) -> Places:
-    """(P, 2): the cheapest pairs of ticks. cost: of a row with columns; of row i the `width` from lows[i] on.
+def _warped(costs: Array, lows: Places, columns: int, skip: float, most: float) -> Places:
+    """(P, 2): the cheapest pairs of ticks. costs (R, W): of row i with the W columns from lows[i] on; most:
+    ticks of either that may be left out at each end.
 
     Raises StudioError where no way leads from one end to the other.
     """
-    rows, scale = len(lows), COARSE if width == columns else 1
-    reach = min(round(REACH_S * FPS / scale), rows // 2, columns // 2)
-    totals: list[Array] = []
-    costs: list[Array] = []
+    rows, width = costs.shape
+    reach = min(round(most), rows // 2, columns // 2)
+    totals = np.full((rows, width), np.inf)
     ways = np.zeros((rows, width), np.int8)
+    nothing = np.full(width, np.inf)
+
+    def before(values: Array, row: int, up: int, left: int) -> Array:
+        """Of the row `up` above, as many columns to the left."""
+        if row < up:
+            return nothing
+        at = lows[row] + np.arange(width) - left - lows[row - up]
+        known = (at >= 0) & (at < width)
+        return np.where(known, values[row - up, np.clip(at, 0, width - 1)], np.inf)
+
     for row in range(rows):
-        places = lows[row] + np.arange(width)
-        inside = places < columns
-        here = np.full(width, np.inf)
-        here[inside] = cost(row, places[inside])
-
-        def before(values: list[Array], up: int, left: int, row: int = row, places: Places = places) -> Array:
-            """Of the row `up` above, as many columns to the left."""
-            taken = np.full(width, np.inf)
-            if row >= up:
-                at = places - left - lows[row - up]
-                known = (at >= 0) & (at < width)
-                taken[known] = values[row - up][at[known]]
-            return taken
-
-        costs.append(here)
-        begins = row if row else np.where(places <= reach, places, np.inf)
-        begin = np.where((places == 0) | (row == 0), begins * skip, np.inf) if row <= reach else np.inf
+        places, here = lows[row] + np.arange(width), costs[row]
+        left_out = np.where(places == 0, row, np.where(row == 0, places, reach + 1))
         steps = np.stack(
             [
-                np.broadcast_to(begin, (width,)) + 2 * here,
-                before(totals, 1, 1) + 2 * here,
-                before(totals, 2, 1) + 2 * before(costs, 1, 0) + here + DETOUR_DEGREES,
-                before(totals, 1, 2) + 2 * before(costs, 0, 1) + here + DETOUR_DEGREES,
+                np.where(left_out <= reach, left_out * skip, np.inf) + 2 * here,
+                before(totals, row, 1, 1) + 2 * here,
+                before(totals, row, 2, 1) + 2 * before(costs, row, 1, 0) + here + DETOUR_DEGREES,
+                before(totals, row, 1, 2) + 2 * before(costs, row, 0, 1) + here + DETOUR_DEGREES,
             ]
         )
         ways[row] = steps.argmin(axis=0)
-        totals.append(steps.min(axis=0))
+        totals[row] = steps.min(axis=0)
     return _way_back(totals, ways, lows, columns, reach, skip)
 
 
 def _way_back(
-    totals: list[Array], ways: NDArray[np.int8], lows: Places, columns: int, reach: int, skip: float
+    totals: Array, ways: NDArray[np.int8], lows: Places, columns: int, reach: int, skip: float
 ) -> Places:
     """The pairs from the last one back."""
     rows, width = ways.shape
@@ -179,10 +167,14 @@ def _way_back(
     return np.array(pairs[::-1])
 
 
-def _costs(pose: Array, poses: Array) -> Array:
-    """Mean joint angle in degrees between a pose (M, 4) and poses (N, M, 4)."""
-    apart: Array = np.degrees(quaternion.angle_between(pose[None], poses)).mean(axis=-1)
-    return apart
+def _costs(one: Array, other: Array, places: Places) -> Array:
+    """(T, W): mean joint angles in degrees of poses (T, M, 4) and those of (S, M, 4) at places (T, W)."""
+    found = np.empty(places.shape)
+    for first in range(0, len(one), AT_ONCE):
+        rows = slice(first, first + AT_ONCE)
+        cosines = np.abs(np.einsum("tjk,twjk->twj", one[rows], other[places[rows]]))
+        found[rows] = np.degrees(2 * np.arccos(np.minimum(cosines, 1.0))).mean(axis=-1)
+    return found
 
 
 def _smoothed(ticks: Array) -> Array:
@@ -190,7 +182,10 @@ def _smoothed(ticks: Array) -> Array:
     half = min(round(SMOOTH_S * FPS / 2), (len(ticks) - 1) // 2)
     if half < 1:
         return ticks.astype(float)
-    before, after = (2 * ticks[end] - ticks[part] for end, part in ((0, slice(half, 0, -1)), (-1, slice(-2, -half - 2, -1))))
+    before, after = (
+        2 * ticks[end] - ticks[part]
+        for end, part in ((0, slice(half, 0, -1)), (-1, slice(-2, -half - 2, -1)))
+    )
     weights = np.hanning(2 * half + 3)[1:-1]
     padded = np.concatenate([before, ticks, after])
     smooth: Array = np.convolve(padded, weights / weights.sum(), mode="valid")

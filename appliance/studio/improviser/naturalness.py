@@ -96,7 +96,7 @@ class Yardstick:
         speeds = [np.linalg.norm(np.diff(shape, axis=0), axis=1).mean() * FPS for shape in shapes]
         lengths = [len(part) for part in parts]
         few = [shape[:: round(EVERY_S * FPS)] for shape in shapes]
-        seconds = [_seconds(shape, 2) for shape in shapes]
+        seconds = [seconds_of(shape, 2) for shape in shapes]
         some = max(1, sum(len(part) for part in seconds) // 200)
         among = _to_others(few, names)
         return Yardstick(
@@ -170,7 +170,7 @@ def _likeness(phrase: Array, yardstick: Yardstick) -> Likeness:
     few = phrase[:: round(EVERY_S * FPS)]
     covered = distances(few, yardstick.shapes).min(axis=0) <= np.maximum(yardstick.near, yardstick.usual_cm)
     strange = yardstick.strangeness(few)
-    whole_seconds = _seconds(phrase, round(SECOND_S * FPS) // 2)
+    whole_seconds = seconds_of(phrase, round(SECOND_S * FPS) // 2)
     seconds = distances(whole_seconds, yardstick.seconds).min(axis=1)
     spread, usual_spread = (np.sqrt(shapes.var(axis=0).sum()) for shapes in (phrase, yardstick.shapes))
     return Likeness(
@@ -210,7 +210,7 @@ def distances(a: Array, b: Array) -> Array:
     return root
 
 
-def _seconds(shapes: Array, stride: int) -> Array:
+def seconds_of(shapes: Array, stride: int) -> Array:
     """Stretches of a second, one every `stride` frames, each as ten figures in a row (K, 10 * M * 3)."""
     length = round(SECOND_S * FPS)
     starts = np.arange(0, len(shapes) - length + 1, stride)

@@ -1,0 +1,114 @@
+"""Student and teacher: form and timing of two versions of a dance are told apart, and the worst moments named."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.pose import quaternion
+from appliance.pose.bvh import write_bvh
+from appliance.pose.recording import Recording
+from appliance.studio.comparison import versions
+from appliance.studio.comparison.versions import compare, null_rows, sentences
+from appliance.studio.data.mirror import mirrored
+from appliance.studio.exchange.retargeting import retarget
+from appliance.studio.studio_error import StudioError
+from tests.studio.bodies import body
+from tests.studio.conftest import bunraku
+from tests.studio.tiny import skeleton
+
+
+def danced(seconds: float = 8.0, seed: int = 1) -> Recording:
+    """Every joint moves smoothly, and never twice alike."""
+    rng, time, bones = np.random.default_rng(seed), np.arange(round(50 * seconds)) / 50, skeleton()
+    poses = np.tile([1.0, 0, 0, 0], (len(time), len(bones), 1))
+    for joint in range(len(bones)):
+        waves = [rng.uniform(0.1, 0.3) * np.sin(time * rate + rng.uniform(0, 6)) for rate in (0.9, 2.1, 3.7)]
+        poses[:, joint] = quaternion.from_axis_angle(rng.normal(size=3), sum(waves))
+    roots = np.stack([0.2 * np.sin(time), np.full(len(time), 0.8), 0 * time], axis=-1)
+    return Recording(bones, quaternion.continuous(poses), roots, 50.0)
+
+
+def lowered(dance: Recording, name: str, degrees: float, first: int, end: int) -> Recording:
+    """A joint turned for a while, its beginning and end eased."""
+    joint, poses = dance.skeleton.index(name), dance.poses.copy()
+    turn = quaternion.from_axis_angle([0.0, 0, 1.0], -np.radians(degrees) * np.hanning(end - first))
+    poses[first:end, joint] = quaternion.multiply(turn, poses[first:end, joint])
+    return replace(dance, poses=poses)
+
+
+def test_a_shift_and_another_tempo_are_timing_and_no_form() -> None:
+    teacher = danced()
+    found = dict(null_rows(teacher))
+    itself, late, fast, image, backwards = found.values()
+    assert itself.form == pytest.approx(0, abs=0.01) and itself.alignment.late_s == pytest.approx(0, abs=0.01)
+    assert late.form < 0.1 < 3 < late.on_the_clock
+    assert late.alignment.late_s == pytest.approx(0.4, abs=0.02)
+    assert late.alignment.tempo == pytest.approx(1, abs=0.01)
+    assert fast.form < 0.5 < 3 < fast.on_the_clock
+    assert fast.alignment.tempo == pytest.approx(1.1, abs=0.01) and fast.alignment.unsteady_s < 0.03
+    assert image.form > 8 and backwards.form > 8, "another dance stays another one"
+    assert compare(teacher, danced(seed=2)).form > 8
+    words = sentences(late, [], "anna")
+    assert "anna is 0.40 s later, at the same tempo" in words[0] and "the form is the same" in words[1]
+    assert "1.10 times as fast" in sentences(fast, [], "anna")[0]
+
+
+def test_the_joint_and_the_second_of_a_mistake_are_named_whatever_the_tempo() -> None:
+    teacher = danced()
+    wrong = lowered(teacher, "lShldr", 60, 200, 300)
+    student = wrong.between(np.clip(np.arange(0, len(wrong) - 1, 0.9) - 15, 0, None))
+    found = compare(teacher, student)
+    worst = found.moments()[0]
+    assert worst.joint == "left upper arm" == next(iter(found.by_joint))
+    assert worst.teacher_s == pytest.approx(5.0, abs=0.4) and worst.degrees == pytest.approx(60, abs=8)
+    assert worst.student_s == pytest.approx(0.3 + worst.teacher_s / 0.9, abs=0.2)
+    assert "cm" in worst.words and found.by_joint["right upper arm"] < 0.3 * found.by_joint["left upper arm"]
+    assert found.alignment.tempo == pytest.approx(0.9, abs=0.02)
+
+
+def test_neither_may_stand_while_the_other_goes_on() -> None:
+    """The null product is unbounded time warping, with which a statue fits wherever the dancer passes by."""
+    teacher = danced()
+    still = replace(teacher, poses=np.repeat(teacher.poses[100:101], len(teacher), axis=0))
+    found = compare(teacher, still)
+    assert found.form > 5
+    assert found.alignment.tempo_over_time.min() >= 0.5 and found.alignment.tempo_over_time.max() <= 2
+
+
+def test_another_body_is_compared_by_what_its_joints_are() -> None:
+    teacher = danced(5.0)
+    other = retarget(teacher, body())
+    assert compare(teacher, other).form < 3
+    with pytest.raises(StudioError, match="different skeletons"):
+        names = tuple(f"j{number}" for number in range(len(body())))
+        compare(teacher, replace(other, skeleton=replace(body(), names=names)))
+
+
+def test_too_long_a_dance_is_no_version() -> None:
+    with pytest.raises(StudioError, match="more than twice as long"):
+        compare(danced(2.0), danced(30.0))
+
+
+def test_the_command_draws_says_and_writes_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(versions, "MOMENTS", 1)
+    teacher = danced(4.0)
+    write_bvh(tmp_path / "teacher.bvh", teacher)
+    write_bvh(tmp_path / "anna.bvh", lowered(mirrored(teacher), "rShldr", 50, 80, 160).excerpt(0.4))
+    files = tmp_path / "teacher.bvh", tmp_path / "anna.bvh"
+    result = bunraku("compare", *files, "--no-nulls", "--out", tmp_path / "as-it-is")
+    assert result.exit_code == 0 and "give --mirrored" in result.stderr
+    result = bunraku("compare", *files, "--mirrored", "--out", tmp_path / "out")
+    words = " ".join(result.stderr.split())
+    assert result.exit_code == 0 and "anna is 0.40 s earlier, at the same tempo" in words, result.output
+    assert "The worst moments: " in words and "left upper arm" in words
+    report = json.loads((tmp_path / "out" / "compare.json").read_text())
+    assert (
+        report["figures"]["anna"]["form_degrees"] < 5 < report["figures"]["itself, mirrored"]["form_degrees"]
+    )
+    for name in ("moments.png", "joints.png"):
+        assert (tmp_path / "out" / name).read_bytes()[:4] == b"\x89PNG"
