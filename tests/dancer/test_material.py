@@ -86,6 +86,8 @@ def test_a_variation_keeps_the_phrases_way_seconds_and_still_joints(maker: Maker
     assert loop.start_s == pytest.approx(phrase.start_s + phrase.fade / 50) and loop.step == phrase.step
     still = [joint for joint, name in enumerate(FIGURE.names) if name not in MOVING]
     assert np.array_equal(loop.poses[:-1, still], Cycle.of(phrase).poses[:, still])
+    own = maker.make(VARY | {"sigma": 0.0}).poses[:-1]
+    assert np.degrees(quaternion.angle_between(own, Cycle.of(phrase).poses)).max() < 0.1, "the phrase itself"
     nearer = maker.make(VARY | {"sigma": 0.1})
     plain = maker.make(VARY | {"sigma": 0.0})
     far = quaternion.angle_between(loop.poses, plain.poses).mean()

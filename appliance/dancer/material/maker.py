@@ -23,6 +23,7 @@ from appliance.dancer.material.improvising import MOVE, improvised
 from appliance.dancer.material.motion_network import MotionNetwork, Poses
 from appliance.dancer.material.pose_paths import even_path, wobbled
 from appliance.dancer.material.prompt import CLOSING, closing_frame, homed, unpacked_steps
+from appliance.dancer.material.put_on import put_on
 from appliance.dancer.material.steps import HOP, Steps, danced_again, motion_of
 from appliance.dancer.phrase import FPS, X, Z
 from appliance.levers.sources import GRANULAR, IMPROVISE, KEPT, MAIN, PATH, VARY
@@ -74,12 +75,20 @@ class Maker:
         return cycle.loop(poses, lifts, heights, recipe["number"])
 
     def _varied(self, network: MotionNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
-        """The phrase moved by noise of sigma standard deviations, the same for all its windows."""
+        """The phrase moved by noise of sigma standard deviations, the same for all its windows; at 0 the
+        phrase itself.
+        """
         cycle = Cycle.of(self._loop_of(recipe["phrase"]))
         starts, latents, facing = _encoded(network, cycle)
         noise = np.random.default_rng(recipe["seed"]).standard_normal(network.latent)
         moved = (latents + recipe["sigma"] * noise).astype(np.float32)
-        return cycle, cycle.blended(_decoded(network, moved, starts, facing), network.places)
+        known, varied = (
+            cycle.blended(_decoded(network, path, starts, facing), network.places)[:, network.places]
+            for path in (latents, moved)
+        )
+        poses = cycle.poses.copy()
+        poses[:, network.places] = put_on(poses[:, network.places], known, varied, cycle.step.yaw)
+        return cycle, quaternion.continuous(poses).astype(np.float32, copy=False)
 
     def _walked(self, network: MotionNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
         """A walk through the prior, or the path between two excerpts, that leads into its own start."""

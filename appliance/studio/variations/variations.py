@@ -15,6 +15,7 @@ import numpy as np
 from appliance.dancer.material import latent_paths
 from appliance.dancer.material.cyclic import Starts, hann_mean
 from appliance.dancer.material.latent_paths import Latents
+from appliance.dancer.material.put_on import put_on
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.coded_windows import decoded, encoded, latent_of, window_of
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from appliance.studio.coded_windows import Network
 
 OVERLAP = 4  # windows that know a pose
-SMOOTH_FRAMES = 25  # the noise's effect is smoothed: 12.3 of 12.7 degrees stay, trembling goes
 
 
 @dataclass(frozen=True)
@@ -69,17 +69,6 @@ def varied(network: Network, phrase: EncodedPhrase, sigma: float, seed: int) -> 
     noise = np.random.default_rng(seed).standard_normal(phrase.latents.shape[1])
     moved = phrase.latents + np.asarray(sigma * noise, dtype=np.float32)
     return put_on(phrase.poses, phrase.known, _danced(network, moved, phrase.facing))
-
-
-def put_on(poses: Poses, before: Poses, after: Poses) -> Poses:
-    """Poses (T, M, 4) turned as a motion is turned that goes from `before` to `after`, smoothed in time."""
-    change = quaternion.multiply(after, quaternion.inverse(before))
-    change = quaternion.continuous(np.where(change[:1, :, :1] < 0, -change, change))
-    weights = np.hanning(SMOOTH_FRAMES + 2)[1:-1]
-    padded = np.pad(change, ((SMOOTH_FRAMES // 2,) * 2, (0, 0), (0, 0)), mode="edge")
-    smooth = sum(w * padded[at : at + len(change)] for at, w in enumerate(weights / weights.sum()))
-    turned: Poses = quaternion.multiply(quaternion.normalize(smooth), poses).astype(np.float32)
-    return turned
 
 
 def mixed(network: Network, phrase: EncodedPhrase, other: EncodedPhrase, share: float, seed: int) -> Poses:
