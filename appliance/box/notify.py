@@ -18,6 +18,7 @@ WATCHDOG_S = {
     "generator": 5.0,
     "console": 5.0,
     "sound": 5.0,
+    "remote": 5.0,
     "keeper": 8.0,
     "projector": 10.0,
 }
@@ -58,9 +59,9 @@ class Notifier:
             if self._send(f"{self._owed}{ALIVE}"):
                 self._owed = ""
 
-    def status(self, words: str) -> None:
+    def status(self, message: str) -> None:
         """One line for `systemctl status`."""
-        self._send("", words)
+        self._send("", message)
 
     def stopping(self) -> None:
         """It ends by itself now."""

@@ -16,7 +16,7 @@ from appliance.box.record import Record
 from appliance.box.runtime_folder import renew_lost
 from appliance.pose.foreign_file import kept_json, plain_json
 
-PROCESSES = ("control", "lights", "projector", "keeper", "console", "generator", "sound")
+PROCESSES = ("control", "lights", "projector", "keeper", "console", "generator", "sound", "remote")
 BEAT_S, LATE_S = 1.0, 5.0
 _LARGEST = 8192
 _CHOSEN = "chosen.json"
@@ -57,6 +57,11 @@ DIED = {
         "sound-died",
         "The sound's process died or hangs. The strings are silent, and it is started again within "
         "seconds. If it goes on, look at its messages: journalctl -u bunraku-sound.",
+    ),
+    "remote": Fallback(
+        "remote-died",
+        "The process for timecode and MIDI died or hangs. Cues wait for a GO by hand, and it is started "
+        "again within seconds. If it goes on, look at its messages: journalctl -u bunraku-remote.",
     ),
 }
 STAGE_HUNG = Fallback(
@@ -164,6 +169,11 @@ class ProcessHealth:
                 found.append(Member(process, starts, late, fallbacks, parts, lives, more))
         return found
 
+    def reported(self, process: str, now: float) -> Mapping[str, Any]:
+        """The rest of a process's report; empty where it does not live."""
+        found = (one.reported for one in self.members(now) if one.process == process and one.lives)
+        return next(found, MappingProxyType({}))
+
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
         """Process and fallback: what each published, whether it died, and shows that do not dance."""
         found = []
@@ -171,7 +181,7 @@ class ProcessHealth:
             died = DIED[member.process]
             deaths = member.starts - 1 + member.late
             if deaths:
-                found.append((member.process, Fallen(died.name, deaths, member.late, died.words)))
+                found.append((member.process, Fallen(died.name, deaths, member.late, died.message)))
             found += [(member.process, one) for one in member.fallbacks]
         return found + [("preflight", one) for one in self._choice()]
 
@@ -195,9 +205,9 @@ class ProcessHealth:
 
 def _of_choice(refused: list[str], aside: list[list[str]]) -> list[Fallen]:
     """The preflight notes what it refused, the stage the pairs that it has put aside."""
-    both = ((SHOW_REFUSED, refused), (SHOW_PUT_ASIDE, [words for _, words in aside]))
+    both = ((SHOW_REFUSED, refused), (SHOW_PUT_ASIDE, [message for _, message in aside]))
     return [
-        Fallen(one.name, len(words), True, " ".join(words), _files_in(words)) for one, words in both if words
+        Fallen(one.name, len(message), True, " ".join(message), _files_in(message)) for one, message in both if message
     ]
 
 

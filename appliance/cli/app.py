@@ -21,7 +21,7 @@ prepare_environment()
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
 from appliance.cli.distributions import PLUG_INS, absent, absent_commands  # noqa: E402
-from appliance.cli.examples import ORDER, OTHER_WORDS  # noqa: E402
+from appliance.cli.examples import ORDER, SYNONYMS  # noqa: E402
 from appliance.cli.help_page import complete_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
 from appliance.options.idle_options import refuse_idle  # noqa: E402
@@ -48,6 +48,8 @@ _MODULES = {  # in each a function or a group of the command's name
     "sensors": "appliance.cli.sensors.commands",
     "lights": "appliance.cli.lights_commands",
     "sound": "appliance.cli.sound",
+    "remote": "appliance.cli.remote",
+    "learn": "appliance.cli.learn",
     "preflight": _HERE,
     "release": "appliance.cli.release",
     "firewall": "appliance.cli.firewall",
@@ -222,7 +224,7 @@ def _require_known(given: Sequence[str], commands: Sequence[str]) -> None:
         print(f"bunraku: {missing[word]}", file=sys.stderr)
         sys.exit(REFUSED)
     known = {name: name for name in (*commands, *missing)}
-    meant = {other: name for name, others in OTHER_WORDS.items() if name in known for other in others}
+    meant = {other: name for name, others in SYNONYMS.items() if name in known for other in others}
     near = nearest(word, list(known | meant)) if word.casefold() not in meant else word.casefold()
     found = known.get(near or "") or meant.get(near or "")
     cure = f"Did you mean '{found}'?" if found else "bunraku -h lists all."
@@ -232,10 +234,10 @@ def _require_known(given: Sequence[str], commands: Sequence[str]) -> None:
 
 def refuse(error: Exception) -> NoReturn:
     """Exit with one clear line for an error that the user can correct; raise any other."""
-    words = sentence(error) if isinstance(error, OSError) else str(error) if _is_correctable(error) else None
-    if words is None:
+    message = sentence(error) if isinstance(error, OSError) else str(error) if _is_correctable(error) else None
+    if message is None:
         raise error
-    print(f"bunraku: {words}", file=sys.stderr)
+    print(f"bunraku: {message}", file=sys.stderr)
     status = getattr(error, "exit_status", REFUSED)
     if status != REFUSED:
         Notifier().ready(str(error))  # systemd must not count this as a failed start
@@ -249,8 +251,8 @@ def plug_ins(found: Iterable[EntryPoint]) -> list[typer.Typer]:
         try:
             loaded.append(point.load())
         except Exception as error:
-            words = f"bunraku: the commands of '{point.name}' are not available here ({error})."
-            print(words, file=sys.stderr)
+            message = f"bunraku: the commands of '{point.name}' are not available here ({error})."
+            print(message, file=sys.stderr)
     return loaded
 
 

@@ -56,12 +56,17 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
         "bunraku lights convert fixture.json --out my_show/profiles/fixture.yaml",
         "bunraku lights convert rig.mvr --out rig",
     ),
+    "remote": ("bunraku remote --box box.yaml",),
     "sound": ("bunraku sound --box box.yaml", "bunraku sound out/tonight --file tonight.wav"),
     "emulate": (
         "bunraku emulate --sensor left-wrist --seconds-per-turn 5",
         "bunraku emulate --sensor left-wrist=dance --sensor head=still --network bad",
         "bunraku emulate --motion trace --trace dance.bvh --joint lShldr --serial /dev/ttyUSB0",
         "bunraku emulate --firmware --motion dance",
+    ),
+    "learn": (
+        "bunraku learn --recordings takes --out tonight",
+        "bunraku learn --recordings takes --out tonight --minutes 120 -- --from my_show",
     ),
     "measure": ("bunraku measure --seconds 30 --report out/measure",),
     "filmstrip": (
@@ -102,7 +107,16 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
         "bunraku path phrase.bvh --model out/pose/checkpoint.pt --out wobble.bvh --wobble 0.1 0.5",
         "bunraku path --model out/pose/checkpoint.pt --out drawn.bvh --draw map.svg",
     ),
+    "explore": (
+        "bunraku explore --show default --out unseen.bvh",
+        "bunraku explore rehearsal.bvh --model out/pose/checkpoint.pt --out unseen.bvh",
+    ),
     "duet": ("bunraku duet couples --show my_show", "bunraku duet couples --show my_show --minutes 5"),
+    "compare": (
+        "bunraku compare teacher.bvh student.bvh --out out/compare",
+        "bunraku compare teacher.bvh student.bvh --mirrored --out out/compare",
+    ),
+    "periods": ("bunraku periods takes_2024 takes_2026 --out out/periods",),
     "compare-blind": (
         "bunraku compare-blind mine.bvh other.bvh --pairs 20 --out study.html",
         "bunraku compare-blind --votes votes-anna.json --votes votes-ben.json",
@@ -111,7 +125,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
 }
 ORDER = tuple(dict.fromkeys(path.split()[0] for path in EXAMPLES if path))
 
-OTHER_WORDS: dict[str, tuple[str, ...]] = {
+SYNONYMS: dict[str, tuple[str, ...]] = {
     "play": ("run", "start", "dance", "perform", "rehearse", "demo", "go"),
     "project": ("projector", "show", "display", "window", "beamer", "screen", "video"),
     "control": ("osc", "cue", "panic", "stop", "blackout"),
@@ -130,6 +144,7 @@ OTHER_WORDS: dict[str, tuple[str, ...]] = {
     "provision": ("pair", "register", "enrol", "wifi", "key", "keys", "setup"),
     "sensors": ("sensor", "wearable", "wearables", "devices", "imu", "neutral", "strobe"),
     "lights": ("light", "dmx", "rig", "fixtures", "lamps"),
+    "remote": ("timecode", "midi", "mtc", "ltc", "smpte", "fader"),
     "sound": ("audio", "strings", "music", "wav", "speaker"),
     "emulate": ("emulator", "simulate", "simulator", "fake", "mock"),
     "measure": ("latency", "benchmark", "bench", "jitter", "speed"),
@@ -148,6 +163,9 @@ OTHER_WORDS: dict[str, tuple[str, ...]] = {
     "map": ("space", "pca", "umap", "embed"),
     "path": ("wobble", "line", "trace"),
     "duet": ("partner", "couple", "answer", "dependence"),
+    "explore": ("unseen", "novelty", "new", "discover", "unvisited"),
+    "compare": ("align", "teacher", "student", "difference", "diff", "timing"),
+    "periods": ("period", "practice", "before", "after", "development"),
     "compare-blind": ("study", "votes", "preference", "judge", "survey"),
     "version": ("about",),
 }

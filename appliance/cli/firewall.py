@@ -12,6 +12,7 @@ from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
 from appliance.show.box import BoxConfig, load_box
 
+_MDNS = 5353
 _RULES = """\
 #!/usr/sbin/nft -f
 # Written by `bunraku firewall`: what the box file opens is let in, and nothing else.
@@ -48,7 +49,7 @@ def firewall(
 
 def rules(box: BoxConfig, access_points: Sequence[str] = ()) -> str:
     """One table of our own: all other tables stay as they are."""
-    lines = [*_sensors(box), *_commands(box), *_page(box), *_own_network(access_points)]
+    lines = [*_sensors(box), *_commands(box), *_remote(box), *_page(box), *_own_network(access_points)]
     return _RULES.format(rules="\n".join(f"\t\t{line}" for line in lines))
 
 
@@ -73,8 +74,19 @@ def _commands(box: BoxConfig) -> Iterator[str]:
         )
 
 
+def _remote(box: BoxConfig) -> Iterator[str]:
+    """Timecode and MIDI, from the listed senders."""
+    timecode, network = box.timecode, box.midi and box.midi.network
+    if timecode is not None and timecode.source == "art-net" and not _is_loopback(timecode.host):
+        where = f"{_to(timecode.host)}ip saddr {{ {', '.join(timecode.senders)} }}"
+        yield f'{where} udp dport {timecode.port} accept comment "timecode"'
+    if network and not _is_loopback(network.host):
+        where = f"{_to(network.host)}ip saddr {{ {', '.join(network.senders)} }}"
+        yield f'{where} udp dport {network.port}-{network.port + 1} accept comment "MIDI"'
+
+
 def _page(box: BoxConfig) -> Iterator[str]:
-    """The page and the stream, from the listed viewers, IPv4 and IPv6 apart, as nft has them."""
+    """The page, its name by mDNS, and the stream, from the listed viewers, IPv4 and IPv6 apart."""
     for served, name in ((box.console, "the page"), (box.projector.stream, "the stream")):
         if served is None or _is_loopback(served.host) or not served.port:
             continue
@@ -83,6 +95,8 @@ def _page(box: BoxConfig) -> Iterator[str]:
             if networks:
                 viewers = ", ".join(networks)
                 yield f'{family} saddr {{ {viewers} }} tcp dport {served.port} accept comment "{name}"'
+                if served is box.console:
+                    yield f'{family} saddr {{ {viewers} }} udp dport {_MDNS} accept comment "its name"'
 
 
 def _own_network(access_points: Sequence[str]) -> Iterator[str]:

@@ -65,11 +65,11 @@ def play_show(
         from appliance.cli.phones import with_phone
 
         box = with_phone(show, box)
-    words = ""
+    message = ""
     if directory is not None and chosen is None:  # a network that never ends would block every signal
         from appliance.cli.network_proof import prove_network
 
-        words = prove_network(show)
+        message = prove_network(show)
     with ExitStack() as opened:
         stopped = opened.enter_context(stop_signals())
         scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
@@ -105,7 +105,7 @@ def play_show(
             keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
             keeper = _keeper(keepers_box, journal, minutes) if keeps else None
             unlit = () if alone or show.config.lights.fixtures else unwired(show, box)
-            for line in (*words.splitlines(), *_introduction(stage, emulate, control), *unlit):
+            for line in (*message.splitlines(), *_introduction(stage, emulate, control), *unlit):
                 speaker.say(line)
             companions = () if alone else tuple(_companions(show, box, control, window or shown))
             if page is not None:
@@ -147,7 +147,7 @@ def _pair_to_dance(chosen: Path, directory: Path | None, box_file: Path | None) 
 
     require_no("--show", directory, chosen)
     require_no("--box", box_file, chosen)
-    pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
+    pair = pair_to_dance(chosen, time.monotonic(), lambda message: print(message, flush=True))
     return pair.show, pair.box
 
 
@@ -230,6 +230,13 @@ def _companions(
             (*BUNRAKU, "sound", *named),
             "The strings are silent for a moment.",
             watchdog_s=WATCHDOG_S["sound"],
+        )
+    if box.timecode is not None or box.midi is not None:
+        yield Companion(
+            "The process for timecode and MIDI",
+            (*BUNRAKU, "remote", *named),
+            "Cues wait for a GO by hand.",
+            watchdog_s=WATCHDOG_S["remote"],
         )
     if window:
         yield Companion(

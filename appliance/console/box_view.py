@@ -29,7 +29,7 @@ class BoxView:
     """Reads what stage, show control and the others share, and remembers what they forget.
 
     value: the newest. A battery level stays after its sensor is gone; `since`: Unix seconds since when no
-    tick was late or skipped. words: the same as JSON.
+    tick was late or skipped. text: the same as JSON.
     """
 
     def __init__(self, desk: Desk, stage: StageView, seen: SeenStage, show_state: ShowStateReader) -> None:
@@ -39,12 +39,12 @@ class BoxView:
         self._late: tuple[int, int] | None = None
         self._since = self._started = time.time()
         self.value: dict[str, Any] = {}
-        self.words = "{}"
+        self.text = "{}"
 
     def refresh(self) -> None:
         """Look once."""
         self.value = self._value(time.monotonic())
-        self.words = json.dumps(self.value)
+        self.text = json.dumps(self.value)
 
     def _value(self, now: float) -> dict[str, Any]:
         seen, state, members = self._seen, self._show_state.read(), self._seen.members(now)
@@ -70,9 +70,8 @@ class BoxView:
             "sensors": sensors,
             "fallbacks": fallbacks,
             "processes": [{"process": one.process, "late": one.late} for one in members],
-            "wall": dict(
-                next((one.reported for one in members if one.process == "projector" and one.lives), {})
-            ),
+            "wall": dict(seen.reported("projector", now)),
+            "remote": dict(seen.reported("remote", now)),
             "hands": [one._asdict() for one in hands_of(seen)] if known else [],
             "generation": self._stage.generation,
             **self._declared(),

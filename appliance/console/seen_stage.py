@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,10 @@ class SeenStage:
         """Process and fallback, of all processes of the box, as far as they ever happened."""
         stage = fallen(self.health().get("fallbacks")) if self.state(now) != "absent" else ()
         return [*(("stage", one) for one in stage), *self._processes.fallbacks(now)]
+
+    def reported(self, process: str, now: float) -> Mapping[str, Any]:
+        """The report of a process beside the stage; empty where it does not live."""
+        return self._processes.reported(process, now)
 
     def members(self, now: float) -> list[Member]:
         """The processes beside the stage."""

@@ -45,6 +45,7 @@ class Status(NamedTuple):
     fallbacks: Annotated[int, "how many [fallbacks](#fallbacks) are in force now; 0 on a good night"] = 0
     liveliness: Annotated[float, "how alive the answer to a hand is, 0 to 1"] = UNKNOWN
     seed: Annotated[int, "seed of the noise in the answer: the newest that was asked for"] = -1
+    timecode: Annotated[str, "the timecode that is followed, like `01:00:10:05`; empty: none comes"] = ""
     live: Annotated[str, "how much of a live dancer comes, like `17 of 17 bones`; empty: none is heard"] = ""
 
     @classmethod

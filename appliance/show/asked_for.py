@@ -1,4 +1,4 @@
-"""Whether a box file asks for sound or lights at all: a look that loads next to nothing.
+"""Whether a box file asks for sound lights or remote control at all: a look that loads next to nothing.
 
 At each power-on a process is started for either; on a small machine all that it loads takes seconds.
 """
@@ -32,11 +32,19 @@ def no_sound(box: Path | None) -> NotAskedForError:
     return _not_asked_for(box, "This box file asks for no sound.", cure)
 
 
+def require_remote(box: Path | None) -> None:
+    """Raises NotAskedForError where there is neither timecode nor MIDI; ConfigError: it is no YAML."""
+    values = {} if box is None else read_yaml(box).values
+    if values.get("timecode") is None and values.get("midi") is None:
+        cure = "Add `timecode: {source: art-net}`, or `midi: {}` for each controller that is plugged in."
+        raise _not_asked_for(box, "This box file has neither timecode nor MIDI.", cure)
+
+
 def no_wires(box: Path | None) -> NotAskedForError:
     """The sentence about this box file."""
     cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
     return _not_asked_for(box, "No wire leads to the lights.", cure)
 
 
-def _not_asked_for(box: Path | None, words: str, cure: str) -> NotAskedForError:
-    return NotAskedForError([Problem(box or Path("box.yaml"), 0, words, cure)])
+def _not_asked_for(box: Path | None, message: str, cure: str) -> NotAskedForError:
+    return NotAskedForError([Problem(box or Path("box.yaml"), 0, message, cure)])

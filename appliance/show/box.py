@@ -15,8 +15,10 @@ from appliance.show.dmx import DmxWires
 from appliance.show.foreign_sensors import MOST as MOST_FOREIGN
 from appliance.show.foreign_sensors import ForeignSensorConfig
 from appliance.show.osc import OscConfig, osc_misfits
+from appliance.show.pair import PairConfig
 from appliance.show.posistagenet import PosiStageNetConfig, misfits
 from appliance.show.projector import ProjectorConfig
+from appliance.show.remote import MidiConfig, TimecodeConfig
 from appliance.show.section import (
     Ipv4,
     LocalFile,
@@ -192,6 +194,8 @@ class BoxConfig(Section):
     lights: VenueLightsConfig = part(VenueLightsConfig)
     projector: ProjectorConfig = part(ProjectorConfig)
     sound: SoundConfig | None = key("The sound card for a show's strings; null: none.", None)
+    timecode: TimecodeConfig | None = key("Timecode in and out; null: none.", None)
+    midi: MidiConfig | None = key("MIDI controllers and desks; null: none.", None)
     runtime: LocalFolder | None = key(
         "Folder shared by the box's processes, relative to the box file; a folder in memory. "
         "null: the one from systemd, otherwise the user's.",
@@ -206,6 +210,7 @@ class BoxConfig(Section):
         "always",
     )
     journal: JournalConfig = part(JournalConfig)
+    pair: PairConfig | None = key("A second box that takes over when this one is silent; null: none.", None)
 
     @model_validator(mode="after")
     def _programs_are_heard(self) -> BoxConfig:
@@ -224,6 +229,20 @@ class BoxConfig(Section):
             if one.usual_port in ports:
                 message = f"Port {one.usual_port} hears {ports[one.usual_port]} already."
                 raise refusal(message, f"Give {one.name} another one.", at=(*at, "port"))
+        return self
+
+    @model_validator(mode="after")
+    def _commands_are_heard(self) -> BoxConfig:
+        for name in ("timecode", "midi"):
+            if getattr(self, name) is not None and (self.control is None or not self.control.port):
+                raise refusal(
+                    f"`{name}` gives commands to show control, and this box has no port for them.",
+                    f"Write `control: {{port: {ControlConfig().port}}}`.",
+                    at=name,
+                )
+        timecode = self.timecode
+        if timecode is not None and timecode.source == "mtc" and self.midi is None:
+            raise refusal("MIDI timecode comes by MIDI.", "Add `midi: {}`.", at=("timecode", "source"))
         return self
 
     @model_validator(mode="after")

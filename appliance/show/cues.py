@@ -13,6 +13,7 @@ from appliance.levers.table import MOST_ITERATIONS
 from appliance.show.config_error import Problem, did_you_mean
 from appliance.show.look import CameraChange
 from appliance.show.motion_sources import MotionChanges
+from appliance.show.remote import CueTime
 from appliance.show.section import Section, key, refusal
 from appliance.show.yaml_file import Location, YamlFile
 
@@ -34,6 +35,9 @@ class CueConfig(Section):
     """One cue. Keys left out stay as they are."""
 
     name: str = key("Name for `/cue`.", length=(1, 64))
+    at: CueTime | None = key(
+        'Timecode at which it is called, like "01:00:10:00", where the box file has `timecode`.', None
+    )
     phrase: Name | None = _key(levers.PHRASE)
     motion: MotionChanges | None = key(
         "Parameters of sources made ahead, like {vary: {sigma: 1.2}}, reached over the fade.",
@@ -105,10 +109,10 @@ def cue_problems(
         for where, what, location, word in _named(cue, place):
             if word not in known[where]:
                 cure = did_you_mean(word, known[where]) if known[where] else f"Remove `{where}` from the cue."
-                words = f"This show has no {what} '{word}'."
+                text = f"This show has no {what} '{word}'."
                 if where == levers.HAND.cue:
-                    words = f"No hand of this show holds the joint '{word}'."
-                yield file.problem(location, words, cure)
+                    text = f"No hand of this show holds the joint '{word}'."
+                yield file.problem(location, text, cure)
 
 
 def too_much(cues: Sequence[CueConfig], most: int, file: YamlFile) -> Iterator[Problem]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +43,8 @@ class StageObserver:
 
     def applied(self) -> tuple[int, str]:
         """The generation of the show state that the dance follows, and what the stage says about it."""
-        generation, words = self.health().get("applied", (0, ""))
-        return int(generation), str(words)
+        generation, message = self.health().get("applied", (0, ""))
+        return int(generation), str(message)
 
     def kept(self) -> tuple[str, ...]:
         """Names of motions that were kept: /phrase calls them."""
@@ -57,6 +58,10 @@ class StageObserver:
         others = self._process_health.fallbacks(now)
         more = [(process, one) for process, one in others if (process, one.name) not in own_names]
         return [*(("stage", one) for one in stage), *own, *more]
+
+    def reported(self, process: str, now: float) -> Mapping[str, Any]:
+        """The report of a process beside the stage; empty where it does not live."""
+        return self._process_health.reported(process, now)
 
     @property
     def facts(self) -> Facts | None:

@@ -16,7 +16,7 @@ from appliance.show_control.packet import Message
 
 StageState = Literal["dancing", "stopped", "hung", "absent"]
 END = "/end"
-_LONGEST_WORDS = 1000  # longest sentence in an answer
+_LONGEST_TEXT = 1000  # longest sentence in an answer
 
 
 class SeenFacts(Protocol):
@@ -46,6 +46,7 @@ class Seen(Protocol):
     def state(self, now: float) -> StageState: ...
     def health(self) -> dict[str, Any]: ...
     def kept(self) -> tuple[str, ...]: ...
+    def reported(self, process: str, now: float) -> Mapping[str, Any]: ...
     def fallbacks(self, now: float) -> Sequence[tuple[str, Fallen]]: ...
 
 
@@ -82,6 +83,7 @@ def status(
         refused=refused,
         strangers=strangers,
         fallbacks=sum(one.active for _, one in observer.fallbacks(now)),
+        timecode=str(observer.reported("remote", now).get("timecode", "")),
         live=live,
     )
 
@@ -141,8 +143,8 @@ def hands_of(observer: Seen) -> Iterator[HandLine]:
 
 def _fallbacks(observer: Seen, now: float) -> Iterator[Message]:
     for process, one in observer.fallbacks(now):
-        words, about = one.words[:_LONGEST_WORDS], one.about[:_LONGEST_WORDS]
-        yield "/fallbacks/fallback", one.name, process, one.times, int(one.active), words, about
+        message, about = one.message[:_LONGEST_TEXT], one.about[:_LONGEST_TEXT]
+        yield "/fallbacks/fallback", one.name, process, one.times, int(one.active), message, about
 
 
 def _made(status: Status, observer: Seen) -> Iterator[Message]:

@@ -141,13 +141,14 @@ class Sharing:
                     "base": one.motion.base,
                     "made": one.motion.made.recipe if one.motion.made else "",
                     "position_s": one.motion.position_s,
+                    "excerpt_s": one.motion.excerpt_s,
                     "is_led": one is parts.led,
                     "let_go": [held.joint for held in one.hands.puppeteers if not held.enabled],
                 }
                 for name, one in zip(parts.names, parts.puppets, strict=True)
             ],
             "cue": reconciler.cue,
-            "applied": [reconciler.generation, reconciler.words],
+            "applied": [reconciler.generation, reconciler.message],
             "looked_at": now,
             "sensors": sensors,
             "temperature_c": self._thermometer.celsius(),

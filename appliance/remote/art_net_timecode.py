@@ -1,0 +1,57 @@
+"""Art-Net timecode: 19 bytes with the operation code 0x9700 (Art-Net 4, 'ArtTimeCode packet definition')."""
+
+from __future__ import annotations
+
+import errno
+import socket
+import struct
+
+from appliance.remote.timecode import RATES, Timecode
+from appliance.sensor.transports.udp import bind_early
+
+PORT = 6454
+_PACKET = struct.Struct("<8sH8s")  # identifier, operation code, the bytes below
+_ID, _OP_TIMECODE = b"Art-Net\0", 0x9700
+_VERSION = 14
+LENGTH = 19
+
+
+def packed(label: Timecode) -> bytes:
+    """A packet with this label."""
+    return struct.pack(
+        "<8sHBB7B",
+        *(_ID, _OP_TIMECODE, 0, _VERSION, 0, 0),
+        *(label.frames, label.seconds, label.minutes, label.hours, RATES.index(label.rate)),
+    )
+
+
+def label_in(packet: bytes) -> Timecode | None:
+    """The label of a packet; None: it is another one. Raises ValueError for a label that does not exist."""
+    if len(packet) < LENGTH or packet[:10] != _ID + struct.pack("<H", _OP_TIMECODE):
+        return None
+    frames, seconds, minutes, hours, kind = packet[14:LENGTH]
+    if kind >= len(RATES):
+        raise ValueError(f"Art-Net timecode has no type {kind}.")
+    return Timecode(hours, minutes, seconds, frames, RATES[kind])
+
+
+def open_port(host: str, port: int = PORT) -> socket.socket:
+    """The port, shared with this box's own Art-Net wires, which send from it. Raises OSError.
+
+    Those are connected to their nodes, so that whatever comes from other machines comes here.
+    """
+    one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        try:
+            bind_early(one, (host, port))
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
+            # Another user's program has it: with this option both hear broadcasts, which most desks send.
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            bind_early(one, (host, port))
+    except OSError:
+        one.close()
+        raise
+    return one

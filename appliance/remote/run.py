@@ -1,0 +1,380 @@
+"""The process for timecode and MIDI: hears both, and gives show control commands as any desk does."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from appliance.box.fallback import Fallbacks
+from appliance.box.log_writer import LogWriter
+from appliance.box.notify import Notifier
+from appliance.box.process_health import ProcessHealthWriter
+from appliance.box.runtime_folder import Claim, runtime_folder
+from appliance.box.show_state import ShowStateReader
+from appliance.box.stop_signals import stop_signals
+from appliance.levers.addresses import ADDRESSES
+from appliance.levers.show_state import ShowState
+from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
+from appliance.outputs.frame_reader import FrameReader
+from appliance.remote import art_net_timecode
+from appliance.remote.chase import CueChase, DanceChase, timed_cues
+from appliance.remote.code_clock import CodeClock
+from appliance.remote.fallback import MIDI_AWAY, OF_THE_REMOTE, TIMECODE_AWAY, TIMECODE_UNHEARD
+from appliance.remote.linear_timecode import LtcInput
+from appliance.remote.midi_timecode import MidiTimecode
+from appliance.remote.network_midi import NetworkMidi
+from appliance.remote.raw_midi import RawMidi
+from appliance.remote.show_control_messages import command_of
+from appliance.remote.timecode import BY_NAME, at
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.remote import MidiConfig, TimecodeConfig
+from appliance.show_control.midi_bindings import MidiBindings, Moved, moved
+from appliance.show_control.packet import Message, datagram
+from appliance.show_control.port import Port
+
+_TURN_S = 0.01  # how often due cues and sound are looked at; MIDI and datagrams wake the process at once
+_AT_ONCE = 64
+_RETRY_S = 2.0
+_LOOK_S = 0.1  # at what the stage says about itself
+_OWN_CONTROL_S = 0.5  # a fader that was just moved is not moved against the hand
+_NETWORK_NAME = "Bunraku"
+
+
+class Follower:
+    """What follows the code: cues and, where it is asked for, the phrase."""
+
+    def __init__(self, config: TimecodeConfig, give: Callable[[Message], None]) -> None:
+        self._config, self._give = config, give
+        self.clock = CodeClock(config.freewheel_s)
+        self._cues, self._dance = CueChase(), DanceChase(config.tolerance_s)
+        self._was_running = False
+
+    @property
+    def error_s(self) -> float:
+        """How far the phrase is behind."""
+        return self._dance.error_s
+
+    def time_s(self, now: float) -> float | None:
+        """Seconds of the code with the offset; None: there is none."""
+        time_s = self.clock.time_s(now)
+        return None if time_s is None else time_s + self._config.offset_s
+
+    def turn(
+        self, cues: tuple[Mapping[str, Any], ...], health: Mapping[str, Any], is_asleep: bool, now: float
+    ) -> None:
+        """Give what is due. cues: the show's; is_asleep: nothing is danced: stopped, or no stage."""
+        time_s = self.time_s(now)
+        if is_asleep:
+            return
+        if (due := self._cues.due(time_s, timed_cues(cues, self.clock.rate))) is not None:
+            self._give(("/cue", due))
+        if self._config.chase != "dance":
+            return
+        stands = self.clock.state(now) == "standing"
+        looked_at = float(health.get("looked_at", now))
+        speed = 0.0 if stands else self.clock.speed
+        time_at = None
+        if time_s is not None:
+            time_at = time_s - self._cues.start(time_s) - speed * (now - looked_at)
+        for message in self._dance.follow(health, time_at, self.clock.speed, stands, now):
+            self._give(message)
+
+    def begun(self, time_s: float) -> float:
+        """Where in the code the cue in force began."""
+        return self._cues.start(time_s)
+
+
+class Senders:
+    """Receivers of this box's own timecode: the chased one, else the place in the phrase."""
+
+    def __init__(self, config: TimecodeConfig) -> None:
+        self._receivers = [
+            (
+                BY_NAME[one.rate],
+                DatagramSender(f"timecode {one.host}", DatagramPath(one.host, one.port, None, one.broadcast)),
+            )
+            for one in config.send
+        ]
+        self._sent = [-1] * len(self._receivers)
+
+    def turn(self, time_s: float | None, now: float) -> None:
+        """Send each label once, as its frame begins."""
+        if time_s is None:
+            return
+        for place, (rate, sender) in enumerate(self._receivers):
+            label = at(time_s, rate)
+            if label.count != self._sent[place]:
+                self._sent[place] = label.count
+                sender.send_datagrams((art_net_timecode.packed(label),), now)
+
+    def close(self) -> None:
+        """Send no more."""
+        for _, sender in self._receivers:
+            sender.close()
+
+
+class Midi:
+    """All of MIDI: cables and network in, bindings, show control and timecode out of it."""
+
+    def __init__(
+        self, config: MidiConfig, bindings: MidiBindings, give: Callable[[Message], None], name: str
+    ) -> None:
+        self._config, self._bindings, self._give = config, bindings, give
+        self._raw = None if config.devices is None else RawMidi(config.devices)
+        self._name = name
+        self._network: NetworkMidi | None = None
+        self._retry_at = 0.0
+        self.trouble = ""
+        self.newest: Moved | None = None
+        self._moved_at: dict[tuple[str, str, int, int], float] = {}
+        self._shown: dict[tuple[str, str, int, int], int] = {}
+
+    @property
+    def devices(self) -> tuple[str, ...]:
+        """Names of what is connected."""
+        raw = () if self._raw is None else self._raw.names
+        return (*raw, *(() if self._network is None else self._network.names))
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Devices of the box file that are not there."""
+        return () if self._raw is None else self._raw.missing
+
+    def descriptors(self) -> list[int]:
+        """To poll."""
+        raw = [] if self._raw is None else self._raw.descriptors()
+        return [*raw, *([] if self._network is None else self._network.descriptors())]
+
+    def look(self, now: float) -> None:
+        """Open what has come."""
+        if self._raw is not None:
+            self._raw.look(now)
+        session = self._config.network
+        if session is not None and self._network is None and now >= self._retry_at:
+            self._retry_at = now + _RETRY_S
+            try:
+                self._network = NetworkMidi(session.host, session.port, self._name, session.senders)
+                self.trouble = ""
+            except OSError as error:
+                self.trouble = (
+                    f"MIDI by network cannot be heard ({error.strerror}): its ports are taken. What is in "
+                    "force stays in force. Give another `port` under midi: network: in the box file."
+                )
+
+    def turn(self, cues: tuple[str, ...], now: float) -> Iterator[bytes]:
+        """Carry out what has come; gives each message on, for the timecode in it."""
+        heard = [] if self._raw is None else list(self._raw.messages())
+        heard += [] if self._network is None else list(self._network.messages(now))
+        for device, message in heard:
+            yield message
+            if (what := moved(device, message)) is not None:
+                self.newest, self._moved_at[what.control] = what, now
+                commands = list(self._bindings.commands(what))
+                for one in commands:
+                    self._give(one)
+                if what.kind == "program" and not commands and self._config.program_change:
+                    self._program(what.number, cues)
+            elif message[0] == 0xF0 and (command := self._show_control(message, cues)) is not None:
+                self._give(command)
+
+    def show(self, state: ShowState, now: float) -> None:
+        """Move motor faders, and light rings, to where the levers are."""
+        for one in self._bindings.all:
+            lever = ADDRESSES[one.address].lever
+            if lever is None or one.kind != "controller" or one.low is None or one.high is None:
+                continue
+            if one.name or one.low == one.high or now - self._moved_at.get(one.control, 0.0) < _OWN_CONTROL_S:
+                continue
+            number = lever.kind.told(state[lever].value)[1]
+            if not number:
+                continue
+            share = (number[0] - one.low) / (one.high - one.low)
+            value = round(127 * min(max(share, 0.0), 1.0))
+            if self._shown.get(one.control) != value:
+                self._shown[one.control] = value
+                message = bytes([0xB0 | one.channel - 1, one.number, value])
+                if self._raw is not None:
+                    self._raw.send(one.device, message)
+                if self._network is not None:
+                    self._network.send(one.device, message, now)
+
+    def close(self) -> None:
+        """Let go of all devices and ports."""
+        if self._raw is not None:
+            self._raw.close()
+        if self._network is not None:
+            self._network.close()
+
+    def _show_control(self, message: bytes, cues: tuple[str, ...]) -> Message | None:
+        device = self._config.show_control_device
+        return None if device is None else command_of(message, device, cues)
+
+    def _program(self, number: int, cues: tuple[str, ...]) -> None:
+        if number < len(cues):
+            self._give(("/cue", cues[number]))
+
+
+class Remote:
+    """Timecode and MIDI of one box file. Raises OSError where the runtime folder takes no file."""
+
+    def __init__(
+        self, box: BoxConfig, folder: Path, say: Callable[[str], None], fallbacks: Fallbacks
+    ) -> None:
+        control = box.control
+        assert control is not None  # the box file was checked
+        self._box, self._say, self._fallbacks = box, say, fallbacks
+        self._to = ("127.0.0.1" if control.host == "0.0.0.0" else control.host, control.port)
+        self._desk = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._desk.setblocking(False)
+        self._stage, self._state = FrameReader(folder), ShowStateReader(folder)
+        timecode = box.timecode or TimecodeConfig()
+        self._timecode = timecode
+        self.follower = Follower(timecode, self._give)
+        self._senders = Senders(timecode)
+        self._midi_code = MidiTimecode()
+        self._ltc = LtcInput(timecode.device) if timecode.source == "ltc" else None
+        self._port: Port | None = None
+        self._retry_at = 0.0
+        bindings = MidiBindings(box.state_folder or folder)
+        self.midi = None if box.midi is None else Midi(box.midi, bindings, self._give, _NETWORK_NAME)
+        self.trouble = ""
+        self._said = ""
+        self._was_heard = False
+        self._health: dict[str, Any] = {}
+        self._look_at = 0.0
+
+    def descriptors(self) -> list[int]:
+        """To poll."""
+        midi = [] if self.midi is None else self.midi.descriptors()
+        return [*midi, *([] if self._port is None else [self._port.fileno()])]
+
+    def turn(self, now: float) -> None:
+        """Hear what has come, and give what is due; monotonic seconds."""
+        self._open(now)
+        facts = self._stage.facts
+        cues = () if facts is None else facts.cues
+        names = tuple(str(cue["name"]) for cue in cues)
+        if self.midi is not None:
+            self.midi.look(now)
+            for message in self.midi.turn(names, now):
+                if self._timecode.source == "mtc" and (heard := self._midi_code.hear(message)) is not None:
+                    self.follower.clock.hear(heard.label, now, heard.ahead_frames)
+        self._hear_art_net(now)
+        if self._ltc is not None:
+            for heard, ended in self._ltc.labels(now):
+                self.follower.clock.hear(heard.label, ended, heard.ahead_frames)
+        if now >= self._look_at:
+            self._look_at = now + _LOOK_S
+            self._stage.newest(now)
+            self._health = self._stage.health() or {}
+        state, is_alive, health = self._state.read(), self._stage.is_alive(now), self._health
+        self.follower.turn(cues, health, not state.going or not is_alive, now)
+        if self.midi is not None:
+            self.midi.show(state, now)
+        self._senders.turn(self._own_time_s(health, is_alive, now), now)
+
+    def report(self, now: float) -> dict[str, Any]:
+        """What the page and the status tell, and what stands in the way."""
+        clock = self.follower.clock
+        label = self.follower.time_s(now)
+        state = clock.state(now) if self._timecode.source else ""
+        self._was_heard = self._was_heard or state not in ("absent", "locking", "")
+        self.trouble = self._ltc.trouble if self._ltc is not None else self.trouble
+        self._fallbacks.set(TIMECODE_AWAY.name, self._was_heard and state == "absent")
+        self._fallbacks.set(TIMECODE_UNHEARD.name, self.trouble or (self.midi.trouble if self.midi else ""))
+        missing = () if self.midi is None else self.midi.missing
+        self._fallbacks.set(MIDI_AWAY.name, bool(missing))
+        self._fallbacks.concern(MIDI_AWAY.name, missing)
+        if self.trouble != self._said:
+            self._said = self.trouble
+            self._say(self.trouble or "Timecode can be heard again.")
+        newest = None if self.midi is None else self.midi.newest
+        return {
+            "timecode": "" if label is None else str(at(label, clock.rate)),
+            "state": state,
+            "rate": clock.rate.name,
+            "error_s": round(self.follower.error_s, 3),
+            "midi": [] if self.midi is None else list(self.midi.devices),
+            "moved": None if newest is None else newest._asdict(),
+        }
+
+    def close(self) -> None:
+        """Let go of everything."""
+        for one in (self._port, self._ltc, self.midi, self._senders, self._stage, self._state, self._desk):
+            if one is not None:
+                one.close()
+
+    def _open(self, now: float) -> None:
+        timecode = self._timecode
+        if timecode.source != "art-net" or self._port is not None or now < self._retry_at:
+            return
+        self._retry_at = now + _RETRY_S
+        try:
+            opened = art_net_timecode.open_port(timecode.host, timecode.port)
+        except OSError as error:
+            self.trouble = (
+                f"UDP port {timecode.port} on {timecode.host} cannot be opened for timecode "
+                f"({error.strerror}). Cues wait for a GO by hand. Stop the program that has it, or give "
+                "another `port` under timecode in the box file."
+            )
+            return
+        self._port, self.trouble = Port(opened, timecode.senders), ""
+
+    def _hear_art_net(self, now: float) -> None:
+        for _ in range(_AT_ONCE):
+            found = None if self._port is None else self._port.take()
+            if found is None:
+                return
+            with contextlib.suppress(ValueError):
+                if (label := art_net_timecode.label_in(found[0])) is not None:
+                    self.follower.clock.hear(label, now)
+
+    def _own_time_s(self, health: Mapping[str, Any], is_alive: bool, now: float) -> float | None:
+        """Seconds of the code that is sent: the one that is chased, else where the phrase is."""
+        if (time_s := self.follower.time_s(now)) is not None:
+            return time_s
+        led = next((one for one in health.get("puppets", ()) if one.get("is_led")), None)
+        if led is None or not is_alive:
+            return None
+        stands = health.get("state") == "stopped"
+        since = 0.0 if stands else now - float(health.get("looked_at", now))
+        return max(float(led["position_s"]) + since, 0.0)
+
+    def _give(self, message: Message) -> None:
+        with contextlib.suppress(OSError):
+            self._desk.sendto(datagram(message), self._to)
+
+
+def run_remote(box_file: Path | None) -> None:
+    """Hear timecode and MIDI until a signal comes. Raises ConfigError, RuntimeFolderError."""
+    box = load_box(box_file)
+    with stop_signals() as stopped, ExitStack() as opened:
+        speaker = LogWriter()
+        opened.callback(speaker.close)
+        folder = runtime_folder(box)
+        opened.callback(Claim(folder, "remote").close)
+        notifier, fallbacks = Notifier(), Fallbacks(OF_THE_REMOTE)
+        opened.callback(notifier.close)
+        process_health = ProcessHealthWriter(folder, "remote", fallbacks)
+        opened.callback(process_health.close)
+        remote = Remote(box, folder, speaker.say, fallbacks)
+        opened.callback(remote.close)
+        notifier.ready("Timecode and MIDI are heard.")
+        report_at = 0.0
+        while not stopped():
+            with contextlib.suppress(OSError, ValueError):  # a device that was unplugged meanwhile
+                select.select(remote.descriptors(), (), (), _TURN_S)
+            now = time.monotonic()
+            remote.turn(now)
+            notifier.ping(now)
+            if now >= report_at:
+                report_at = now + _LOOK_S
+                process_health.reported = remote.report(now)
+            process_health.publish_health(now)
+        process_health.end(time.monotonic())
