@@ -46,6 +46,10 @@ class TickClock:
         """Call it before the first wait, when all is ready: the grid begins in this many seconds."""
         self._slot.deadline = self.now() + in_s - self.period_s
 
+    def go_on(self, tick: int, deadline: float) -> None:
+        """Go on after this slot of another box, whose deadline is in this clock's seconds."""
+        self._slot.tick, self._slot.deadline = tick, deadline
+
     def wait(
         self, shift_s: float = 0.0, lead_s: float = 0.0, warm_up: Callable[[], object] | None = None
     ) -> Slot:

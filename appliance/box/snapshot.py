@@ -2,6 +2,7 @@
 
 A class names them in SNAPSHOT, after those of its base class. A field is a number, text, None, an array,
 an object with a snapshot, or a list, tuple or dictionary of these. Arrays and objects are restored in place.
+TIMES names those of the fields that are monotonic seconds.
 Where fields do not say enough, a class has `state`, which gives the rest as plain values, and `restore`,
 which takes it after the fields. `settle` works out what follows from all of that.
 """
@@ -23,13 +24,35 @@ _PLAIN = frozenset((int, float, str, bool, type(None)))
 def packed(one: Any) -> bytes:
     """The state of an object. Raises TypeError for a field that has none."""
     arrays: list[bytes] = []
-    words = json.dumps(_plain(one, arrays)).encode()
-    return b"".join((_HEAD.pack(len(words)), words, *arrays))
+    encoded = json.dumps(_plain(one, arrays)).encode()
+    return b"".join((_HEAD.pack(len(encoded)), encoded, *arrays))
 
 
 def restore(one: Any, data: bytes) -> None:
     """Let an object go on as the one did whose state this is. Raises what DAMAGED lists for invalid bytes."""
     _restored(one, unpacked(data))
+
+
+def shift_times(one: Any, seconds: float) -> None:
+    """Let an object go on by another clock, which is so much ahead."""
+    kind: Any = type(one)
+    for base in kind.__mro__:
+        for name in vars(base).get("TIMES", ()):
+            if (time := getattr(one, name)) is not None:
+                setattr(one, name, time + seconds)
+    for name in _fields(kind):
+        _shift_field(one, name, seconds)
+
+
+def _shift_field(one: Any, name: str, seconds: float) -> None:
+    field = getattr(one, name)
+    if hasattr(field, "shifted"):
+        setattr(one, name, field.shifted(seconds))
+        return
+    parts = field.values() if type(field) is dict else field if type(field) in (list, tuple) else (field,)
+    for part in parts:
+        if _has_state(type(part)):
+            shift_times(part, seconds)
 
 
 def _plain(value: Any, arrays: list[bytes]) -> Any:

@@ -12,7 +12,7 @@ FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 1.0
 WELL_AFTER_S = 2.0  # longer than the pause between two keep-alives: a refusal comes back with the next one
 PASSING = (errno.EAGAIN, errno.ENOBUFS)  # a full buffer: the next datagram may go through
-_IN_WORDS = {
+_MEANINGS = {
     errno.ECONNREFUSED: "no program listens on that port",
     errno.ENETUNREACH: "no network leads there",
     errno.EHOSTUNREACH: "that machine does not answer",
@@ -25,9 +25,9 @@ _IN_WORDS = {
 }
 
 
-def in_words(error: OSError) -> str:
+def meaning_of(error: OSError) -> str:
     """Why a datagram did not leave, as a clause."""
-    return _IN_WORDS.get(error.errno or 0, str(error.strerror))
+    return _MEANINGS.get(error.errno or 0, str(error.strerror))
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,7 @@ class DatagramSender:
         self.dropped = 0  # datagrams that were not
         self.last_error = ""  # why the last one was dropped; stays when all is well again
         self.is_open = False  # whether the newest datagram left
+        self.is_muted = False  # a box that follows another one encodes, and sends nothing
         self.is_gone = False  # whether some of the last second did not; the stage's watch sets it
         self._path = path
         self._socket: socket.socket | None = None
@@ -112,6 +113,8 @@ class DatagramSender:
 
         `now`: monotonic seconds.
         """
+        if self.is_muted:
+            return
         left = 0
         if now >= self._retry_at:
             try:
@@ -137,7 +140,7 @@ class DatagramSender:
         self.is_open = False
 
     def _note_failure(self, error: OSError, now: float) -> None:
-        self.last_error = in_words(error)
+        self.last_error = meaning_of(error)
         if error.errno in PASSING:
             return
         DatagramSender.close(self)

@@ -40,6 +40,7 @@ class JointFrame:
     """The poses of all puppets at one tick, in the show's order. One that was read has read-only arrays."""
 
     SNAPSHOT = ("sensor_sequence", "sensor_arrival")
+    TIMES = ("sensor_arrival",)
 
     puppets: tuple[PuppetFrame, ...]
     tick: int = 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from appliance.outputs.datagram_sender import DatagramSender
@@ -23,6 +23,12 @@ class Outputs:
         self._posistagenet = tuple(PosiStageNet(one, skeleton, puppets) for one in config.posistagenet)
         self.receivers: tuple[DatagramSender, ...] = (*self._osc.receivers, *self._posistagenet)
         self._shared: FrameWriter | None = None
+        self.may_speak: Callable[[], bool] | None = None  # asked before each frame, on a box with a pair
+
+    def mute(self, is_muted: bool) -> None:
+        """Whether receivers get nothing; the shared frame is written nonetheless."""
+        for one in self.receivers:
+            one.is_muted = is_muted
 
     def share(self, shared: FrameWriter) -> None:
         """Write frames to `shared` too, until `close`."""
@@ -30,11 +36,18 @@ class Outputs:
 
     def publish_frame(self, frame: JointFrame) -> None:
         """Send a frame to every receiver and share it. Never waits, never raises."""
+        if self.may_speak is not None:
+            self.mute(not self.may_speak())
         self._osc.send_frame(frame)
         for output in self._posistagenet:
             output.send_frame(frame)
         if self._shared is not None:
             self._shared.write(frame)
+
+    def shift_shared(self, seconds: float) -> None:
+        """Frames have times of a clock that is so much behind this machine's."""
+        if self._shared is not None:
+            self._shared.shift_s = seconds
 
     def publish_health(self, health: Mapping[str, Any]) -> None:
         """Share how the box is; once a second, after the frame has left."""

@@ -63,6 +63,7 @@ class HeadingDrift:
         *("corrected", "_drift", "_rate", "_off", "_spread", "_looked_at", "_updated_at", "_corrected_at"),
         *("_stood", "_window", "_samples", "_surprise", "_means", "_lies_since", "_lies_as"),
     )
+    TIMES = ("_looked_at", "_updated_at", "_corrected_at", "_lies_since")
 
     def __init__(self, habit: HeadingHabit | None = None, at_neutral: Sequence[float] = (1.0, 0.0, 0.0, 0.0)):
         """habit: of the joint that the sensor holds; None: unknown. at_neutral: as in `neutral.Mounting`."""

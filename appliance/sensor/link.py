@@ -141,6 +141,22 @@ class SensorLink:
                     {route[1] for route in routes if route is not None and route[0] is intake}
                 )
 
+    def heard_at(self, now: float) -> dict[str, tuple[int, str, int]]:
+        """Of each linked wearable in the network: its power-on, and its address and port."""
+        found = {}
+        for name, known in self._by_name.items():
+            session, route = known.pairing.session, known.pairing.route(now)
+            if session is not None and route is not None and len(route[1]) == 2 and name not in self._foreign:
+                found[name] = session.boot_nonce, str(route[1][0]), int(route[1][1])
+        return found
+
+    def call(self, sensor: str, boot_nonce: int, address: tuple[str, int]) -> None:
+        """Ask a wearable that another box has heard there to greet this one."""
+        known = self._by_name.get(sensor)
+        intake = next((one for one in self.intakes if isinstance(one, UdpIntake)), None)
+        if known is not None and intake is not None:
+            known.pairing.queue_call(boot_nonce, (intake, address))
+
     def states(self, now: float) -> list[SensorState]:
         """The state of each sensor of the key file, in its order."""
         return [sensor.state(now) for sensor in self._by_name.values()]

@@ -63,6 +63,7 @@ class Stillness:
     """Whether a sensor stays within 3 degrees of where it was; time is an argument, in seconds."""
 
     SNAPSHOT = ("_anchor", "_since", "_heard")
+    TIMES = ("_since", "_heard")
 
     def __init__(self) -> None:
         self._anchor: Quaternion = (

@@ -29,6 +29,10 @@ class SensorReading(NamedTuple):
     round_trip_s: float | None = None  # by the newest heartbeat's echo
     wearable: int = 0  # SensorKey.wearable; changes when another wearable gets the name
 
+    def shifted(self, seconds: float) -> SensorReading:
+        """The same on a clock that is so much ahead."""
+        return self._replace(measured_at=self.measured_at + seconds, arrival=self.arrival + seconds)
+
 
 def restored_reading(fields: Sequence[Any] | None) -> SensorReading | None:
     """A reading from its fields in order, as a file holds them; None stays None."""

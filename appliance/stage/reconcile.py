@@ -26,7 +26,7 @@ class Reconciler:
     """Compares the show state with what the dance does: once a tick, at the price of a small read.
 
     generation: of the show state that the dance follows. cue: the newest. rate: of playback while the show
-    goes. words: what there was to say about the newest change. source: what the show starts from while
+    goes. message: what there was to say about the newest change. source: what the show starts from while
     nothing is declared; wanted: what is to take the phrase's place now, "" for none. motion: names and values
     of what was declared for the generator, also before a power cut.
     """
@@ -43,7 +43,7 @@ class Reconciler:
         from that.
         """
         self.parts = parts
-        self.generation, self.cue, self.words = 0, "", ""
+        self.generation, self.cue, self.message = 0, "", ""
         self.rate = self._usual_rate = parts.led.motion.rate
         self._show, self._reader = show, reader
         self._is_first = parts.led.springs is not None or parts.continuing is not None
@@ -101,6 +101,17 @@ class Reconciler:
             orders.append(Order("rate", (rate,)))
         return orders
 
+    @property
+    def declared(self) -> ShowState:
+        """The newest show state, the same object until it changes."""
+        return self._reader.read()
+
+    def go_on_after(self, generation: int, now: float) -> None:
+        """Another box has led the same dance, and had followed this generation of the same show state."""
+        self.generation, self._is_first = 0, False
+        self.pending(now)  # cue, rate and source as declared; its orders were carried out there
+        self.generation = generation
+
     def _see(self, show_state: ShowState) -> None:
         """Another show state: what each tick asks of it."""
         self._seen, self._going = show_state, show_state.going
@@ -127,14 +138,14 @@ class Reconciler:
 
     def begin(self, now: float) -> str:
         """Before the first tick: begin with what is declared, without fades; a sentence about it, or ""."""
-        words: list[str] = []
+        messages: list[str] = []
         for order in self.pending(now):
             if order.name == "phrase" and order.text in self.parts.led.motion.phrases:
                 self.parts.led.motion.start_with(order.text)
                 continue
-            words.append(obey(without_fade(order), self.parts)[1])
+            messages.append(obey(without_fade(order), self.parts)[1])
         cue = f"The show goes on in the cue '{self.cue}'." if self.cue else ""
-        return " ".join(filter(None, (cue, *words)))
+        return " ".join(filter(None, (cue, *messages)))
 
 
 def order_of(lever: Lever[Any], fade: Fade[Any]) -> Order:

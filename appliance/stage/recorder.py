@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,13 +48,14 @@ class Recorder:
         keyframe_bytes *= len(facts["puppets"])
         shapes = [(1, len(said)), (LOG_SLOTS, entry_bytes), (KEYFRAME_SLOTS, keyframe_bytes)]
         self.lost = 0
+        self.tap: Callable[[int, bytes], None] | None = None  # gets what is noted: kind, and record or JSON
         self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
         self._file.rings[FACTS].write(said)
         self._log = self._file.rings[LOG]
         row = np.frombuffer(self._log.payload, layout, 1, ENTRY.size)
         self._field: dict[str, np.ndarray[Any, Any]] = {name: row[name] for name in layout.names or ()}
         self._sensors = {name: place for place, name in enumerate(facts["sensors"])}
-        self._entries = 0
+        self._entries, self._ends = 0, ENTRY.size + layout.itemsize
         self._ticks = 0
         self._file.publish()
 
@@ -94,6 +95,8 @@ class Recorder:
                 row += 1
         self._note_readings(tick)
         self._note_live(tick.live_heard)
+        if self.tap is not None:
+            self.tap(TICK, bytes(self._log.payload[ENTRY.size : self._ends]))
         self._log.publish()
         self._entries += 1
         self._ticks += 1
@@ -104,7 +107,10 @@ class Recorder:
         `now`: seconds on the monotonic clock.
         """
         try:
-            for entry in _entries_of(_within({"kind": kind, "now": now} | facts)):
+            said = _within({"kind": kind, "now": now} | facts)
+            if self.tap is not None:
+                self.tap(EVENT, said)
+            for entry in _entries_of(said):
                 self._log.write(entry)
                 self._entries += 1
         except (TypeError, ValueError):

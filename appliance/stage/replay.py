@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-from appliance.box.clock import Slot
-from appliance.box.live_pose import LivePose, LivePoseReader
-from appliance.box.orders import Order
 from appliance.box.snapshot import restore
-from appliance.dancer.puppet import PuppetNetwork
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import Run
 from appliance.recorder.record import DAMAGED, ORDER, hands_of, puppets_of
-from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show
-from appliance.stage.carry_out import carry_out
 from appliance.stage.comparison import Comparison
 from appliance.stage.made_again import maker_of
+from appliance.stage.rerun import RecordedNetwork, Rerun
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import assemble
@@ -42,7 +36,7 @@ class Replay:
     def __init__(self, run: Run, show: Show) -> None:
         self.skipped = 0
         self._run = run
-        parts = assemble(show, _NO_PORTS, network_of=_RecordedNetwork)
+        parts = assemble(show, _NO_PORTS, network_of=RecordedNetwork)
         hands = [[hand["puppet"], hand["joint"]] for hand in run.header["hands"]]
         held = [[number, hand.joint] for number, hand in hands_of(show)]
         if parts.skeleton.names != run.skeleton.names or hands != held or run.puppets != puppets_of(show):
@@ -50,13 +44,13 @@ class Replay:
                 f"{show.directory}: this show has other figures or other hands than the recorded one "
                 f"('{run.header['show']}'). Name its bundle: --show DIR."
             )
-        parts.link = self._link = _RecordedLink(run)
-        assert isinstance(parts.network, _RecordedNetwork)
+        assert isinstance(parts.network, RecordedNetwork)
         self._network = parts.network
-        parts.live_inbox = self._live = _RecordedLive(run)
         parts.make_by(maker_of(show, parts.led.motion))
-        self._wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
-        self.tick = Tick(parts, self._wearing, 0.0)
+        wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
+        self.tick = Tick(parts, wearing, 0.0)
+        self._rerun = Rerun(self.tick, wearing, run.header["sensors"])
+        parts.link, parts.live_inbox = self._rerun.heard, self._rerun.live
 
     @property
     def forced(self) -> int:
@@ -107,25 +101,13 @@ class Replay:
 
     def _dance_row(self, row: int, comparison: Comparison) -> None:
         recorded = self._run.ticks[row]
-        self._link.row = self._live.row = row
-        self._network.fails = recorded["failed"].tolist()
-        slot = Slot(
-            int(recorded["tick"]),
-            float(recorded["frame_time"]),
-            float(recorded["started"]),
-            int(recorded["skipped"]),
-        )
-        with _refused(f"Tick {slot.tick}, or the keyframe before it,"):
-            self.tick.run(slot)
-            self.tick.after(slot)
+        with _refused(f"Tick {int(recorded['tick'])}, or the keyframe before it,"):
+            self._rerun.dance(recorded)
             comparison.look(recorded, self.tick)
 
     def _obey(self, event: dict[str, Any], comparison: Comparison) -> None:
         with _refused("An order, or the keyframe before it,"):
-            asked, now, done_then = event["order"], float(event["now"]), bool(event["done"])
-            order = Order(asked["name"], tuple(map(float, asked["values"])), asked["text"])
-            self._link.answers(order.text, done_then)
-            done, _ = carry_out(order, self.tick.parts, self._wearing, now)
+            order, done_then, done = self._rerun.obey(event)
             comparison.note_order(order.name, done_then, done)
 
 
@@ -141,76 +123,5 @@ def _refused(what: str) -> Iterator[None]:
         ) from error
 
 
-class _RecordedNetwork(PuppetNetwork):
-    """The show's network; where it failed then, it fails here too.
-
-    fails: for each puppet, whether it failed then; forced: how often it did, and does not here.
-    """
-
-    fails: Sequence[int] = ()
-    forced = 0
-
-    def dance(self) -> None:
-        super().dance()
-        for puppet, fails in zip(self.puppets, self.fails, strict=True):
-            if fails and not puppet.is_broken:
-                self.forced += 1
-                puppet.is_broken = True
-
-
-class _RecordedLive(LivePoseReader):
-    """Gives the live pose of the row that is at hand."""
-
-    def __init__(self, run: Run) -> None:
-        self._ticks, self.row = run.ticks, 0
-
-    def read(self) -> LivePose | None:
-        recorded = self._ticks[self.row]
-        arrival = recorded["live_arrival"]
-        if not arrival.size or math.isnan(arrival[0]):
-            return None
-        x, y, z = recorded["live_root"][0].tolist()
-        return LivePose(float(arrival[0]), (x, y, z), recorded["live_pose"].tobytes())
-
-    def close(self) -> None:
-        pass
-
-
-class _RecordedLink(SensorLink):
-    """Gives the readings of the row that is at hand."""
-
-    def __init__(self, run: Run) -> None:
-        super().__init__({}, ())
-        self.row = 0
-        self._ticks, self._sensors = run.ticks, run.header["sensors"]
-        self._asked: tuple[set[str], bool] = set(), False
-
-    def answers(self, sensor: str | int, done: bool) -> None:
-        """Whether the sensors were there when a person asked for something."""
-        self._asked = {*self._sensors, str(sensor)} - {""}, done
-
-    def drain(self, now: float) -> Sequence[SensorReading]:
-        here = self._ticks["reading_here"][self.row]
-        return [self._reading(place, name) for place, name in enumerate(self._sensors) if here[place]]
-
-    def states(self, now: float) -> list[SensorState]:
-        names, are_here = self._asked
-        state = "linked" if are_here else "absent"
-        return [
-            SensorState(name, 0, state, "", 0.0, 0.0, None, None, 255, 0, "", "", 0, 0, "")
-            for name in sorted(names)
-        ]
-
-    def _reading(self, place: int, name: str) -> SensorReading:
-        w, x, y, z = self._ticks["reading_orientation"][self.row, place].tolist()
-        measured_at, arrival, trip_s = self._ticks["reading_times"][self.row, place].tolist()
-        numbers = self._ticks["reading_numbers"][self.row, place].tolist()
-        sequence, time_us, battery, calibration, boot_nonce, taps, recoveries, flags, wearable = numbers
-        return SensorReading(
-            *(name, (w, x, y, z), sequence, time_us, measured_at, arrival, battery, calibration),
-            *(boot_nonce, taps, recoveries, flags, None if trip_s != trip_s else trip_s, wearable),
-        )
-
-
-def _nobody(words: str) -> None:
+def _nobody(message: str) -> None:
     """A replay takes the messages of that night from the events."""

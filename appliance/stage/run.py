@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from appliance.box.clock import Slot, TickClock
 from appliance.box.live_pose import LivePoseReader
@@ -14,6 +16,7 @@ from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.runtime_folder import renew_lost
 from appliance.box.show_state import ShowStateReader
 from appliance.dancer.phrase_cache import MEMORY
+from appliance.pair.part import forget_part
 from appliance.recorder.record import ORDER, SAID, facts_of_run
 from appliance.sensor.battery_life import BatteryLives
 from appliance.show.box import BoxConfig
@@ -35,6 +38,11 @@ from appliance.stage.stage_error import StageError
 from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
+
+if TYPE_CHECKING:
+    from appliance.dancer.puppet import PuppetNetwork
+    from appliance.pose.skeleton import Skeleton
+    from appliance.stage.paired import PairedStage
 
 _ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5
@@ -73,7 +81,8 @@ class Stage:
             self.memory = SensorMemory(box.state_folder, say, self.sharing.noted)
             opened.callback(self.memory.close)
             self.parts: StageParts = assemble(
-                show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY
+                *(show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY),
+                *_network_of_a_pair(box),
             )
             opened.callback(self.parts.close)
             if self.parts.led.live is not None:
@@ -113,6 +122,7 @@ class Stage:
         keeps_rate = primary is not None and not link.is_foreign(primary)
         self.lock = PhaseLock(1 / link.rate_hz) if box.phase_lock and keeps_rate else None
         self.watch = Watch(self.parts, self.admission, self.made)
+        self.paired = self._open_pair()
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""
@@ -121,8 +131,8 @@ class Stage:
             self._tick_on(seconds, stopped)
             return
         missing = enter_realtime(self.box.realtime.priority)
-        for words in missing:
-            self.say(words)
+        for message in missing:
+            self.say(message)
         self.watch.note_missing_rights(missing)
         try:
             self._tick_on(seconds, stopped)
@@ -131,6 +141,8 @@ class Stage:
 
     def close(self) -> None:
         """Free every port, socket and file."""
+        if self.paired is not None:
+            self.paired.close()
         self._closing.close()
 
     def _tick_on(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
@@ -149,14 +161,20 @@ class Stage:
             self._say_and_note(f"The answer's noise has the seed {self.parts.liveliness.seed}.")
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
+            if self.paired is not None and not self._may_dance(clock):
+                continue
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self._now = slot.started
+            if self.paired is not None and not self.paired.may_dance(slot.started):
+                continue
             # only the first tick after a stop: a machine that is always slow is still reported
             self._comes_from_stop = slot.skipped >= _HUNG_SLOTS and not self._comes_from_stop
             self.tick.run(slot)
             self._note(slot)
             self._reconcile(slot.started)
             self._take_orders(slot.started, clock.now)
+            if self.paired is not None:
+                self.paired.flush(clock.now())
             if self.recorder is not None and self.recorder.wants_keyframe:
                 self.recorder.keyframe(self.tick)
             shift_s = self._follow_sensor(slot)
@@ -183,6 +201,52 @@ class Stage:
         self.resuming.write_checkpoint(self.reconciler, slot.tick)
         if self.recorder is not None:
             self.recorder.note_tick(slot, tick, late)
+        if self.paired is not None:
+            self.paired.publish(time.monotonic())
+
+    def _open_pair(self) -> PairedStage | None:
+        """The other box, where the box file names one. Raises ConfigError without its secret."""
+        if self.box.pair is None:
+            forget_part(self.sharing.folder)
+            return None
+        from appliance.stage.paired import PairedStage
+
+        if self.recorder is None:
+            return None  # what the other box would follow is what the recorder notes; it was said why not
+        paired = PairedStage(
+            *(self.box.pair, self.show, self.parts, self.wearing, self.tick, self.reconciler),
+            *(self.sharing.folder, self.say),
+        )
+        self.recorder.tap = paired.note
+        return paired
+
+    def _may_dance(self, clock: TickClock) -> bool:
+        """Whether this box leads; else it follows for a moment, with its outputs silent."""
+        paired = self.paired
+        assert paired is not None
+        if paired.leads:
+            return True
+        paired.follow(clock, self._note_followed)
+        now = self._now = clock.now()
+        if paired.leads:
+            self._say_and_note(f"This box leads the pair: {paired.told(now)['why']}.")
+            if self.recorder is not None:
+                self.recorder.keyframe(self.tick)
+            return False  # the reconciler and the orders come with the first tick
+        self.notifier.ready()
+        self.notifier.ping(now)
+        while (order := self.inbox.take()) is not None:
+            self.inbox.answer(order, False, paired.refused(order))
+        if self.health.is_due(now):
+            self.health.look(now)
+            self.say(self.health.line(*self.parts.led.iterations.asked, None, False) + "  follows")
+            self._publish_health(now)
+        return False
+
+    def _note_followed(self, now: float, cost_ms: float) -> None:
+        """A tick of the leader was run here."""
+        self.health.tick(cost_ms, self.box.limits.tick_budget_ms)
+        self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)
 
     def _follow_sensor(self, slot: Slot) -> float:
         """The phase lock's correction to the next period, seconds."""
@@ -199,8 +263,8 @@ class Stage:
         """Apply what show control has declared since the last time."""
         before, orders = self.reconciler.generation, self.reconciler.pending(now)
         if orders or self.reconciler.generation != before:
-            words = [self._carry_out(order, now)[1] for order in orders]
-            self.reconciler.words = " ".join(filter(None, words))
+            messages = [self._carry_out(order, now)[1] for order in orders]
+            self.reconciler.message = " ".join(filter(None, messages))
             self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
             self._publish_health(now)
 
@@ -226,20 +290,20 @@ class Stage:
             self.inbox.answer(*answer)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        done, words = carry_out(order, self.parts, self.wearing, now)
+        done, message = carry_out(order, self.parts, self.wearing, now)
         if self.recorder is not None:
             asked = {"name": order.name, "values": order.values, "text": order.text}
-            self.recorder.event(ORDER, now, order=asked, done=done, words=words)
-        if words:
-            self.say(words)
-        return done, words
+            self.recorder.event(ORDER, now, order=asked, done=done, message=message)
+        if message:
+            self.say(message)
+        return done, message
 
     def _resume(self, now: float) -> None:
         """After a crash or a power cut: go on where the show was, or else with what is declared."""
-        words = [self.resuming.complaint, self.resuming.go_on(self.reconciler, now)]
+        messages = [self.resuming.complaint, self.resuming.go_on(self.reconciler, now)]
         if not self.resuming.went_on:
-            words.append(self.reconciler.begin(now))
-        for sentence in filter(None, words):
+            messages.append(self.reconciler.begin(now))
+        for sentence in filter(None, messages):
             self.say(sentence)
 
     def _publish_health(self, now: float) -> None:
@@ -251,11 +315,11 @@ class Stage:
         fallbacks = self.watch.fallbacks.happened(now)
         self.sharing.publish_health(now, self.health, self.reconciler, age_s, locked, roster, fallbacks)
 
-    def _say_and_note(self, words: str) -> None:
+    def _say_and_note(self, message: str) -> None:
         """Say it on the terminal, and note that in the journal."""
-        self.say(words)
+        self.say(message)
         if self.recorder is not None:
-            self.recorder.event(SAID, self._now, words=words)
+            self.recorder.event(SAID, self._now, message=message)
 
     def _sensor_age_s(self, now: float) -> float | None:
         """None: the show has no sensor."""
@@ -295,6 +359,14 @@ class Stage:
                 "without one. Free memory there, or give another folder as `runtime:` in the box file."
             )
             return None
+
+
+def _network_of_a_pair(box: BoxConfig) -> Iterator[Callable[[Path, Skeleton, int], PuppetNetwork]]:
+    """One that can be told where the other box's failed."""
+    if box.pair is not None:
+        from appliance.stage.rerun import RecordedNetwork
+
+        yield RecordedNetwork
 
 
 def _open_inbox(folder: Path) -> OrderInbox:

@@ -52,6 +52,7 @@ class SensorBinding:
     """
 
     SNAPSHOT = ("hands", "drift", "stillness", "reading", "needs_still_s", "waits_until")
+    TIMES = ("waits_until",)
 
     name: str
     hands: list[WornHand]

@@ -1,0 +1,89 @@
+"""What a paired stage tells its box's other processes: whether they may speak; the leader's show state."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import NamedTuple
+
+from appliance.box.block import BlockReader, BlockWriter
+from appliance.levers.show_state import ShowState, packed, unpacked
+
+FILE, KIND = "pair", "pair"
+STATE_FILE = "pair_state"
+_PART = struct.Struct("<BBBId")  # leads, is ready, peer lives; epoch; when it was written
+_LARGEST_STATE = 16384
+STALE_S = 0.07  # a stage that wrote nothing for so long does not speak
+
+
+class BoxPart(NamedTuple):
+    """leads: this box's stage speaks. is_ready: it could take over. peer_lives: the other box was there when
+    this was written, in monotonic seconds.
+    """
+
+    leads: bool
+    is_ready: bool
+    peer_lives: bool
+    epoch: int
+    written: float
+
+    def may_speak(self, now: float) -> bool:
+        """Whether lights may send: the stage leads. One that died has handed over if the other box lives."""
+        return self.leads and (now - self.written < STALE_S or not self.peer_lives)
+
+
+class PartWriter:
+    """The stage's end. Raises OSError where the folder takes no file."""
+
+    def __init__(self, folder: Path) -> None:
+        self._part = BlockWriter(folder / FILE, KIND, _PART.size, fresh=True)
+        self._state = BlockWriter(folder / STATE_FILE, STATE_FILE, _LARGEST_STATE, fresh=True)
+
+    def write(self, part: BoxPart) -> None:
+        """Once a tick."""
+        self._part.write(_PART.pack(*part))
+
+    def write_state(self, state: ShowState) -> None:
+        """The leader's show state, in times of this machine."""
+        self._state.write(packed(state))
+
+    def close(self) -> None:
+        """Let go of the files."""
+        self._part.close()
+        self._state.close()
+
+
+class PartReader:
+    """The other processes' end; never waits, never raises. On a box without a pair it may always speak."""
+
+    def __init__(self, folder: Path) -> None:
+        self._part = BlockReader(folder / FILE, KIND)
+        self._state = BlockReader(folder / STATE_FILE, STATE_FILE)
+
+    def read(self) -> BoxPart | None:
+        """None: no stage of a pair has written here."""
+        if (found := self._part.read()) is None or len(found) != _PART.size:
+            return None
+        leads, is_ready, peer_lives, epoch, written = _PART.unpack(found)
+        return BoxPart(bool(leads), bool(is_ready), bool(peer_lives), epoch, written)
+
+    def state(self) -> ShowState | None:
+        """The leader's show state."""
+        found = self._state.read()
+        return None if found is None else unpacked(found)
+
+    def follows(self, now: float) -> bool:
+        """Whether this box follows another one at this moment."""
+        part = self.read()
+        return part is not None and not part.leads and now - part.written < 1.0
+
+    def close(self) -> None:
+        """Let go of the files."""
+        self._part.close()
+        self._state.close()
+
+
+def forget_part(folder: Path) -> None:
+    """A stage without a pair leaves none behind."""
+    for name in (FILE, STATE_FILE):
+        (folder / name).unlink(missing_ok=True)

@@ -1,0 +1,131 @@
+"""Which of two boxes leads: a state machine without clock, sockets or show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+FIRST_WAITS_S = 0.4  # at the start, for a box that leads already; the second leaves the first time to start
+SECOND_WAITS_S = 6.0
+UNREADY_WAITS_S = 2.0  # a follower that knows no dance yet gives the first's stage time to restart
+YIELDS_S = 0.15  # a leader that gave back and hears nobody leads again
+MOST_PATIENCE_S = 0.5
+PATIENCE_FOR_S = 600.0  # without another false takeover it is forgotten
+
+
+class Role(IntEnum):
+    """What a box does; all but LEADS are silent."""
+
+    WAITS = 0
+    FOLLOWS = 1
+    LEADS = 2
+    YIELDS = 3  # it has led until now, and asks the other one to lead
+
+
+class Heard(NamedTuple):
+    """What a datagram of the other box says of its part. is_ready: it could take over at any moment."""
+
+    role: Role
+    epoch: int
+    is_ready: bool
+
+
+@dataclass
+class Roles:
+    """The part of one box. Times are this machine's monotonic seconds.
+
+    epoch: a number that grows with each change of the leader: of two leaders the one with the lower epoch
+    is silent, and where both are equal the second box. patience_s: silence of the leader after which a
+    follower takes over. takeovers: since the start. why: of the newest change, in a word.
+    """
+
+    is_first: bool
+    now: float
+    silent_s: float
+    role: Role = Role.WAITS
+    epoch: int = 0
+    takeovers: int = 0
+    why: str = "start"
+
+    def __post_init__(self) -> None:
+        self.patience_s = self.silent_s
+        self._since = self.now
+        self._heard_leader = self._heard = float("-inf")
+        self._deposed_at = float("-inf")
+        self._peer: Heard | None = None
+
+    @property
+    def leads(self) -> bool:
+        """Whether this box may speak to receivers and sensors."""
+        return self.role is Role.LEADS
+
+    def peer_lives(self, now: float) -> bool:
+        """Whether the other box was heard within the last second."""
+        return now - self._heard < 1.0
+
+    @property
+    def peer(self) -> Heard | None:
+        """The newest that was heard of the other box."""
+        return self._peer
+
+    @property
+    def heard_leader(self) -> float:
+        """When the other box was heard leading."""
+        return self._heard_leader
+
+    def hear(self, heard: Heard, now: float, is_ready: bool) -> None:
+        """A datagram of the other box, authentic and new. is_ready: this box could take over."""
+        self._heard, self._peer = now, heard
+        if heard.role is Role.LEADS:
+            self._heard_leader = now
+            if self.role is not Role.LEADS:
+                if self.role is not Role.FOLLOWS:
+                    self._become(Role.FOLLOWS, now, "it leads")
+                self.epoch = max(self.epoch, heard.epoch)
+            elif (heard.epoch, not self.is_first) > (self.epoch, self.is_first):
+                self._lose_patience_less(now)
+                self._become(Role.FOLLOWS, now, "it took over")
+                self.epoch = heard.epoch
+        elif heard.role is Role.YIELDS:
+            self._heard_leader = now
+            self.epoch = max(self.epoch, heard.epoch) if self.role is not Role.LEADS else self.epoch
+            if self.role is Role.FOLLOWS and is_ready:
+                self._lead(now, "it gave back")
+        elif self.role is not Role.LEADS:
+            self.epoch = max(self.epoch, heard.epoch)
+
+    def look(self, now: float, is_ready: bool) -> None:
+        """What time alone brings; call it at least once a tick."""
+        if now - self._deposed_at > PATIENCE_FOR_S:
+            self.patience_s = self.silent_s
+        if self.role is Role.WAITS:
+            if now - self._since >= (FIRST_WAITS_S if self.is_first else SECOND_WAITS_S):
+                self._lead(now, "alone")
+        elif self.role is Role.FOLLOWS:
+            silent_s = now - max(self._heard_leader, self._since)
+            if silent_s > (self.patience_s if is_ready else max(UNREADY_WAITS_S, self.patience_s)):
+                self.takeovers += 1
+                self._lead(now, "it is silent")
+        elif self.role is Role.YIELDS and now - self._since > YIELDS_S:
+            self._lead(now, "nobody took it")
+
+    def give_back(self, now: float) -> bool:
+        """Ask the other box to lead, which could; whether it is asked."""
+        peer = self._peer
+        if not self.leads or not self.peer_lives(now) or peer is None or not peer.is_ready:
+            return False
+        self._become(Role.YIELDS, now, "given back")
+        return True
+
+    def _lead(self, now: float, why: str) -> None:
+        self.epoch += 1
+        self._become(Role.LEADS, now, why)
+
+    def _lose_patience_less(self, now: float) -> None:
+        """Deposed while alive: this box or the network halted for a moment, and may again."""
+        self.patience_s = min(2.0 * self.patience_s, MOST_PATIENCE_S)
+        self._deposed_at = now
+
+    def _become(self, role: Role, now: float, why: str) -> None:
+        self.role, self._since, self.why = role, now, why

@@ -1,0 +1,351 @@
+"""A stage that is one of two: what it tells the other box of each tick, and how it follows that one's."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from appliance.box.clock import TICK_S, TickClock
+from appliance.box.orders import Order
+from appliance.box.snapshot import packed, restore, shift_times
+from appliance.levers import show_state as states
+from appliance.levers.show_state import ShowState
+from appliance.pair.pair import Pair, PairSettings
+from appliance.pair.part import BoxPart, PartWriter
+from appliance.pair.roles import Role
+from appliance.recorder.record import DAMAGED, EVENT, ORDER, TICK, facts_of_run, layout_of
+from appliance.sensor.wire import KEY_BYTES
+from appliance.show.config_error import ConfigError, Problem
+from appliance.show.pair import PairConfig
+from appliance.show.show import Show
+from appliance.stage.comparison import Comparison
+from appliance.stage.reconcile import Reconciler
+from appliance.stage.rerun import RecordedNetwork, Rerun
+from appliance.stage.sensor_fit import SensorFit
+from appliance.stage.stage_parts import StageParts
+from appliance.stage.tick import Tick
+
+STATE, ROUTES = 16, 17  # kinds of items beside the journal's
+_ITEM = struct.Struct("<BI")
+_EACH_TICKS = 50  # show state and routes, also unchanged
+_AT_ONCE = 5  # ticks that a follower runs before it looks at the network again
+_MOST_BEHIND = 4  # messages, so some 80 ms: from there the dance goes on without a jump that is seen
+_FRESH_LOOK_S = 0.004
+_OTHERS = frozenset(("run", "pid", "show_directory", "python", "numpy", "onnxruntime"))
+TOLERANCE_DEGREES = 0.5  # between processors of two kinds; beyond it the leader's state is fetched again
+
+
+def settings_of(config: PairConfig) -> PairSettings:
+    """From the box file. Raises ConfigError where the secret is none."""
+    try:
+        key = bytes.fromhex(config.secret.read_text().strip())
+    except (OSError, ValueError):
+        key = b""
+    if len(key) != KEY_BYTES:
+        words = f"There is no pair's secret in {config.secret}."
+        cure = f"Make it: bunraku pair secret {config.secret}; and copy it to the other box."
+        raise ConfigError([Problem(Path(config.secret), 0, words, cure)])
+    name = "the second box" if config.role == "first" else "the first box"
+    where = config.host, config.port, tuple(config.peer)
+    return PairSettings(name, config.role == "first", *where, key, config.silent_ms / 1000.0)
+
+
+def fingerprint_of(show: Show, facts: dict[str, Any]) -> bytes:
+    """What two boxes need alike to dance alike: show file, network, phrases, the layout of a tick."""
+    digest = hashlib.blake2s(digest_size=8)
+    digest.update(json.dumps({name: facts[name] for name in sorted(facts.keys() - _OTHERS)}).encode())
+    for path in (show.file.path, show.network, *dict.fromkeys(show.phrases.values())):
+        digest.update(Path(path).read_bytes())
+    return digest.digest()
+
+
+class PairedStage:
+    """Joins the pair with the stage's parts. Nothing here waits but `follow`.
+
+    tick: the stage's; its parts hear the sensors while this box leads, and the other box otherwise.
+    differs: the worst difference of a frame from the leader's, degrees, since it was followed.
+    """
+
+    def __init__(
+        self,
+        config: PairConfig,
+        show: Show,
+        parts: StageParts,
+        wearing: SensorFit,
+        tick: Tick,
+        reconciler: Reconciler,
+        folder: Path,
+        say: Callable[[str], None],
+    ) -> None:
+        facts = facts_of_run(show, list(parts.worn))
+        self._layout = layout_of(facts)
+        self._settings = settings_of(config)
+        self.pair = Pair(self._settings, fingerprint_of(show, facts), time.monotonic())
+        self._parts, self._tick, self._wearing, self._reconciler = parts, tick, wearing, reconciler
+        self._say = say
+        self._rerun = Rerun(tick, wearing, facts["sensors"])
+        self._own_link, self._own_live = parts.link, parts.live_inbox
+        self._own_latest_start_s = tick.latest_start_s
+        self._own_most = [one.iterations.most for one in parts.puppets]
+        self._part = PartWriter(folder)
+        self._items: list[bytes] = []
+        self._sent_state: ShowState | None = None
+        self._state_due = 0
+        self._applied = 0
+        self._routes: dict[str, Any] = {}
+        self._has_danced = False  # some tick of the leader was followed
+        self._last = 0, 0.0  # tick, deadline of the newest one that was followed
+        self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
+        self._role = self.pair.roles.role
+        self._looked_at = self._beat_at = self._work_s = 0.0
+        self.resyncs = 0
+        parts.outputs.may_speak = self._may_speak
+        parts.outputs.mute(True)
+        self._hear_leader()
+
+    @property
+    def leads(self) -> bool:
+        """Whether this box speaks."""
+        return self.pair.leads
+
+    def note(self, kind: int, noted: bytes) -> None:
+        """The recorder's tap: what the other box needs of it."""
+        if self.pair.leads and (kind == TICK or (kind == EVENT and b'"kind": "order"' in noted[:64])):
+            self._items.append(_ITEM.pack(kind, len(noted)) + noted)
+
+    def publish(self, now: float) -> None:
+        """The leader, right after its frame left: the tick, and what happened before it."""
+        if not self.pair.leads:
+            self._items.clear()
+            return
+        self._state_due -= 1
+        state = self._reconciler.declared
+        if state is not self._sent_state or self._state_due <= 0:
+            self._sent_state, self._state_due = state, _EACH_TICKS
+            said = struct.pack("<q", self._reconciler.generation) + states.packed(state)
+            self._items.append(_ITEM.pack(STATE, len(said)) + said)
+            routes = json.dumps(self._own_link.heard_at(now)).encode()
+            self._items.append(_ITEM.pack(ROUTES, len(routes)) + routes)
+        self.flush(now)
+        if self.pair.wants_keyframe:
+            self.pair.give_keyframe(packed(self._tick))
+        self.pair.answer(now)
+        self._write_part(now)
+
+    def flush(self, now: float) -> None:
+        """Send what has gathered."""
+        if self._items:
+            self.pair.publish(b"".join(self._items), now)
+            self._items.clear()
+
+    def may_dance(self, now: float) -> bool:
+        """The leader, before a tick: whether it still leads."""
+        self._look(now)
+        return self.pair.leads
+
+    def follow(self, clock: TickClock, pulse: Callable[[float, float], None]) -> None:
+        """One pass of a box that does not lead: run what has come; take over where it is time.
+
+        pulse: told of each tick that was run: now, and its cost in ms.
+        """
+        self.pair.await_datagram(0.004 if self.pair.is_ready else 0.01)
+        now = clock.now()
+        self._look(now)
+        if self.pair.leads:
+            self._take_over(clock)
+            return
+        if now - self._beat_at >= TICK_S:
+            self._beat_at = now
+            self.pair.beat(now)
+            self._write_part(now)
+        self.pair.ask(now)
+        if not self.pair.same_show:
+            return
+        if (keyframe := self.pair.take_keyframe()) is not None:
+            self._restore(keyframe)
+        for _ in range(_AT_ONCE):
+            if (message := self.pair.take_message()) is None:
+                break
+            self._run(message, clock, pulse)
+        self.pair.is_ready = self._has_danced and self.pair.behind <= _MOST_BEHIND
+
+    def give_back(self, now: float) -> tuple[bool, str]:
+        """Let the other box lead; whether it was asked to, and a sentence."""
+        if not self.pair.leads:
+            return False, "This box follows already; ask the one that leads."
+        if not self.pair.roles.give_back(now):
+            return False, f"{self._settings.name.capitalize()} is not there, or not ready to take over."
+        self.pair.beat(now)
+        return True, f"{self._settings.name.capitalize()} leads from the next frame on."
+
+    def refused(self, order: Order) -> str:
+        """Why a box that follows does not carry it out."""
+        return f"This box follows {self._settings.name}: send it there ({order.name})."
+
+    def told(self, now: float) -> dict[str, Any]:
+        """For status and page."""
+        roles, worst = self.pair.roles, self._comparison.worst
+        return {
+            "box": "first" if self._settings.is_first else "second",
+            "role": roles.role.name.lower(),
+            "peer": roles.peer_lives(now),
+            "ready": self.pair.is_ready if not roles.leads else bool(roles.peer and roles.peer.is_ready),
+            "epoch": roles.epoch,
+            "takeovers": roles.takeovers,
+            "why": roles.why,
+            "same_show": self.pair.same_show,
+            "differs_degrees": 0.0 if worst is None else worst.degrees,
+            "resyncs": self.resyncs,
+        }
+
+    def complaint(self, now: float) -> str:
+        """Why nobody could take over, or ""."""
+        name, roles = self._settings.name, self.pair.roles
+        if self.pair.trouble:
+            return f"The pair's port cannot be opened ({self.pair.trouble}): no box takes over. Free it."
+        if not roles.peer_lives(now):
+            return (
+                f"{name.capitalize()} of the pair is not heard: the show goes on, and nobody would take "
+                "over. Switch it on; look at the cable between, and at pair: in both box files."
+            )
+        if not self.pair.same_show:
+            return (
+                f"{name.capitalize()} has another show or another release: it cannot follow. Give both "
+                "the same."
+            )
+        return ""
+
+    def close(self) -> None:
+        """Free port and files."""
+        self.pair.close()
+        self._part.close()
+
+    def _look(self, now: float) -> None:
+        self._looked_at = now
+        before = self._role
+        self.pair.look(now)
+        self._role = role = self.pair.roles.role
+        if before is role:
+            return
+        if before is Role.LEADS:
+            self._parts.outputs.mute(True)
+            self._has_danced = self.pair.is_ready = False
+            self._hear_leader()
+        self._write_part(now)
+
+    def _may_speak(self) -> bool:
+        """Right before a frame leaves: a box that was held up may have lost the lead meanwhile."""
+        if not self.pair.leads:
+            return False
+        now = time.monotonic()
+        if now - self._looked_at > _FRESH_LOOK_S:
+            self._look(now)
+        return self.pair.leads
+
+    def _write_part(self, now: float) -> None:
+        roles = self.pair.roles
+        part = BoxPart(roles.leads, self.pair.is_ready, roles.peer_lives(now), roles.epoch, now)
+        self._part.write(part)
+
+    def _hear_leader(self) -> None:
+        self._parts.link, self._parts.live_inbox = self._rerun.heard, self._rerun.live
+        self._parts.outputs.shift_shared(self.pair.offset.seconds)
+
+    def _restore(self, keyframe: bytes) -> None:
+        try:
+            restore(self._tick, keyframe)
+        except DAMAGED as error:
+            self._lose_step(f"The leader's state does not fit here ({type(error).__name__}: {error}).")
+            return
+        self._has_danced = False
+        self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
+
+    def _run(self, message: bytes, clock: TickClock, pulse: Callable[[float, float], None]) -> None:
+        """The items of a message in their order."""
+        for kind, item in _items_of(message):
+            try:
+                if kind == TICK:
+                    self._run_tick(item, clock, pulse)
+                elif kind == EVENT:
+                    event = json.loads(item)
+                    if event["kind"] == ORDER:
+                        order, done_then, done = self._rerun.obey(event)
+                        self._comparison.note_order(order.name, done_then, done)
+                elif kind == STATE:
+                    self._take_state(item)
+                elif kind == ROUTES:
+                    self._routes = json.loads(item)
+            except DAMAGED as error:
+                self._lose_step(f"What the leader sent does not fit here ({type(error).__name__}: {error}).")
+                return
+
+    def _run_tick(self, item: bytes, clock: TickClock, pulse: Callable[[float, float], None]) -> None:
+        recorded = np.frombuffer(item, self._layout, 1)[0]
+        begun = clock.now()
+        self._parts.outputs.shift_shared(self.pair.offset.seconds)
+        slot = self._rerun.dance(recorded)
+        self._last, self._has_danced = (slot.tick, slot.deadline), True
+        self._comparison.look(recorded, self._tick)
+        now = clock.now()
+        pulse(now, 1000.0 * (now - begun))
+        if (first := self._comparison.first) is not None:
+            self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
+            self._lose_step(f"This box danced otherwise than the leader: {first.sentence()}")
+
+    def _lose_step(self, why: str) -> None:
+        self.resyncs += 1
+        self.pair.forget_state()
+        if self.resyncs < 10 or self.resyncs % 100 == 0:
+            self._say(f"{why} The leader's state is fetched again.")
+
+    def _take_state(self, item: bytes) -> None:
+        (self._applied,) = struct.unpack_from("<q", item)
+        state, ahead_s = states.unpacked(item[8:]), self.pair.offset.seconds
+        settings = {name: replace(one, since=one.since + ahead_s) for name, one in state.settings.items()}
+        self._part.write_state(replace(state, settings=settings))
+
+    def _take_over(self, clock: TickClock) -> None:
+        """From the next slot on this box speaks."""
+        parts, ahead_s = self._parts, self.pair.offset.seconds
+        self.pair.lead_anew()
+        self.pair.is_ready = True
+        parts.link, parts.live_inbox = self._own_link, self._own_live
+        parts.outputs.shift_shared(0.0)
+        parts.outputs.mute(False)
+        self._sent_state = None
+        if self._has_danced:
+            shift_times(self._tick, ahead_s)
+            tick, deadline = self._last
+            clock.go_on(tick, deadline + ahead_s)
+            now = clock.now()
+            for name, (boot_nonce, host, port) in self._routes.items():
+                self._own_link.call(name, boot_nonce, (host, port))
+            self._own_link.send_due(now)
+            self._reconciler.go_on_after(self._applied, now)
+        else:
+            clock.begin(0.001)
+        self._tick.latest_start_s = self._own_latest_start_s
+        if isinstance(parts.network, RecordedNetwork):
+            parts.network.fails = ()
+        for one, most in zip(parts.puppets, self._own_most, strict=True):
+            if most < one.iterations.most:
+                one.iterations.allow(most)
+        self._has_danced = False
+        self._write_part(clock.now())
+
+
+def _items_of(message: bytes) -> Iterator[tuple[int, bytes]]:
+    at = 0
+    while at + _ITEM.size <= len(message):
+        kind, length = _ITEM.unpack_from(message, at)
+        at += _ITEM.size
+        yield kind, message[at : at + length]
+        at += length

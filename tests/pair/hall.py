@@ -1,0 +1,316 @@
+"""Two real boxes of a pair in a hall: networks of their own, a switch between, receivers of all outputs."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import select
+import signal
+import socket
+import struct
+import subprocess
+import threading
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import yaml
+
+from tests.system.namespace import Namespace
+from tests.system.processes import BUNRAKU, Process, wait_until
+
+HALL, FIRST, SECOND = "10.77.0.9", "10.77.0.1", "10.77.0.2"
+PAIR_PORT, OSC_PORT, CONTROL_PORT = 9760, 9004, 9002
+KEY = "00112233445566778899aabbccddeeff"
+
+
+def _ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True, capture_output=True)
+
+
+@dataclass
+class Link:
+    """The way between the boxes: what it does to datagrams. Times in seconds."""
+
+    loss: float = 0.0
+    delay_s: float = 0.0
+    jitter_s: float = 0.0
+    is_cut: bool = False
+    seed: int = 1
+    passed: int = 0
+    lost: int = 0
+    rng: random.Random = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.rng = random.Random(self.seed)
+
+
+class Relay:
+    """Passes the pair's datagrams on, in a thread: lost, late and out of order as its link says."""
+
+    def __init__(self, network: Namespace) -> None:
+        self.link = Link()
+        with network.entered():
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self._socket.bind((HALL, PAIR_PORT))
+        self._socket.setblocking(False)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._socket.close()
+
+    def _run(self) -> None:
+        waiting: list[tuple[float, int, bytes, str]] = []
+        number = 0
+        while not self._ended.is_set():
+            now = time.monotonic()
+            wait_s = min([0.05, *(max(0.0, one[0] - now) for one in waiting)])
+            select.select([self._socket], [], [], wait_s)
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    data, (host, _) = self._socket.recvfrom(4096)
+                    link, rng = self.link, self.link.rng
+                    if link.is_cut or rng.random() < link.loss:
+                        link.lost += 1
+                        continue
+                    link.passed += 1
+                    number += 1
+                    at = time.monotonic() + link.delay_s + link.jitter_s * rng.random()
+                    waiting.append((at, number, data, SECOND if host == FIRST else FIRST))
+            now = time.monotonic()
+            due = sorted(one for one in waiting if one[0] <= now)
+            waiting = [one for one in waiting if one[0] > now]
+            for _, _, data, to in due:
+                with contextlib.suppress(OSError):
+                    self._socket.sendto(data, (to, PAIR_PORT))
+
+
+class Seen:
+    """What came on the wires, from whom: a thread that notes arrivals until it is closed."""
+
+    def __init__(self, network: Namespace) -> None:
+        self.osc: list[tuple[float, str, list[Any]]] = []  # arrival, box, arguments of the frame message
+        self.poses: list[tuple[float, str, str, list[float]]] = []
+        self.psn: list[tuple[float, str]] = []
+        self.sacn: list[tuple[float, str, int, bytes]] = []  # arrival, box, priority, levels
+        self.artnet: list[tuple[float, str, bytes]] = []
+        with network.entered():
+            self._sockets = {
+                "osc": _listening(OSC_PORT),
+                "psn": _listening(56565, "236.10.10.10"),
+                "sacn": _listening(5568, "239.255.0.1"),
+                "artnet": _listening(6454),
+            }
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        for one in self._sockets.values():
+            one.close()
+
+    def _run(self) -> None:
+        names = {one.fileno(): name for name, one in self._sockets.items()}
+        poll = select.epoll()
+        for descriptor in names:
+            poll.register(descriptor, select.EPOLLIN)
+        while not self._ended.is_set():
+            for descriptor, _ in poll.poll(0.05):
+                name = names[descriptor]
+                with contextlib.suppress(BlockingIOError):
+                    while True:
+                        data, ancillary, _, (host, _) = self._sockets[name].recvmsg(4096, 64)
+                        seconds, nanoseconds = struct.unpack("@qq", ancillary[0][2])
+                        self._note(name, seconds + 1e-9 * nanoseconds, host, data)
+        poll.close()
+
+    def _note(self, name: str, at: float, host: str, data: bytes) -> None:
+        if name == "psn":
+            if data[:2] == b"\x55\x67":  # data, not names: PSN_DATA_PACKET
+                self.psn.append((at, host))
+        elif name == "sacn":
+            self.sacn.append((at, host, data[108], data[126:]))
+        elif name == "artnet":
+            self.artnet.append((at, host, data[18:]))
+        else:
+            for address, arguments in _messages(data):
+                if "frame" in address:
+                    self.osc.append((at, host, arguments))
+                elif address.endswith("/rot"):
+                    self.poses.append((at, host, address, arguments))
+
+
+def _messages(data: bytes) -> list[tuple[str, list[Any]]]:
+    from hw_sim import osc_receiver
+
+    return [(address, arguments) for address, arguments in osc_receiver.decode(data)]
+
+
+def _listening(port: int, group: str = "") -> socket.socket:
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    made.setsockopt(socket.SOL_SOCKET, 33, 4 << 20)
+    made.setsockopt(socket.SOL_SOCKET, 35, 1)  # SO_TIMESTAMPNS: the kernel says when it came
+    made.bind(("", port))
+    if group:
+        made.setsockopt(
+            socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + socket.inet_aton(HALL)
+        )
+    made.setblocking(False)
+    return made
+
+
+class PairedBox(Process):
+    """One of the two."""
+
+    def __init__(
+        self, folder: Path, network: Namespace, address: str, show: Path, settings: dict[str, Any]
+    ) -> None:
+        self.folder, self.address, self.runtime = folder, address, folder / "runtime"
+        folder.mkdir(exist_ok=True)
+        (folder / "pair.key").write_text(KEY)
+        (folder / "box.yaml").write_text(yaml.safe_dump(settings))
+        command = [*BUNRAKU, "play", "--show", str(show), "--box", str(folder / "box.yaml")]
+        super().__init__(folder / "words.txt", network.command(*command))
+
+    @property
+    def part(self) -> Any:
+        from appliance.pair.part import PartReader
+
+        reader = PartReader(self.runtime)
+        try:
+            return reader.read()
+        finally:
+            reader.close()
+
+    def signal(self, number: int, children: bool = True) -> None:
+        """To the stage, and to the other processes of the box (power, or all of a machine that hangs)."""
+        for pid in [self.process.pid, *(_descendants(self.process.pid) if children else ())]:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, number)
+
+    def cut_power(self) -> None:
+        """All processes at once."""
+        self.signal(signal.SIGKILL)
+        self.process.wait()
+
+
+def _descendants(pid: int) -> list[int]:
+    found = []
+    with contextlib.suppress(OSError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            for child in (task / "children").read_text().split():
+                found += [int(child), *_descendants(int(child))]
+    return found
+
+
+class Hall:
+    """A context: two boxes on one switch. first, second: None until they are switched on."""
+
+    def __init__(self, folder: Path, show: Path, *, relayed: bool = True, **more: Any) -> None:
+        self.folder, self.show, self._relayed, self._more = folder, show, relayed, more
+        self._opened = ExitStack()
+        self.boxes: dict[str, PairedBox] = {}
+
+    def __enter__(self) -> Self:
+        opened = self._opened
+        self.hall = opened.enter_context(Namespace("hall"))
+        self.networks = {
+            FIRST: opened.enter_context(Namespace("one")),
+            SECOND: opened.enter_context(Namespace("two")),
+        }
+        name = self.hall.name
+        _ip("-n", name, "link", "add", "br0", "type", "bridge")
+        _ip("-n", name, "address", "add", f"{HALL}/24", "dev", "br0")
+        _ip("-n", name, "link", "set", "br0", "up")
+        self.ends: dict[str, str] = {}
+        for number, (address, network) in enumerate(self.networks.items()):
+            end = f"bk{os.getpid() % 100000}h{number}"
+            _ip(
+                "link",
+                "add",
+                end,
+                "netns",
+                name,
+                "type",
+                "veth",
+                "peer",
+                "name",
+                "eth0",
+                "netns",
+                network.name,
+            )
+            _ip("-n", name, "link", "set", end, "master", "br0", "up")
+            _ip("-n", network.name, "address", "add", f"{address}/24", "dev", "eth0")
+            _ip("-n", network.name, "link", "set", "eth0", "up")
+            _ip("-n", network.name, "route", "add", "default", "via", HALL)
+            self.ends[address] = end
+        self.relay = Relay(self.hall)
+        opened.callback(self.relay.close)
+        self.seen = Seen(self.hall)
+        opened.callback(self.seen.close)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for box in self.boxes.values():
+            if box.process.poll() is None:
+                box.signal(signal.SIGCONT)
+                box.cut_power()
+        self._opened.close()
+
+    def switch_on(self, address: str) -> PairedBox:
+        """A box with power: a new process, what it kept is there."""
+        is_first = address == FIRST
+        peer = HALL if self._relayed else SECOND if is_first else FIRST
+        settings: dict[str, Any] = {
+            "sensors": {"udp": {"host": "0.0.0.0", "port": 9750}, "keys": str(self.folder / "sensors.keys")},
+            "outputs": {
+                "osc": [{"host": HALL, "port": OSC_PORT, "frame_message": True, "dialect": "joint"}],
+                "posistagenet": [{"interface": address}],
+            },
+            "control": {"host": "127.0.0.1", "port": CONTROL_PORT},
+            "console": None,
+            "runtime": "runtime",
+            "resume": "never",
+            "pair": {
+                "role": "first" if is_first else "second", "peer": [peer], "host": "0.0.0.0",
+                "port": PAIR_PORT, "secret": "pair.key",
+            },
+        }
+        for section, values in self._more.items():
+            settings[section] = {**settings.get(section, {}), **values}
+        folder = self.folder / ("first" if is_first else "second")
+        box = self.boxes[address] = PairedBox(folder, self.networks[address], address, self.show, settings)
+        return box
+
+    def pull_cable(self, address: str) -> None:
+        """Of the switch, at this box."""
+        _ip("-n", self.hall.name, "link", "set", self.ends[address], "down")
+
+    def plug_cable(self, address: str) -> None:
+        """Back in."""
+        _ip("-n", self.hall.name, "link", "set", self.ends[address], "up")
+
+    def await_pair(self) -> None:
+        """Until one leads, and the other one could take over."""
+
+        def are_ready() -> bool:
+            parts = [box.part for box in self.boxes.values()]
+            return sum(part is not None and part.leads for part in parts) == 1 and all(
+                part is not None and (part.leads or part.is_ready) for part in parts
+            )
+
+        wait_until(are_ready, lambda: "\n".join(box.output for box in self.boxes.values()))
+
+    @property
+    def leader(self) -> str:
+        """Address of the box that leads."""
+        return next(address for address, box in self.boxes.items() if (part := box.part) and part.leads)
