@@ -22,6 +22,7 @@ from appliance.lights.fallback import DMX_AWAY, OF_THE_LIGHTS, STAGE_UNSEEN
 from appliance.lights.live import LiveRig, OrderedWalk
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
+from appliance.lights.speaking import Speaking
 from appliance.outputs.dmx.open_wire import open_universes
 from appliance.outputs.dmx.pace import Universe
 from appliance.outputs.frame_reader import FrameReader
@@ -63,6 +64,7 @@ class Lights:
         self._stage, self._show_state, self._say, self._fallbacks = stage, show_state, say, fallbacks
         self._foreign: int | None = None
         self._was_lost = True
+        self._speaking = Speaking(box, self.universes)
         self._troubles: dict[str, str] = {}
         self._remarks: set[str] = set()
 
@@ -89,7 +91,7 @@ class Lights:
             if now >= report_at:
                 report_at = now + _REPORT_S
                 self._report()
-            deadline = _wait_for(deadline, period_s)
+            deadline = self._speaking.wait(deadline, period_s) or _wait_for(deadline, period_s)
         self._walk.end()
         self.rig.fade_out()
         give_up = time.monotonic() + _GIVE_UP_S
@@ -100,8 +102,10 @@ class Lights:
         """Send the safe look, or zeros, on all wires and close them."""
         levels, now = self.rig.last_levels(self._show_state.read()), time.monotonic()
         for universe in self.universes:
-            universe.offer(levels[universe.number], now)
+            if self._speaking.may_speak(now):
+                universe.offer(levels[universe.number], now)
             universe.close(now)
+        self._speaking.close()
 
     def _next_pass(self) -> float:
         now, show_state, patch = time.monotonic(), self._show_state.read(), self.rig.patch
@@ -110,9 +114,10 @@ class Lights:
             levels = self.rig.render(self._frame(now), self._stage.generation, show_state, now)
         if self._live is not None:
             walked = self._walk.values
-            self._live.tell(patch, self.rig.values if walked is None else walked, self._walk.words, now)
-        for universe in self.universes:
-            universe.offer(levels[universe.number], now)
+            self._live.tell(patch, self.rig.values if walked is None else walked, self._walk.description, now)
+        if self._speaking.may_speak(now):
+            for universe in self.universes:
+                universe.offer(levels[universe.number], now)
         return now
 
     def _frame(self, now: float) -> JointFrame | None:
@@ -250,10 +255,10 @@ def _light(lights: Lights, stopped: Callable[[], bool], pulse: Callable[[float],
         lights.close()
 
 
-def say(words: str) -> None:
+def say(message: str) -> None:
     """Print a line; a closed terminal is ignored: light matters more."""
     with contextlib.suppress(OSError, ValueError):
-        print(words, flush=True)
+        print(message, flush=True)
 
 
 def _wait_for(deadline: float, period_s: float) -> float:

@@ -59,6 +59,7 @@ class PartReader:
     def __init__(self, folder: Path) -> None:
         self._part = BlockReader(folder / FILE, KIND)
         self._state = BlockReader(folder / STATE_FILE, STATE_FILE)
+        self._state_read: tuple[bytes | None, ShowState | None] = None, None
 
     def read(self) -> BoxPart | None:
         """None: no stage of a pair has written here."""
@@ -68,9 +69,11 @@ class PartReader:
         return BoxPart(bool(leads), bool(is_ready), bool(peer_lives), epoch, written)
 
     def state(self) -> ShowState | None:
-        """The leader's show state."""
+        """The leader's show state, the same object until it changes."""
         found = self._state.read()
-        return None if found is None else unpacked(found)
+        if found != self._state_read[0]:
+            self._state_read = found, None if found is None else unpacked(found)
+        return self._state_read[1]
 
     def follows(self, now: float) -> bool:
         """Whether this box follows another one at this moment."""

@@ -80,6 +80,7 @@ class CommandHandler:
         self._observer, self._dispatch, self._keys = observer, dispatch, keys
         self._send, self._publish, self._live = send, publish, live
         self._trackers = Trackers()
+        self.follows = False  # another box leads: what is declared comes from there
         self._generation = -1
         self._is_new_stage = False
 
@@ -111,7 +112,7 @@ class CommandHandler:
                 self._reply(asker, address, False, str(error))
             except Exception as error:
                 self.note_failure(address, error, now)
-                self._reply(asker, address, False, COMMAND_FAILED.words)
+                self._reply(asker, address, False, COMMAND_FAILED.message)
 
     def note_failure(self, address: str, error: Exception, now: float) -> None:
         """An error of this program, in a command or between two (""): the process goes on, it hears PANIC."""
@@ -133,6 +134,10 @@ class CommandHandler:
             self._adopt(facts, health, now)
         self._note_live(now)
         self.acknowledgements.send_due(now)
+
+    def follow_leader(self, show_state: ShowState) -> None:
+        """Another box leads, and declared this."""
+        self._publish_changed(show_state)
 
     def report(self, strangers: int, now: float) -> dict[str, Any]:
         """The part of the status that only this process knows."""
@@ -166,13 +171,15 @@ class CommandHandler:
         address, observer = command.address, self._observer
         if address == "/ping":
             self._send(asker, (PONG,))
-        elif words := let_go(command):
-            self._send(asker, (REPLY, address, 0, words))  # not done, and nothing was refused
+        elif text := let_go(command):
+            self._send(asker, (REPLY, address, 0, text))  # not done, and nothing was refused
         elif address in _QUESTIONS:
             for message in answer_to(address, self.show_state, observer, self.status(0, now), now):
                 self._send(asker, message)
         elif address == "/sensors/list":
             self._send_roster(asker, now)
+        elif self.follows and (ADDRESSES[address].order or ("stage",))[0] != "projector":
+            raise ValueError("This box follows the other one of its pair: send it there.")
         elif (order := ADDRESSES[address].order) is not None:
             self._order(*order, command, asker, now)
         else:
@@ -184,17 +191,17 @@ class CommandHandler:
         before = of_this_show(self.show_state, observer.facts)
         if address in ("/phrase", "/cue"):
             command = replace(command, kept=observer.kept())
-        show_state, words = declare(before, command, observer.facts, now)
+        show_state, message = declare(before, command, observer.facts, now)
         if address == "/go" and before.going and observer.state(now) == "stopped":
             show_state = show_state.to(RATE, None, now)
         self._publish_changed(show_state)
         if show_state.generation != before.generation and self._takes_live:
-            words = f"{words} {self._live.words(now)}".lstrip()
+            message = f"{message} {self._live.message(now)}".lstrip()
         reply = partial(self._reply, asker, address)
         if address == "/go" or show_state.generation == before.generation:
-            reply(True, words)
+            reply(True, message)
         else:
-            self.acknowledgements.expect(show_state.generation, words, now, reply)
+            self.acknowledgements.expect(show_state.generation, message, now, reply)
 
     def _order(self, place: Receiver, name: str, command: Command, asker: Address, now: float) -> None:
         text = joint_name(command.text, self._observer.facts)
@@ -220,14 +227,14 @@ class CommandHandler:
             self._publish(show_state)
             self.show_state = show_state
 
-    def _reply(self, asker: Address, address: str, done: bool, words: str) -> None:
+    def _reply(self, asker: Address, address: str, done: bool, message: str) -> None:
         """Reply to a command; to one of a stream only that it is not done."""
         if done and address.startswith(STREAMS):
             return
         if not done:
-            self._refuse(words)
+            self._refuse(message)
         reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY
-        self._send(asker, (reply, address[:LONGEST_NAME], int(done), words or "Done."))
+        self._send(asker, (reply, address[:LONGEST_NAME], int(done), message or "Done."))
 
     @property
     def _takes_live(self) -> bool:

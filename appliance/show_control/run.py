@@ -17,6 +17,7 @@ from appliance.box.process_health import COMMANDS_DROPPED, ProcessHealthWriter
 from appliance.box.show_state import ShowStateReader, ShowStateWriter
 from appliance.box.stop_signals import stop_signals
 from appliance.levers.show_state import ShowState
+from appliance.pair.part import PartReader
 from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.fallback import LIVE_DROPPED, SENDER_NOT_LISTED
@@ -33,6 +34,7 @@ from appliance.show_control.settings import Settings
 from appliance.show_control.stage_observer import StageObserver
 
 _LONGEST_SLEEP_S = 0.25  # a restarted stage is found within this
+_FOLLOWING_SLEEP_S = 0.04  # what the leader declares is in force here within this
 _AT_ONCE = 16  # datagrams; then answers, heartbeat and signals have their turn
 _LIVE_AT_ONCE = 64  # datagrams of a live dancer: most programs send a frame in fewer
 _LIVE_S = 0.003  # for these; a whole figure takes up to 1 ms
@@ -61,6 +63,8 @@ class ControlProcess:
             opened.callback(self.observer.close)
             self._health = ProcessHealthWriter(folder, "control", self.observer.own)
             opened.callback(self._health.close)
+            self._pair = PartReader(folder)
+            opened.callback(self._pair.close)
             self._dispatch = OrderDispatch(sender)
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
@@ -81,8 +85,8 @@ class ControlProcess:
         writer.write(show_state)
         self._failures_said, self._failures_said_at = 0, float("-inf")
         self._news = ConsoleMessages(show_state)
-        if words := held_back(show_state):
-            say(f"Still from before: {words}")
+        if message := held_back(show_state):
+            say(f"Still from before: {message}")
 
     def run(self, ended: Callable[[], bool], wake: int, notifier: Notifier) -> None:
         """Until `ended` says so; `wake` is a descriptor that can be read when it may."""
@@ -117,8 +121,8 @@ class ControlProcess:
         except Exception as error:  # whatever the others publish: PANIC is heard
             self.handler.note_failure("", error, self._monotonic())
             time.sleep(_REST_S)
-        if words := self._failures(self._monotonic()):
-            self._say(words)
+        if message := self._failures(self._monotonic()):
+            self._say(message)
         if taken == _AT_ONCE:
             time.sleep(_REST_S)
 
@@ -127,6 +131,7 @@ class ControlProcess:
         self._dispatch.exchange(self._monotonic())
         now = self._monotonic()
         self._count(now)
+        self._follow_leader(now)
         self.handler.follow_stage(now)
         self._health.reported = self.handler.report(self.port.strangers, now)
         self._health.publish_health(now)
@@ -135,9 +140,15 @@ class ControlProcess:
         for descriptor in self._foreign.opened(now):
             self._poll.register(descriptor, select.POLLIN)
         news = self._news.look(self.handler.show_state, now)
-        for words in (self.port.news(now), news, *self._foreign.news(now)):
-            if words:
-                self._say(words)
+        for message in (self.port.news(now), news, *self._foreign.news(now)):
+            if message:
+                self._say(message)
+
+    def _follow_leader(self, now: float) -> None:
+        """On a box of a pair that follows: declare what the other one has declared."""
+        self.handler.follows = self._pair.follows(now)
+        if self.handler.follows and (show_state := self._pair.state()) is not None:
+            self.handler.follow_leader(show_state)
 
     def _count(self, now: float) -> None:
         """Tell of what came to the port and was not heard."""
@@ -174,7 +185,8 @@ class ControlProcess:
         if not self._intake.is_empty:
             return 0.0
         due = [self._heartbeat.due, self._dispatch.due(now), self.handler.acknowledgements.due(now)]
-        return max(min(*due, now + _LONGEST_SLEEP_S) - now, 0.0)
+        longest_s = _FOLLOWING_SLEEP_S if self.handler.follows else _LONGEST_SLEEP_S
+        return max(min(*due, now + longest_s) - now, 0.0)
 
 
 def control(settings: Settings, say: Callable[[str], None]) -> int:
@@ -185,8 +197,8 @@ def control(settings: Settings, say: Callable[[str], None]) -> int:
             process.run(ended, wake, Notifier())
         finally:
             process.close()
-        if words := process.conclusion():
-            say(words)
+        if message := process.conclusion():
+            say(message)
     return 0
 
 

@@ -287,6 +287,8 @@ class Hall:
         }
         for section, values in self._more.items():
             settings[section] = {**settings.get(section, {}), **values}
+        for wire in settings["outputs"].get("dmx", []):
+            wire["interface"] = address
         folder = self.folder / ("first" if is_first else "second")
         box = self.boxes[address] = PairedBox(folder, self.networks[address], address, self.show, settings)
         return box

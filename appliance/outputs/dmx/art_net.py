@@ -10,7 +10,8 @@ from appliance.show.dmx import DmxConfig
 
 PORT = 6454  # at both ends: some nodes take nothing from another one
 _ID = b"Art-Net\0"
-_OP_DMX = 0x5000
+_OP_DMX, _OP_ADDRESS = 0x5000, 0x6000
+_KEEP, _CANCEL_MERGE = 0x7F, 0x01  # ArtAddress: leave as it is; AcCancelMerge
 _PROTOCOL_VERSION = 14
 _SEQUENCE = 12  # offsets in the packet
 _DATA = 18
@@ -38,6 +39,13 @@ class ArtDmx:
         return self._packet
 
 
+def cancel_merge() -> bytes:
+    """ArtAddress that changes nothing of a node, and ends its merge: the next ArtDmx counts alone."""
+    switches = bytes([_KEEP] * 9 + [255, _CANCEL_MERGE])  # input, output, sub-net; sACN priority; command
+    head = struct.pack("<8sH", _ID, _OP_ADDRESS) + struct.pack(">HBB", _PROTOCOL_VERSION, _KEEP, 1)
+    return head + bytes(18 + 64) + switches
+
+
 class ArtNetWire(NetworkWire):
     """One universe to one node, or to all of a network. Unchanged data is repeated by the pace."""
 
@@ -49,6 +57,10 @@ class ArtNetWire(NetworkWire):
             "Check the node's power, its network cable, and its address in the box file.",
         )
         self._packets = ArtDmx(config.number_on_wire, config.channels)
+
+    def take_over(self, raised: int, now: float) -> None:
+        """Another box was the source until now: the node is to forget that one's levels."""
+        self.send_datagrams((cancel_merge(),), now)
 
     def send_universe(self, levels: bytes | bytearray, now: float) -> None:
         """Send one universe, 512 levels."""

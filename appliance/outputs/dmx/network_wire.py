@@ -12,6 +12,12 @@ class NetworkWire(DatagramSender):
         super().__init__(name, path)
         self._cure = cure
 
+    def take_over(self, raised: int, now: float) -> None:
+        """Another box was the source until now; receivers take this one, which counts for more by so much."""
+
+    def cede(self, now: float) -> None:
+        """Another box is the source from now on; receivers need not wait for this one."""
+
     @property
     def trouble(self) -> str | None:
         """Says what happened, what the audience sees, what to do."""

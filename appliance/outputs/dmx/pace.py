@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from appliance.outputs.dmx.network_wire import NetworkWire
 from appliance.outputs.dmx.wire import Wire
 from appliance.show.dmx import SLOTS, DmxConfig
 
@@ -39,6 +40,19 @@ class Universe:
             return False
         self._leave(now)
         return True
+
+    def take_over(self, raised: int, now: float) -> None:
+        """Another box has sent until now. The next offer leaves at once, by `raised` above this box's usual
+        priority where the wire has one.
+        """
+        self._due, self._changed = float("-inf"), True
+        if isinstance(self.wire, NetworkWire):
+            self.wire.take_over(raised, now)
+
+    def cede(self, now: float) -> None:
+        """Another box sends from now on."""
+        if isinstance(self.wire, NetworkWire):
+            self.wire.cede(now)
 
     def close(self, now: float) -> None:
         """Send the last offer, if it has not left, and close the wire."""

@@ -44,7 +44,7 @@ class SacnWire(NetworkWire):
             DatagramPath(host, config.udp_port, interface, hops=config.ttl),
             "Check the network cable, and host and interface in the box file.",
         )
-        self._number = number
+        self._number, self._priority = number, config.priority
         self._source = source
         self._packets = sacn_packet.DataPackets(
             source.cid,
@@ -61,10 +61,18 @@ class SacnWire(NetworkWire):
         self.send_datagrams((self._packets.pack(levels),), now)
         self._source.announce_universes(now)
 
-    def close(self) -> None:
-        """Terminate the stream, so that receivers need not wait 2.5 s for the source next in priority."""
+    def take_over(self, raised: int, now: float) -> None:
+        """Another box was the source until now: this one counts for more by so much."""
+        self._packets.rank(self._priority + raised)
+
+    def cede(self, now: float) -> None:
+        """Another box is the source from now on: receivers need not wait 2.5 s for it."""
         for _ in range(TERMINATIONS):
-            self.send_datagrams((self._packets.terminate(),), inf)  # no pause after a failure: now or never
+            self.send_datagrams((self._packets.terminate(),), now)
+
+    def close(self) -> None:
+        """Terminate the stream."""
+        self.cede(inf)  # no pause after a failure: now or never
         super().close()
         self._source.universes.remove(self._number)
         if not self._source.universes:

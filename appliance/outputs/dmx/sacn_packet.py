@@ -17,7 +17,8 @@ _FRAME_DATA, _FRAME_DISCOVERY = 2, 2
 _DMP_SET_PROPERTY, _ADDRESS_AND_DATA_TYPE = 0x02, 0xA1
 _UNIVERSE_LIST = 1
 _FRAMING, _DMP, _LIST = 38, 115, 112  # where the layers begin
-_SEQUENCE, _OPTIONS, _DATA = 111, 112, 126
+_PRIORITY, _SEQUENCE, _OPTIONS, _DATA = 108, 111, 112, 126
+HIGHEST_PRIORITY = 200  # section 6.2.3
 
 
 def group(universe: int) -> str:
@@ -71,6 +72,10 @@ class DataPackets:
         """The next packet; valid until the next call."""
         self._packet[_DATA:] = data[: self._channels]
         return self._number(self._options)
+
+    def rank(self, priority: int) -> None:
+        """Receivers take the source with the highest priority, from the next packet on."""
+        self._packet[_PRIORITY] = min(priority, HIGHEST_PRIORITY)
 
     def terminate(self) -> bytearray:
         """The next packet, which terminates this source's stream; receivers ignore its levels."""
