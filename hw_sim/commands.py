@@ -149,12 +149,12 @@ def emulate(
     if not firmware:
         refuse_idle(context, ("imu",), "without --firmware")
     try:
-        wanted = [name_and_motion(words) for words in sensor or []]
+        wanted = [name_and_motion(message) for message in sensor or []]
         kinds = dict(wanted)
         if MotionKind.trace not in (motion, *kinds.values()):
             refuse_idle(context, ("trace", "joint"), "without the motion 'trace'")
         chosen = choose_keys(
-            keys, [name for name, _ in wanted], count, lambda words: typer.echo(words, err=True)
+            keys, [name for name, _ in wanted], count, lambda message: typer.echo(message, err=True)
         )
         if tap and firmware:
             raise ValueError("--tap is not for --firmware, whose sensors feel a finger on their case")
@@ -211,6 +211,6 @@ def _stopped_by_signals() -> Iterator[Callable[[], bool]]:
 
 
 def _refuse(error: Exception) -> NoReturn:
-    words = (sentence(error) if isinstance(error, OSError) else None) or f"{str(error).rstrip('.')}."
-    typer.echo(f"bunraku emulate: {words}", err=True)
+    message = (sentence(error) if isinstance(error, OSError) else None) or f"{str(error).rstrip('.')}."
+    typer.echo(f"bunraku emulate: {message}", err=True)
     sys.exit(REFUSED)

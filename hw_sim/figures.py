@@ -18,6 +18,7 @@ from hw_sim.latency import (
     percentiles,
     power_on_s,
     response_ms,
+    sounded_ms,
     steps,
     transport,
 )
@@ -30,6 +31,8 @@ POWER_ON_S, POWER_ON_AND_JOIN_S = 1.0, 5.0  # until a reading is used: network u
 RESTART_S = 1.5
 RESPONSE_MS = 45.0  # from a step of the sensor to half of it in the output joint
 DANCE_TO_LIGHT_MS = 60.0  # how late the wall follows a hand that dances
+SOUND_MS = 15.0  # from a step of the hand to the first audible change that the card's clock plays
+STILL_S = 0.3  # after a step, when the hand is still: what changes then is not the hand's
 LIGHT_MS = 75.0  # from a step of the hand to half of it on the screen, at 60 pictures a second
 NAMED = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}
 FEW = {"p50": 50.0, "max": 100.0}
@@ -47,6 +50,7 @@ class Evidence:
     firmware: bool = False  # the compiled firmware was the sensor, and joined a simulated Wi-Fi each time
     light: Run | None = None  # with a projector on a screen that was watched
     light_dance: Run | None = None  # the same with a hand that dances
+    sound: Run | None = None  # with the strings on an emulated card
 
     @property
     def transports(self) -> tuple[Transport, Transport]:
@@ -71,7 +75,7 @@ class Evidence:
 class Limit(NamedTuple):
     """One figure of the verdict."""
 
-    words: str
+    label: str
     value: float | None
     most: float
     unit: str
@@ -94,6 +98,22 @@ def _light(run: Run | None, dance: Run | None) -> dict[str, Any]:
         "dance_to_light_ms": lag_ms(_danced(dance), dance.pictures),
         "pictures_a_second": round(rate, 1),
         "light_steps": len(found),
+    }
+
+
+def _sound(run: Run | None) -> dict[str, Any]:
+    """Hand to sound; nothing without its run. A sound that changes as often while the hand is still has no
+    figure: it does not follow."""
+    if run is None or run.played is None:
+        return {}
+    standing = [moment for moment in steps(run.readings) if moment >= run.stood_from + 0.5]
+    found = sounded_ms(standing, run.played)
+    by_itself = len(sounded_ms([moment + STILL_S for moment in standing], run.played))
+    return {
+        "hand_to_sound_ms": percentiles(found if len(found) > 2 * by_itself else found[:0], FEW),
+        "sound_steps": len(found),
+        "sound_changes_without_hand": by_itself,
+        "late_sound_blocks": run.played.late,
     }
 
 
@@ -131,6 +151,7 @@ def figures_of(evidence: Evidence) -> dict[str, Any]:
         "readings": len(way.latency_ms),
         "overtaken_readings": way.overtaken,
         "steps": len(response),
+        **_sound(evidence.sound),
         **_light(evidence.light, evidence.light_dance),
     }
 
@@ -143,7 +164,7 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
     )
     power_on_limit_s = POWER_ON_AND_JOIN_S if figures["firmware"] else POWER_ON_S
     late_share = 100.0 * figures["late_ticks"] / max(1, figures["ticks"])
-    light = figures.get("hand_to_light_ms")
+    light, sound = figures.get("hand_to_light_ms"), figures.get("hand_to_sound_ms")
     return [
         Limit("transport, median", figures["transport_ms"]["p50"], 3.0, "ms"),
         Limit("transport, p99", figures["transport_ms"]["p99"], 12.0, "ms"),
@@ -165,6 +186,7 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
         Limit("sensor's power-on to its reading in a frame, median", power_on_s, power_on_limit_s, "s"),
         Limit("box's restart to a reading in a frame, median", restart_s, RESTART_S, "s"),
         Limit("the same from its end, median", kill_s, RESTART_S, "s"),
+        *([Limit("hand to sound, median", sound["p50"], SOUND_MS, "ms")] if sound else []),
         *([Limit("hand to light, median", light["p50"], LIGHT_MS, "ms")] if light else []),
         *([Limit("dance to light", figures["dance_to_light_ms"], DANCE_TO_LIGHT_MS, "ms")] if light else []),
     ]
@@ -182,6 +204,7 @@ def table(figures: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
         f"  ({figures['readings']} readings, {figures['overtaken_readings']} of them overtaken by newer)",
         f"  running free  p50 {_ms(free['p50'])}  p99 {_ms(free['p99'])}",
         f"response to a step, half of the way  p50 {_ms(response['p50'])}   ({figures['steps']} steps)",
+        *_sound_lines(figures),
         *_light_lines(figures),
         f"{figures['power_ons']} power-ons of a sensor, {figures['restarts']} restarts of the box",
         "tick by section, p50  "
@@ -191,8 +214,20 @@ def table(figures: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
     for limit in limits:
         value = "nothing came" if limit.value is None else f"{limit.value:.2f} {limit.unit}"
         mark = "ok  " if limit.holds else "FAIL"
-        lines.append(f"{mark}  {limit.words}: {value} (at most {limit.most:.2f} {limit.unit})")
+        lines.append(f"{mark}  {limit.label}: {value} (at most {limit.most:.2f} {limit.unit})")
     return lines
+
+
+def _sound_lines(figures: dict[str, Any]) -> list[str]:
+    if "hand_to_sound_ms" not in figures:
+        return []
+    sound, count = figures["hand_to_sound_ms"], figures["sound_steps"]
+    still, late = figures["sound_changes_without_hand"], figures["late_sound_blocks"]
+    found = f"p50 {_ms(sound['p50'])}  max {_ms(sound['max'])}"
+    return [
+        f"hand to sound, first audible change  {found}   ({count} steps; {still} while the hand was still; "
+        f"{late} blocks late)"
+    ]
 
 
 def _light_lines(figures: dict[str, Any]) -> list[str]:

@@ -9,12 +9,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hw_sim.sound_card import Played
+
 _FEWEST, _GRID_S, _LONGEST_LAG_S, _SMOOTH_S = 50, 0.002, 0.3, 0.08  # for `lag_ms`
 _ALIKE = 0.5  # correlation at least: arms go only where arms can, so a joint is 0.7 to 0.8 like its hand
 Floats = NDArray[np.float64]
 
 BEFORE_STEP_S = 0.1  # the joint's orientation before a step is its mean over this long
 SETTLED_S = (0.3, 0.45)  # and after it over this part
+HEARD_WITHIN_S = 0.1
+_LOUD_WINDOW_S, _HEARD = 0.001, 1e-4  # of full scale: softer than this nobody hears
 
 
 class SentReading(NamedTuple):
@@ -148,6 +152,27 @@ def response_ms(step_times: Sequence[float], shown: Sequence[Shown]) -> Floats:
         beyond = np.flatnonzero(share >= 0.5)
         if len(beyond):
             found.append(1000.0 * (times[during][beyond[0]] - moment))
+    return np.array(found)
+
+
+def sounded_ms(moments: Sequence[float], played: Played) -> Floats:
+    """From each moment to the first audible change of what a card plays, ms; only those with a change.
+
+    A change: within HEARD_WITHIN_S the loudness in windows of 1 ms is three times what it was at most in the
+    tenth of a second before. It begins with the first window that is half louder than that.
+    """
+    size = max(1, round(_LOUD_WINDOW_S / float(np.median(np.diff(played.at))))) if len(played.at) > 1 else 1
+    count = len(played.at) // size
+    times = played.at[: count * size : size]
+    loud = np.sqrt((played.samples[: count * size].reshape(count, size) ** 2).mean(axis=1))
+    found = []
+    for moment in moments:
+        begin, middle, end = np.searchsorted(times, [moment - BEFORE_STEP_S, moment, moment + HEARD_WITHIN_S])
+        if not begin < middle < end < len(times):
+            continue
+        before = max(float(loud[begin:middle].max()), _HEARD)
+        if np.percentile(loud[middle:end], 90) >= 3.0 * before:
+            found.append(1000.0 * (times[middle:end][loud[middle:end] >= 1.5 * before][0] - moment))
     return np.array(found)
 
 

@@ -19,7 +19,7 @@ from hw_sim.bundled_shows import show_folder
 from hw_sim.emulated_sensor import REBOOT_S
 from hw_sim.figures import FREE_SETTLING_S, SETTLING_S, Evidence, figures_of, table, verdict
 from hw_sim.peers import ProbeError, Setting, scratch_folder
-from hw_sim.probe import Course, run, run_restarts
+from hw_sim.probe import Course, Run, run, run_restarts
 from hw_sim.progress import Progress
 
 REFUSED, FAILED = 2, 1
@@ -29,6 +29,7 @@ _LARGEST_YAML = 1 << 20
 LOCKED_DRIFT_PPM = 60.0  # what a wearable's crystal may be off by; the lock has to follow it
 POWERED_S = 1.5  # how long a sensor is on until it is switched off again
 POWERED_FIRMWARE_S = 5.0  # the firmware joins a simulated Wi-Fi first, which takes seconds
+_CUE_S = 4.0  # until the strings have come in
 MOST_POWER_ONS, MOST_RESTARTS = 9, 5
 
 
@@ -62,7 +63,8 @@ def measure(
 
     Two runs: the tick in phase with the sensor, then running free, with no wait for late readings, while the
     sensor's clock drifts through one whole beat, so that every offset between the two counts alike. Then how
-    soon a reading is used after the sensor's power-on, and after the box was killed and restarted. --light
+    soon a reading is used after the sensor's power-on, and after the box was killed and restarted. If the
+    show has strings, and the box file does not silence them, they play on an emulated sound card. --light
     adds the projector: each picture says in a corner when its dance left the stage, and is read back from the
     screen. Exit status 0 when all limits hold, else 1.
     """
@@ -74,26 +76,32 @@ def measure(
             )
         with scratch_folder("bunraku-measure-") as scratch:
             setting, page = _setting(show, box, scratch, firmware), Progress(progress)
+            parts = 5 if setting.sounds else 4
             print(f"Measuring {seconds:g} s in phase with the sensor ...", flush=True)
-            page.tell(phase="locked", seconds=seconds, settling_s=min(SETTLING_S, seconds / 2.0))
+            page.tell(phase="locked", parts=parts, seconds=seconds, settling_s=min(SETTLING_S, seconds / 2.0))
             locked = run(setting, locked_course(seconds), page)
             free_s = max(6.0, seconds / 3.0)
             print(f"Measuring {free_s:g} s running free ...", flush=True)
-            page.tell(phase="free", seconds=free_s, settling_s=FREE_SETTLING_S)
+            page.tell(phase="free", parts=parts, seconds=free_s, settling_s=FREE_SETTLING_S)
             free = run(setting, free_course(free_s), page)
             course = power_on_course(seconds, POWERED_FIRMWARE_S if firmware else POWERED_S)
             print(f"Switching the sensor on and off for {course.seconds:g} s ...", flush=True)
-            page.tell(phase="power-ons", seconds=course.seconds)
+            page.tell(phase="power-ons", parts=parts, seconds=course.seconds)
             power_ons = run(setting, course)
             times = min(max(2, round(seconds / 6)), MOST_RESTARTS)
             print(f"Killing and starting the box {times} times ...", flush=True)
-            page.tell(phase="restarts", times=times)
+            page.tell(phase="restarts", parts=parts, times=times)
             restarts = run_restarts(setting, times)
-            seen = []
+            heard = None
+            if setting.sounds:
+                print(f"Listening to the strings for {free_s:g} s ...", flush=True)
+                page.tell(phase="sound", seconds=free_s)
+                heard = run(setting, sound_course(free_s))
+            seen: list[Run] = []
             if light:
                 print(f"Watching the projector's pictures for {free_s:g} s ...", flush=True)
                 seen = [run(setting, course) for course in light_courses(free_s)]
-            evidence = Evidence(locked, free, power_ons, restarts, firmware, *seen)
+            evidence = Evidence(locked, free, power_ons, restarts, firmware, *(seen or (None, None)), heard)
     except (ProbeError, OSError, ValueError) as error:
         message = sentence(error) if isinstance(error, OSError) else None
         print(f"bunraku measure: {message or error}", file=sys.stderr)
@@ -133,6 +141,11 @@ def power_on_course(seconds: float, powered_s: float) -> Course:
     return Course("power-ons", (powered_s + REBOOT_S) * power_ons, seed=3, reboot_every_s=powered_s)
 
 
+def sound_course(seconds: float) -> Course:
+    """In phase, with the strings; the phrase stands still when their cue has faded in."""
+    return Course("sound", seconds + _CUE_S, seconds, drift_ppm=LOCKED_DRIFT_PPM, seed=5, sounds=True)
+
+
 def light_courses(seconds: float) -> tuple[Course, Course]:
     """In phase, with the projector: a hand that steps, one that dances; the phrase soon stands still."""
     steps = Course("light", seconds, seconds - 2.0, drift_ppm=LOCKED_DRIFT_PPM, seed=4, projects=True)
@@ -147,16 +160,19 @@ def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool)
     if not hands:
         raise ProbeError(f"{show}: no sensor holds a joint in this show, so there is no way to follow.")
     followed = next((hand for hand in hands if hand.get("primary")), hands[0])
+    strings, venue = config.get("strings"), _plain_yaml(box) if box is not None else {}
     keys = scratch / "sensors.keys"
     create_keys(keys, list(dict.fromkeys(hand["sensor"] for hand in hands)))
     return Setting(
         show=show.resolve(),
-        box=_plain_yaml(box) if box is not None else {},
+        box=venue,
         keys=keys,
         sensor=followed["sensor"],
         joint=followed["joint"],
         scratch=scratch,
         firmware=firmware,
+        sounds=strings is not None and (box is None or venue.get("sound") is not None),
+        cue=str(next(iter((strings or {}).get("cues") or ()), "")),
     )
 
 

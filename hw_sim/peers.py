@@ -102,7 +102,7 @@ def write_box_file(setting: Setting, folder: Path, ports: tuple[int, int, int], 
 def first_frame(
     receiver: OscReceiver,
     stage: subprocess.Popen[bytes],
-    words: Path,
+    output: Path,
     is_awaited: Callable[[bytes], bool] = lambda frame: True,
     what: str = "frame came",
 ) -> float:
@@ -113,22 +113,22 @@ def first_frame(
             if datagram.startswith(FRAME) and is_awaited(datagram):
                 return arrival
         if stage.poll() is not None:
-            raise ProbeError(f"The box does not dance:\n{words.read_text().strip()}")
-    raise ProbeError(f"No {what} within {STARTS_WITHIN_S:g} s:\n{words.read_text().strip()}")
+            raise ProbeError(f"The box does not dance:\n{output.read_text().strip()}")
+    raise ProbeError(f"No {what} within {STARTS_WITHIN_S:g} s:\n{output.read_text().strip()}")
 
 
-def first_reading(emulator: subprocess.Popen[bytes], log: Path, words: Path) -> None:
+def first_reading(emulator: subprocess.Popen[bytes], log: Path, output: Path) -> None:
     """Wait for it; then give the emulator real-time priority, as hardware waits for no processor."""
     until = time.monotonic() + STARTS_WITHIN_S
     while not (log.exists() and log.read_bytes().count(b"\n") > 1):
         if emulator.poll() is not None or time.monotonic() > until:
-            raise ProbeError(f"The emulator does not send:\n{words.read_text().strip()}")
+            raise ProbeError(f"The emulator does not send:\n{output.read_text().strip()}")
         time.sleep(0.02)
     with contextlib.suppress(OSError):
         os.sched_setscheduler(emulator.pid, os.SCHED_FIFO, os.sched_param(PRIORITY))
 
 
-def stop(stage: subprocess.Popen[bytes], words: Path) -> None:
+def stop(stage: subprocess.Popen[bytes], output: Path) -> None:
     """Stop the box. Raises ProbeError when it does not end, or ends with an error."""
     with contextlib.suppress(ProcessLookupError):
         stage.send_signal(signal.SIGTERM)
@@ -137,7 +137,7 @@ def stop(stage: subprocess.Popen[bytes], words: Path) -> None:
     except subprocess.TimeoutExpired:
         raise ProbeError("The box does not end after SIGTERM.") from None
     if status != 0:
-        raise ProbeError(f"The box ended with status {status}:\n{words.read_text().strip()}")
+        raise ProbeError(f"The box ended with status {status}:\n{output.read_text().strip()}")
 
 
 @contextlib.contextmanager
@@ -159,9 +159,9 @@ def remove_folder(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def process(command: Sequence[str], words: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Runs inside the context, and not longer than this process; its output goes into the file `words`."""
-    with words.open("ab") as out:
+def process(command: Sequence[str], output: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Runs inside the context, and not longer than this process; its output goes into the file `output`."""
+    with output.open("ab") as out:
         running = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,

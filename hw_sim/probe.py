@@ -85,7 +85,7 @@ def run(setting: Setting, course: Course, progress: Progress | None = None) -> R
     folder = setting.scratch / course.name
     folder.mkdir()
     sensors, control = free_ports(2)
-    log, words = folder / "sent.csv", folder / "box.txt"
+    log, output = folder / "sent.csv", folder / "box.txt"
     with ExitStack() as opened:
         receiver = opened.enter_context(OscReceiver(HOST))
         screen = opened.enter_context(closing(Screen())) if course.projects else None
@@ -102,15 +102,15 @@ def run(setting: Setting, course: Course, progress: Progress | None = None) -> R
             phase_lock=course.phase_lock,
         )
         begun = time.monotonic()
-        with process(play_command(setting, box), words) as stage:
-            first = first_frame(receiver, stage, words)
+        with process(play_command(setting, box), output) as stage:
+            first = first_frame(receiver, stage, output)
             emulate = emulate_command(setting, sensors, log, *_options(course))
             with process(emulate, folder / "emulator.txt") as emulator:
                 first_reading(emulator, log, folder / "emulator.txt")
                 live = LiveTransport(progress or Progress(None), log, setting.sensor)
                 with _seen(screen, box, folder) as pictures, closing(live):
                     datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control, live)
-            stop(stage, words)
+            stop(stage, output)
     header, ticks = read_journal(folder / "run.journal")
     return Run(
         frames=_frames(datagrams, header["joints"].index(setting.joint)),
@@ -133,15 +133,15 @@ def _seen(screen: Screen | None, box: Path, folder: Path) -> Iterator[list[Pictu
     if screen is None:
         yield []
         return
-    words = folder / "projector.txt"
-    with process(project_command(box), words) as projector:
+    output = folder / "projector.txt"
+    with process(project_command(box), output) as projector:
         watcher = Watcher(screen)
         watcher.start()
         until = time.monotonic() + STARTS_WITHIN_S
         try:
             while not watcher.pictures:
                 if projector.poll() is not None or time.monotonic() > until:
-                    raise ProbeError(f"The projector shows no picture:\n{words.read_text().strip()}")
+                    raise ProbeError(f"The projector shows no picture:\n{output.read_text().strip()}")
                 time.sleep(0.05)
             yield watcher.pictures
         finally:
@@ -153,7 +153,7 @@ def run_restarts(setting: Setting, times: int) -> list[Restart]:
     folder = setting.scratch / "restarts"
     folder.mkdir()
     sensors, control = free_ports(2)
-    log, words = folder / "sent.csv", folder / "box.txt"
+    log, output = folder / "sent.csv", folder / "box.txt"
     restarts = []
     with OscReceiver(HOST) as receiver, listening_closely():
         box = write_box_file(setting, folder, (sensors, control, receiver.port))
@@ -162,8 +162,8 @@ def run_restarts(setting: Setting, times: int) -> list[Restart]:
             for _ in range(times + 1):
                 receiver.poll_datagrams()  # the last frames of the box before
                 started_at = time.monotonic()
-                with process(play_command(setting, box), words) as stage:
-                    used_at = first_frame(receiver, stage, words, _has_reading, "reading was used")
+                with process(play_command(setting, box), output) as stage:
+                    used_at = first_frame(receiver, stage, output, _has_reading, "reading was used")
                     if killed_at is not None:
                         restarts.append(Restart(killed_at, started_at, used_at))
                     else:

@@ -89,7 +89,7 @@ def _first_readings(axes: Any, evidence: Evidence) -> None:
     for place, (_, seconds, limit) in enumerate(rows):
         axes.plot(seconds, [place] * len(seconds), "o", color=VERMILION, alpha=0.6)
         axes.plot([limit, limit], [place - 0.4, place + 0.4], color=SLATE)
-    axes.set_yticks(range(len(rows)), [words for words, *_ in rows])
+    axes.set_yticks(range(len(rows)), [text for text, *_ in rows])
     axes.set(title="Until a frame carries a reading (line: the limit)", xlabel="s", ylim=(-0.6, 2.6))
     axes.set_xlim(left=0.0)
     axes.invert_yaxis()

@@ -129,11 +129,11 @@ def test_the_box_then_the_simulation_then_the_studio(wheels: dict[str, Path], tm
     page = place.bunraku("--help")
     for one in DISTRIBUTIONS:
         assert f"Not installed here: {one.name}" in page
-        words = place.bunraku(one.commands[0], "--help", status=2)
-        assert words.startswith(
+        output = place.bunraku(one.commands[0], "--help", status=2)
+        assert output.startswith(
             f"bunraku: '{one.commands[0]}' comes with {one.name}, which is not installed here."
         )
-        assert words.endswith(f"Install it: pip install {one.name}\n")
+        assert output.endswith(f"Install it: pip install {one.name}\n")
     assert "Did you mean 'convert'?" in place.bunraku("gltf", status=2)
     assert "the bundle is whole" in place.bunraku("check")
     assert "Danced" in place.bunraku(*play, "--journal", tmp_path / "danced")
@@ -166,8 +166,8 @@ def test_where_moderngl_has_no_wheel_everything_but_the_picture_works(
     )
     assert "Danced" in place.bunraku("play", "--emulate", "--box", box, "--seconds", "1")
     assert " project " in place.bunraku("--help")
-    for words in (("project",), ("project", "--window", "--seconds", "1")):
-        said = place.bunraku(*words, status=2)
+    for arguments in (("project",), ("project", "--window", "--seconds", "1")):
+        said = place.bunraku(*arguments, status=2)
         assert "draws with moderngl, which is not installed here" in said
         assert "pip install 'bunraku[projector]'" in said
 

@@ -96,6 +96,6 @@ def test_beside_its_companions_play_loads_no_web_server() -> None:
 
 
 def loaded_by(*modules: str) -> set[str]:
-    words = f"import sys, {', '.join(modules)}; print(*sorted(sys.modules))"
-    ran = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
+    text = f"import sys, {', '.join(modules)}; print(*sorted(sys.modules))"
+    ran = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
     return set(ran.stdout.split())

@@ -27,6 +27,7 @@ NOTES = {  # for each limit, in the order of the verdict: beginning of its words
     "sensor's power-on": "Somebody switches a sensor on: so long until it leads.",
     "box's restart": "The box is killed: so long from its new start to a led frame.",
     "the same": "The same, counted from the moment at which it was killed.",
+    "hand to sound": "The sensor jumps: so long until the sound card plays the first change.",
     "hand to light": "From the hand to the picture on a screen.",
     "dance to light": "The same for a hand that dances: the wall predicts it.",
 }
@@ -56,17 +57,17 @@ def draw_certificate(folder: Path, out: Path) -> Path:
         mark, colour = ("ok", GOOD) if limit.holds else ("FAIL", BAD)
         value = "nothing came" if limit.value is None else f"{limit.value:.2f} {limit.unit}"
         pen.text((40, y), mark, font=plain, fill=colour)
-        pen.text((110, y), limit.words, font=plain, fill=INK)
+        pen.text((110, y), limit.label, font=plain, fill=INK)
         pen.text((760, y), value, font=plain, fill=INK, anchor="ra")
         pen.text((790, y), f"at most {limit.most:.2f} {limit.unit}", font=plain, fill=FAINT)
-        pen.text((110, y + 25), note_of(limit.words), font=small, fill=FAINT)
+        pen.text((110, y + 25), note_of(limit.label), font=small, fill=FAINT)
     image.quantize(64).save(out, optimize=True)
     return out
 
 
-def note_of(words: str) -> str:
+def note_of(text: str) -> str:
     """The meaning of a limit, by the longest beginning that fits. Raises KeyError for one without a note."""
-    return NOTES[max((begin for begin in NOTES if words.startswith(begin)), key=len, default=words)]
+    return NOTES[max((begin for begin in NOTES if text.startswith(begin)), key=len, default=text)]
 
 
 if __name__ == "__main__":

@@ -221,12 +221,12 @@ def print_table(folder: Path, joint: str) -> None:
     print("| dancer and evening | uncorrected | mean stays zero | stillness | the box |")
     print("|---|---|---|---|---|")
     for dancer in dancers(folder, joint):
-        for words, pauses, table in (
+        for text, pauses, table in (
             ("dances on", False, False),
             ("pauses", True, False),
             ("pauses, on a table before", True, True),
         ):
-            print(row(f"{dancer.name}; {words}", dancer, pauses, table), flush=True)
+            print(row(f"{dancer.name}; {text}", dancer, pauses, table), flush=True)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from tools.lamp_traces import SHOWN_S, Trace, traces
 
 PICTURE = Path("docs/pictures/lamp.png")
 WIDTH, ROW, TOP, HEADING = 1280, 74, 84, 58
-STRIP_X, STRIP, WORDS_X = 248, 440, 742
+STRIP_X, STRIP, TEXT_X = 248, 440, 742
 BACKDROP, INK, FAINT, GROOVE, LIT = "#0f1015", "#efe6d8", "#9a948c", "#262932", "#ffd27a"
 
 
@@ -107,8 +107,8 @@ def _draw_row(axes: Any, row: Row, trace: Trace, y: float) -> None:
     for thickness, alpha in ((39.0, 0.03), (33.0, 0.04), (27.0, 0.06), (21.0, 0.10), (15.0, 1.0)):
         for begun, ended in trace:
             axes.add_patch(_bar(begun, ended, y, thickness, LIT, alpha))
-    axes.text(WORDS_X, y - 11, row.meaning, color=INK, fontsize=14, va="center", weight="bold")
-    axes.text(WORDS_X, y + 14, row.advice, color=FAINT, fontsize=11.5, va="center")
+    axes.text(TEXT_X, y - 11, row.meaning, color=INK, fontsize=14, va="center", weight="bold")
+    axes.text(TEXT_X, y + 14, row.advice, color=FAINT, fontsize=11.5, va="center")
 
 
 def _bar(begun: float, ended: float, y: float, thickness: float, colour: str, alpha: float) -> Any:

@@ -119,9 +119,9 @@ def _drawn(recording: Recording) -> list[Array]:
 def _captioned(picture: Array) -> Image.Image:
     image = Image.fromarray(np.asarray(picture, np.uint8))
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(15)
-    for number, words in enumerate(CAPTIONS):
+    for number, text in enumerate(CAPTIONS):
         middle = (number + 0.5) * HALF[0], HALF[1] - 18
-        pen.text(middle, words, font=font, fill=(200, 192, 180), anchor="mm")
+        pen.text(middle, text, font=font, fill=(200, 192, 180), anchor="mm")
     return image
 
 

@@ -48,7 +48,7 @@ def templates() -> list[str]:
     keys = venue_keys(BoxConfig())
     return [
         *found,
-        *dict.fromkeys(one.words for one in keys),
+        *dict.fromkeys(one.purpose for one in keys),
         *dict.fromkeys(one.within for one in keys if one.within),
     ]
 

@@ -144,14 +144,14 @@ def _dot(x: int, y: int, colour: str, radius: int = 4) -> str:
 def _text(
     x: int,
     y: int,
-    words: str,
+    text: str,
     size: int = 14,
     colour: str = BLACK,
     anchor: str = "start",
     weight: str = "normal",
 ) -> str:
     style = f'font-size="{size}" fill="{colour}" text-anchor="{anchor}" font-weight="{weight}"'
-    return f'<text x="{x}" y="{y}" {style}>{escape(words)}</text>'
+    return f'<text x="{x}" y="{y}" {style}>{escape(text)}</text>'
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Fallbacks: what a process does instead when something goes wrong, each with a name, a counter and words."""
+"""Fallbacks: what a process does instead when something goes wrong: a name, a counter, a message."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ RECENT_S = 5.0  # what happens at one moment counts as in force for this long
 
 
 class Fallback(NamedTuple):
-    """name: for desks and scripts; words: what happened, what the audience sees, what to do.
+    """name: for desks and scripts; message: what happened, what the audience sees, what to do.
 
     named: the same where it is known what it concerns, in the place of `{about}`.
     """
 
     name: str
-    words: str
+    message: str
     named: str = ""
 
 
@@ -29,7 +29,7 @@ class Fallen(NamedTuple):
     name: str
     times: int
     active: bool
-    words: str
+    message: str
     about: str = ""
 
 
@@ -43,8 +43,8 @@ class _Tally:
         self.count, self.active, self.recent_until = 0, False, 0.0
 
     @property
-    def words(self) -> str:
-        usual, named = self.fallback.words, self.fallback.named
+    def message(self) -> str:
+        usual, named = self.fallback.message, self.fallback.named
         return self.complaint or (named.format(about=self.about) if self.about and named else usual)
 
 
@@ -70,7 +70,7 @@ class Fallbacks:
             self.count(name, now, times)
 
     def set(self, name: str, complaint: bool | str) -> None:
-        """In force from now on, or over ("", False); a sentence replaces the usual words. Counts starts."""
+        """In force from now on, or over ("", False); a sentence replaces the usual message. Counts starts."""
         tally = self._tallies[name]
         tally.count += bool(complaint) and not tally.active
         tally.active = bool(complaint)
@@ -89,7 +89,7 @@ class Fallbacks:
     def happened(self, now: float) -> list[Fallen]:
         """Those that ever happened, in their order."""
         return [
-            Fallen(name, one.count, one.active or now < one.recent_until, one.words, one.about)
+            Fallen(name, one.count, one.active or now < one.recent_until, one.message, one.about)
             for name, one in self._tallies.items()
             if one.count
         ]
@@ -105,6 +105,6 @@ def fallen(values: Any) -> tuple[Fallen, ...]:
     found = []
     for value in values if isinstance(values, list) else ():
         if isinstance(value, list) and len(value) in (_LEAST_FIELDS, len(Fallen._fields)):
-            name, times, active, words, *about = value
-            found.append(Fallen(str(name), int(times), bool(active), str(words), *map(str, about)))
+            name, times, active, message, *about = value
+            found.append(Fallen(str(name), int(times), bool(active), str(message), *map(str, about)))
     return tuple(found)

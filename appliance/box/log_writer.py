@@ -12,7 +12,7 @@ from queue import SimpleQueue
 
 WAITING_LINES = 200
 SAID, MOST_SAID = "said", 2000  # the file in the runtime folder, and how many lines it has at least
-_LAST_WORDS_S = 0.5
+_LAST_OUTPUT_S = 0.5
 
 
 class LogWriter:
@@ -48,7 +48,7 @@ class LogWriter:
     def close(self) -> None:
         """Let the last lines out, for as long as half a second."""
         self._lines.put(None)
-        self._thread.join(_LAST_WORDS_S)
+        self._thread.join(_LAST_OUTPUT_S)
 
     def _speak(self) -> None:
         try:

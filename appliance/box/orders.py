@@ -60,7 +60,7 @@ class Answer:
 
     ask: int
     done: bool
-    words: str
+    message: str
 
 
 class OrderInbox:
@@ -88,10 +88,10 @@ class OrderInbox:
                 return order
         return None
 
-    def answer(self, order: Order, done: bool, words: str) -> None:
+    def answer(self, order: Order, done: bool, message: str) -> None:
         """Send the answer, if one is waited for; never blocks, never raises."""
         if order.ask:
-            answer = {"ask": order.ask, "done": done, "words": words}
+            answer = {"ask": order.ask, "done": done, "message": message}
             self._socket.send(ANSWERS, json.dumps(answer).encode())
 
     def close(self) -> None:
@@ -118,7 +118,7 @@ class OrderSender:
         while (received := self._socket.take()) is not None:
             with contextlib.suppress(*_NONSENSE):
                 values = json.loads(received)
-                return Answer(int(values["ask"]), bool(values["done"]), str(values["words"]))
+                return Answer(int(values["ask"]), bool(values["done"]), str(values["message"]))
         return None
 
     def close(self) -> None:

@@ -64,7 +64,7 @@ def enter_realtime(priority: int) -> tuple[str, ...]:
     with contextlib.suppress(OSError, AttributeError):  # the C library of other systems has no such function
         ctypes.CDLL(None).malloc_trim(0)
     missing = (_take_priority(priority), _lock_memory(), _sharpen_timers())
-    return tuple(words for words in missing if words)
+    return tuple(message for message in missing if message)
 
 
 @contextlib.contextmanager

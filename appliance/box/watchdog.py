@@ -14,7 +14,7 @@ LOOK_S = 0.5
 _STOOD_STILL_S = (
     2.0  # between two checks: this process itself was suspended, by Ctrl-Z or by a machine asleep
 )
-_LAST_WORDS_S = 0.5
+_LAST_OUTPUT_S = 0.5
 
 
 class Patience:
@@ -73,7 +73,7 @@ def end_process(message: str, status: int) -> NoReturn:
     # A stopped terminal must not block this.
     saying = threading.Thread(target=_say, args=(message,), daemon=True)
     saying.start()
-    saying.join(_LAST_WORDS_S)
+    saying.join(_LAST_OUTPUT_S)
     os._exit(status)
 
 

@@ -21,7 +21,6 @@ from appliance.show.yaml_file import MAX_BYTES
 from appliance.stage.stage_error import StageError
 
 FROM_PAGE = "page"  # the folder below /data/bunraku in which the page's box file arrives, as from a stick
-FROM_REHEARSAL = "rehearsal"
 _EMPTY = "# The box file of this venue; for what it leaves out the box has values built in.\n"
 _AT_ONCE, _LATER = 0.0, float("inf")
 
@@ -80,7 +79,7 @@ def _at(values: Any, *steps: str) -> Any:
 
 def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, Any]:
     """Check and write it. For JSON: `problems` (nothing was written), or `asks` (nor was it: questions to
-    answer with `sure`), else `words`: what counts from when.
+    answer with `sure`), else `message`: what counts from when.
 
     anew: all units have to start anew now. The page's process sees to it, once its browser has the answer.
     """
@@ -93,7 +92,7 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
     except ConfigError as error:
         return {"problems": [_told(one) for one in error.problems]}
     except ValueError as error:
-        return {"problems": [{"line": 0, "words": str(error)}]}
+        return {"problems": [{"line": 0, "message": str(error)}]}
     if not wanted.sure and (asks := list(_questions(_before(place), config))):
         return {"problems": [], "asks": asks}
     if chosen is not None:
@@ -107,14 +106,14 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
     write_whole(place, text.encode())
     return {
         "problems": [],
-        "words": f"{place} is written; the one before is {before.name}. It counts from the next start of "
+        "message": f"{place} is written; the one before is {before.name}. It counts from the next start of "
         "bunraku play on.",
     }
 
 
-def adopt_show(chosen: Path, folder: Path) -> dict[str, Any]:
-    """Let the copy of a rehearsal dance from now on, as a show from a stick would; for JSON, as `change`."""
-    return _adopt(chosen, look(FROM_REHEARSAL, folder), "show", True)
+def adopt_show(chosen: Path, folder: Path, source: str) -> dict[str, Any]:
+    """Let the show in a folder dance from now on, as one from a stick would; for JSON, as `change`."""
+    return _adopt(chosen, look(source, folder), "show", True)
 
 
 def dance_again(chosen: Path, show: str) -> dict[str, Any]:
@@ -132,7 +131,7 @@ def dance_again(chosen: Path, show: str) -> dict[str, Any]:
         choice._replace(data=places.data).write(places.data / CHOSEN)
         said: list[str] = []
         publish(places, Outcome(choice, True, ()), True, _AT_ONCE, said.append, restarts=False)
-    return {"words": f"The {pair.source} dances again, and after the next power-on too.", "anew": True}
+    return {"message": f"The {pair.source} dances again, and after the next power-on too.", "anew": True}
 
 
 def _place(box: Path | None, chosen: Path | None) -> Path | None:
@@ -159,7 +158,7 @@ def _checked(place: Path, text: str) -> BoxConfig:
 
 
 def _told(one: Problem) -> dict[str, Any]:
-    return {"line": one.line, "words": f"{one.message} {one.cure}".strip()}
+    return {"line": one.line, "message": f"{one.message} {one.cure}".strip()}
 
 
 def _before(place: Path) -> BoxConfig:
@@ -203,16 +202,16 @@ def _adopt(chosen: Path, arrival: Arrival, what: str, now: bool) -> dict[str, An
     places = _places(chosen)
     with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
         outcome = adopt(places, [arrival], candidate_problems, late=True)
-        said = list(outcome.words)
+        said = list(outcome.messages)
         if outcome.taken:
             publish(places, outcome, True, _AT_ONCE if now else _LATER, said.append, restarts=False)
     if not outcome.taken and outcome.choice.refused:
-        return {"problems": [{"line": 0, "words": words} for words in outcome.choice.refused]}
+        return {"problems": [{"line": 0, "message": message} for message in outcome.choice.refused]}
     if not outcome.taken:
-        return {"problems": [], "words": f"This {what} counts already."}
+        return {"problems": [], "message": f"This {what} counts already."}
     when = "now: all but the release starts anew" if now else "after the next power-on"
     return {
         "problems": [],
         "anew": now,
-        "words": f"The {what} is kept and counts {when}. The one before it stays on the box.",
+        "message": f"The {what} is kept and counts {when}. The one before it stays on the box.",
     }

@@ -29,8 +29,8 @@ def check_release(data: Path) -> int:
 
         for pair in (Pair(), *read_choice(data).pairs[:1]):
             problems += _undanced(pair)
-    for words in problems:
-        print(words, file=sys.stderr)
+    for message in problems:
+        print(message, file=sys.stderr)
     print("This release can dance here." if not problems else "This release cannot dance here.")
     return 1 if problems else 0
 

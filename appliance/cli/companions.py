@@ -26,7 +26,7 @@ READY_S = 30.0  # from its start to its first sign, as its unit has it
 _STOOD_STILL_S = 1.0  # between two looks: this process itself was held up, and blames nobody for it
 _OF_OURS = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID")  # a supervisor's of this process
 _LAST_LINE_S = 0.3  # after SIGABRT, at which Python prints where it hangs
-LAST_WORDS_S = 3.0
+LAST_OUTPUT_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -81,16 +81,16 @@ class Companions:
             if self._closing.wait(_LOOK_S / 4):
                 return
         while True:
-            for process, words in () if self._listener is None else self._listener.heard():
+            for process, message in () if self._listener is None else self._listener.heard():
                 for running in self._running:
-                    running.note(process, words, time.monotonic())
+                    running.note(process, message, time.monotonic())
             for running in self._running:
                 running.check(time.monotonic())
             if self._closing.wait(_LOOK_S):
                 break
         for running in self._running:
             running.request_end()
-        until = time.monotonic() + LAST_WORDS_S
+        until = time.monotonic() + LAST_OUTPUT_S
         for running in self._running:
             running.await_end(max(0.0, until - time.monotonic()))
 
@@ -132,11 +132,11 @@ class _Running:
         elif self._process is not None:
             self._watch(self._process, now)
 
-    def note(self, process: int, words: str, now: float) -> None:
+    def note(self, process: int, message: str, now: float) -> None:
         """A sign came from a process, perhaps from this one."""
         if self._process is None or self._process.pid != process:
             return
-        lines = words.splitlines()
+        lines = message.splitlines()
         if ENDING in lines:
             self._silent_at = math.inf
         elif READY in lines or ALIVE in lines:

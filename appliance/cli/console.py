@@ -57,8 +57,8 @@ def serve(context: typer.Context, box: BoxFile = None, chosen: ChosenFile = None
 
     config = load_box(box_of(box, chosen))
     if config.console is None:
-        words = "This box file says `console: null`, so this box serves no page."
-        raise NotAskedForError([Problem(config.file.path, 0, words, "Write `console: {port: 8080}`.")])
+        message = "This box file says `console: null`, so this box serves no page."
+        raise NotAskedForError([Problem(config.file.path, 0, message, "Write `console: {port: 8080}`.")])
     descriptor = open_console_port(config.console).detach()
     print(
         f"The page: {address_of(descriptor, config.console.https)}. Its PIN: bunraku console pin.", flush=True
@@ -171,13 +171,13 @@ def card_lines(box: BoxConfig) -> tuple[str, ...]:
 
 def wifi_lines(box: BoxConfig) -> tuple[str, ...]:
     """Short lines about the Wi-Fi that bunraku-wifi.yaml names; nothing where all is well."""
-    from appliance.cli.join_wifi import WORDS
+    from appliance.cli.join_wifi import MESSAGE_FILE
 
     try:
-        words = (runtime_of(box) / WORDS).read_text("utf-8", "replace")
+        message = (runtime_of(box) / MESSAGE_FILE).read_text("utf-8", "replace")
     except (OSError, StageError):
         return ()
-    return tuple(textwrap.wrap(words, _CARD_LETTERS, max_lines=_CARD_LINES, placeholder=" ..."))
+    return tuple(textwrap.wrap(message, _CARD_LETTERS, max_lines=_CARD_LINES, placeholder=" ..."))
 
 
 def console_command(

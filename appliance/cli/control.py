@@ -42,9 +42,9 @@ def control(
     """Take commands by OSC (go, stop, panic, cues ...), even while the stage hangs or is absent."""
     config = load_box(box_of(box, chosen))
     if config.control is None:
-        words = "This box file says `control: null`, so this box takes no commands."
+        message = "This box file says `control: null`, so this box takes no commands."
         cure = "Write `control: {port: 9002}`."
-        raise NotAskedForError([Problem(config.file.path, 0, words, cure)])
+        raise NotAskedForError([Problem(config.file.path, 0, message, cure)])
     if socket_fd is None:
         socket_fd = _from_systemd()
     if socket_fd is None:

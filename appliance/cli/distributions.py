@@ -24,7 +24,8 @@ DISTRIBUTIONS = (
         "studio",
         (
             *("convert", "retarget", "import", "inspect", "train", "evaluate", "export", "experiment"),
-            *("granular", "improvise", "vary", "map", "path", "duet", "compare-blind"),
+            *("granular", "improvise", "vary", "map", "path", "explore"),
+            *("duet", "compare", "periods", "compare-blind"),
         ),
     ),
 )

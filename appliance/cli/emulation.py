@@ -17,11 +17,11 @@ from appliance.show.box import BoxConfig, UdpConfig
 from appliance.show.show import Show
 from appliance.stage.stage_error import StageError
 
-_LAST_WORDS_S = 2.0
+_LAST_OUTPUT_S = 2.0
 # A double tap, half a second of stillness: the neutral pose is taken; then the hand leads.
 _STAND_STILL_S = 0.8
 _CALLING_WITHIN_S = 15.0
-_WORDS = "emulator.txt"
+_OUTPUT = "emulator.txt"
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     names = [name for name in worn if name not in others]
     journal = box.journal.model_copy(update={"folder": None})
     if worn and not names:
-        (scratch / _WORDS).write_text("No sensor is emulated.\n")
+        (scratch / _OUTPUT).write_text("No sensor is emulated.\n")
         sensors = box.sensors.model_copy(update={"keys": None})
         yield box.model_copy(update={"sensors": sensors, "state": None, "journal": journal})
         return
@@ -45,7 +45,7 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
         raise StageError("This show has no sensors to emulate. Leave --emulate out.")
     if missing := absent_commands().get("emulate"):
         raise StageError(f"No sensor can be emulated: {missing}. Or leave --emulate out.")
-    keys, words = scratch / "sensors.keys", scratch / _WORDS
+    keys, log = scratch / "sensors.keys", scratch / _OUTPUT
     create_keys(keys, names)
     udp = box.sensors.udp or UdpConfig()
     command = [
@@ -53,7 +53,7 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
         *("--host", udp.host, "--port", str(udp.port), "--stand-still", str(_STAND_STILL_S), "--tap"),
     ]
     sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
-    with words.open("wb") as output:
+    with log.open("wb") as output:
         process = start_child(
             command,
             stdout=output,
@@ -64,8 +64,8 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
         yield box.model_copy(update={"sensors": sensors, "state": None, "journal": journal})
     finally:
         if process.poll():
-            print(f"The emulated sensors ended by themselves: {words.read_text()}", file=sys.stderr)
-        end_child(process, _LAST_WORDS_S)
+            print(f"The emulated sensors ended by themselves: {log.read_text()}", file=sys.stderr)
+        end_child(process, _LAST_OUTPUT_S)
 
 
 def wait_until_calling(scratch: Path) -> None:
@@ -74,5 +74,5 @@ def wait_until_calling(scratch: Path) -> None:
     Goes on without them after some seconds, or where they ended.
     """
     deadline = time.monotonic() + _CALLING_WITHIN_S
-    while not (scratch / _WORDS).stat().st_size and time.monotonic() < deadline:
+    while not (scratch / _OUTPUT).stat().st_size and time.monotonic() < deadline:
         time.sleep(0.02)

@@ -49,7 +49,7 @@ def help_file(
     versions: Mapping[str, Any],
     doctor: str | None = None,
 ) -> None:
-    """Write the ZIP file. journal: its folder; None: without. doctor: its words; None: it looks now.
+    """Write the ZIP file. journal: its folder; None: without. doctor: its output; None: it looks now.
 
     A part that cannot be had is replaced by the reason. Raises OSError.
     """

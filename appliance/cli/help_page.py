@@ -33,8 +33,8 @@ def complete_help(command: Any, path: str = "", order: Sequence[str] = ()) -> No
 
 
 def _first_sentence(text: str) -> str:
-    words = " ".join(text.split("\n\n")[0].split())
-    return re.split(r"(?<=[a-z)])[.;] ", words)[0].rstrip(".") + "."
+    flat = " ".join(text.split("\n\n")[0].split())
+    return re.split(r"(?<=[a-z)])[.;] ", flat)[0].rstrip(".") + "."
 
 
 def _value(option: Any, context: Any) -> str | None:
@@ -44,6 +44,6 @@ def _value(option: Any, context: Any) -> str | None:
     kind = _OLDER.get(kind, kind)
     if option.is_flag or kind not in _VALUES:
         return None
-    words = (option.help or "").lower()
-    is_folder = words.startswith(("folder", "show")) or "into this folder" in words
+    explained = (option.help or "").lower()
+    is_folder = explained.startswith(("folder", "show")) or "into this folder" in explained
     return "FOLDER" if kind == "path" and is_folder else _VALUES[kind]

@@ -22,7 +22,7 @@ from appliance.release.choice import RUN
 from appliance.release.wifi import NAME, PROFILE, WifiFile, is_filled_in, profile, read_wifi
 from appliance.show.config_error import ConfigError
 
-WORDS = "wifi.txt"  # in the run folder: what went wrong, for the test card and the doctor
+MESSAGE_FILE = "wifi.txt"  # in the run folder: what went wrong, for the test card and the doctor
 _ACCESS_POINT_PROFILE = "sensors.nmconnection"  # by bunraku-access-point
 _CARD_S, _JOINED_S = 20.0, 40.0
 _RETRY_S = 0.5
@@ -46,16 +46,16 @@ NameBox = Callable[[str], None]
 
 def join_wifi(places: Places, run: Run, wait: Wait, name_box: NameBox) -> int:
     """Apply the newest file; 0, or 1 with words in the run folder."""
-    words = _applied(places, run, wait, name_box)
-    left = places.run / WORDS
+    message = _applied(places, run, wait, name_box)
+    left = places.run / MESSAGE_FILE
     with contextlib.suppress(OSError):
-        if words:
-            write_whole(left, f"{words}\n".encode())
+        if message:
+            write_whole(left, f"{message}\n".encode())
         else:
             left.unlink(missing_ok=True)
-    if words:
-        print(words, flush=True)
-    return 1 if words else 0
+    if message:
+        print(message, flush=True)
+    return 1 if message else 0
 
 
 def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
@@ -68,8 +68,8 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
     try:
         wifi = read_wifi(path)
     except ConfigError as error:
-        words = str(error).replace(f"{path.parent}/", "")  # the wall has room for little
-        return f"{words}\nThe box keeps the network from before."
+        message = str(error).replace(f"{path.parent}/", "")  # the wall has room for little
+        return f"{message}\nThe box keeps the network from before."
     name_box(wifi.hostname)
     is_new = not kept.is_file() or kept.read_bytes() != path.read_bytes()
     try:
@@ -83,12 +83,12 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
     if not card:
         return "The box has no Wi-Fi card that works. Plug an adapter in, or a network cable."
     run(("iw", "reg", "set", wifi.country))
-    words = (
+    message = (
         _made(places, wifi, card, is_new, run) if wifi.access_point else _joined(places, wifi, is_new, run)
     )
-    if is_new and not (words and wifi.access_point):
+    if is_new and not (message and wifi.access_point):
         write_whole(kept, path.read_bytes(), private=True)
-    return words
+    return message
 
 
 def _asks(path: Path) -> bool:

@@ -43,13 +43,13 @@ def list_journal(
 ) -> None:
     """List the runs in a journal: when, how long, what was late, how often the network failed."""
     from appliance.recorder.reading import read_journal
-    from appliance.recorder.timeline import words_of
+    from appliance.recorder.timeline import message_of
 
     for number, run in enumerate(read_journal(_recorded(box, chosen, recorded)).runs, 1):
         typer.echo(readable(_line(number, run)))
         for _, event in run.events if events else ():
             second = event["now"] - float(run.ticks["frame_time"][0])
-            typer.echo(readable(f"   {second:9.2f} s  {event['kind']}: {words_of(event)}"))
+            typer.echo(readable(f"   {second:9.2f} s  {event['kind']}: {message_of(event)}"))
 
 
 @journal.command("timeline")
@@ -99,14 +99,26 @@ def export_journal(
     puppet: Annotated[
         str | None, typer.Option(help="With --bvh or --glb: which puppet of several, by name.")
     ] = None,
+    training: Annotated[
+        Path | None, typer.Option(help="Write a live dancer's dance, hands and cues into this new folder.")
+    ] = None,
 ) -> None:
     """Write the journal into one file that replay, filmstrip and list read, on a stick for example.
 
-    With --bvh or --glb it writes the dance alone, as a recording.
+    With --bvh or --glb it writes the dance alone, as a recording; with --training a folder that bunraku train
+    takes.
     """
     from appliance.recorder.export import export
 
     source = _recorded(box, chosen, recorded)
+    if training is not None:
+        if to is not None or bvh is not None or glb is not None:
+            raise typer.BadParameter("--training writes a folder of its own: leave the others out")
+        from appliance.exchange.training_set import write_training_set
+        from appliance.recorder.reading import read_journal
+
+        typer.echo(write_training_set(read_journal(source), training).sentence())
+        return
     if bvh is not None or glb is not None:
         _export_dance(source, to, {".bvh": bvh, ".glb": glb}, puppet)
         return

@@ -29,25 +29,25 @@ def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> s
     def told() -> bytes:
         limit_memory()
         error = ""
-        with contextlib.redirect_stdout(io.StringIO()) as words:
+        with contextlib.redirect_stdout(io.StringIO()) as output:
             try:
                 do()
             except _FOR_PEOPLE as found:
                 error = str(found)
             except MemoryError:
                 error = f"{network}: the show takes more memory than this box has for one. Export it again."
-        return json.dumps([words.getvalue(), error]).encode()
+        return json.dumps([output.getvalue(), error]).encode()
 
     try:
-        words, error = json.loads(run_with_timeout(seconds, told))
+        message, error = json.loads(run_with_timeout(seconds, told))
     except TimedOutError as reason:
         raise StageError(
             f"{network}: this network was given up ({reason}): it never ends, or it crashes. "
             "Nothing is danced. Export the show again, or copy the bundle again."
         ) from None
     if error:
-        raise StageError(words + error)
-    return str(words)
+        raise StageError(message + error)
+    return str(message)
 
 
 def require_danceable(findings: Sequence[Finding]) -> None:

@@ -64,11 +64,43 @@ def dance_again(show: str, box: str | None = None, chosen: str | None = None) ->
     return box_file.dance_again(_chosen(chosen), show)
 
 
-def adopt_show(folder: str, box: str | None = None, chosen: str | None = None) -> Any:
-    """Let the copy of a rehearsal dance from now on."""
+def adopt_show(
+    folder: str, source: str = "rehearsal", box: str | None = None, chosen: str | None = None
+) -> Any:
+    """Let a show dance from now on: the copy of a rehearsal, or what was learned."""
     from appliance.cli import box_file
 
-    return box_file.adopt_show(_chosen(chosen), Path(folder))
+    return box_file.adopt_show(_chosen(chosen), Path(folder), source)
+
+
+def recordings(folders: list[str]) -> Any:
+    """The folders with recordings in these places, the box's and the stick's, and how long they are."""
+    from appliance.exchange.recorded_minutes import recorded_minutes
+
+    found = []
+    for place, root in zip(("box", "stick"), map(Path, folders), strict=True):
+        inside = sorted(one for one in root.glob("*") if one.is_dir()) if root.is_dir() else []
+        for folder in [root, *inside]:
+            files, minutes = recorded_minutes(folder)
+            if files:
+                name = place if folder == root else f"{place}/{folder.name}"
+                found.append({"name": name, "files": files, "minutes": round(minutes, 1)})
+    return found
+
+
+def use_rehearsal(journal: str, into: str) -> Any:
+    """What a live dancer danced in the journal, as recordings to learn from."""
+    import shutil
+
+    from appliance.exchange.training_set import write_training_set
+    from appliance.recorder.journal_error import JournalError
+    from appliance.recorder.reading import read_journal
+
+    written = write_training_set(read_journal(Path(journal)), Path(into))
+    if not written.recordings:
+        shutil.rmtree(into)
+        raise JournalError("No live dancer danced in this journal: there is nothing to learn from.")
+    return {"name": f"box/{written.folder.name}", "seconds": written.seconds}
 
 
 def help_file(
@@ -133,7 +165,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     one.__name__: one
     for one in (
         *(about, pose_map, keep_cue, box_file, change_box_file, dance_again, adopt_show),
-        *(timelines, stretch, help_file),
+        *(timelines, stretch, help_file, recordings, use_rehearsal),
     )
 }
 

@@ -47,8 +47,8 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
         patience_s = LATE_TURN_S if options.late else TURN_S
         with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
             outcome = _found(options, places)
-            for words in outcome.words:
-                say(words)
+            for message in outcome.messages:
+                say(message)
             publish(places, outcome, options.late, uptime_s, say)
     except BlockingIOError:
         say("Another preflight has not ended. The show before goes on. Plug the stick in again.")
@@ -74,11 +74,11 @@ def _found(options: Options, places: Places) -> Outcome:
             return Outcome.unpacked(run_with_timeout(STICK_S, lambda: chosen().packed()))
         return chosen()
     except TimedOutError as error:
-        words = f"The stick could not be read ({error}). The show before goes on. Try another stick."
+        message = f"The stick could not be read ({error}). The show before goes on. Try another stick."
     except Exception as error:
-        words = f"The new show cannot be checked ({error!r}). The show before goes on. Copy it again."
+        message = f"The new show cannot be checked ({error!r}). The show before goes on. Copy it again."
     outcome = adopt(places, [], candidate_problems)
-    return Outcome(outcome.choice._replace(refused=(words, *outcome.choice.refused)), False, (words,))
+    return Outcome(outcome.choice._replace(refused=(message, *outcome.choice.refused)), False, (message,))
 
 
 def _is_folder(path: Path) -> bool:
@@ -169,9 +169,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return preflight(options, _say, time.clock_gettime(time.CLOCK_BOOTTIME))
 
 
-def _say(words: str) -> None:
+def _say(message: str) -> None:
     with contextlib.suppress(OSError):
-        print(words, flush=True)
+        print(message, flush=True)
 
 
 if __name__ == "__main__":

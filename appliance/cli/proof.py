@@ -109,18 +109,21 @@ def _doctor(proving: Proving, box: Path | None) -> dict[str, Any]:
         findings = json.loads(said)
     except ValueError:
         raise _NotProvenError(f"The doctor did not end its look. {said.strip()[-600:]}") from None
-    told = [{part: for_phone(words) for part, words in one.items()} for one in findings]
+    told = [{part: for_phone(message) for part, message in one.items()} for one in findings]
     return {"holds": all(one["verdict"] != "wrong" for one in findings), "findings": told}
 
 
 def _run(
-    proving: Proving, words: tuple[str, ...], tell: Callable[[], None] = lambda: None, at_rest: bool = False
+    proving: Proving,
+    arguments: tuple[str, ...],
+    tell: Callable[[], None] = lambda: None,
+    at_rest: bool = False,
 ) -> str:
     """The output of one of our commands; ended when it is no longer wanted. at_rest: or when the show goes
     on.
     """
     with tempfile.TemporaryFile() as out, stop_signals() as is_ended:
-        child = start_child((*BUNRAKU, *words), stdout=out, stderr=subprocess.STDOUT)
+        child = start_child((*BUNRAKU, *arguments), stdout=out, stderr=subprocess.STDOUT)
         try:
             while child.poll() is None:
                 if proving.wanted() is None or is_ended():

@@ -17,11 +17,11 @@ _REFUSALS = {
 
 def readings_line(counts: dict[str, int]) -> str:
     """Counts of the sensors' packets: accepted, lost, refused by reason."""
-    words = {reason: words for words, reasons in _REFUSALS.items() for reason in reasons}
+    meanings = {reason: meaning for meaning, reasons in _REFUSALS.items() for reason in reasons}
     refused: dict[str, int] = {}
     for reason, count in counts.items():
         if count and reason not in _NO_REFUSAL:
-            said = words.get(reason, reason)
+            said = meanings.get(reason, reason)
             refused[said] = refused.get(said, 0) + count
     lost = f", {counts['lost']} lost on the way" if counts["lost"] else ""
     reasons = ", ".join(f"{count} {said}" for said, count in refused.items())

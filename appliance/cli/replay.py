@@ -117,5 +117,5 @@ def _show_of(run: Run, given: Path | None) -> Path:
 def _progress(name: str, danced: int, ticks: int) -> None:
     """A line on the terminal that replaces itself; an empty one at the end."""
     if sys.stderr.isatty():
-        words = f"{name}: {danced} of {ticks} ticks" if name else ""
-        print(f"\r{words:<78}\r" if not name else f"\r{words:<78}", end="", file=sys.stderr, flush=True)
+        message = f"{name}: {danced} of {ticks} ticks" if name else ""
+        print(f"\r{message:<78}\r" if not name else f"\r{message:<78}", end="", file=sys.stderr, flush=True)

@@ -28,8 +28,8 @@ async def answer_of(function: str, patience_s: float, **keywords: Any) -> bytes:
     except TimeoutError:
         raise web.HTTPServiceUnavailable(text="Reading this took too long. Try again in a moment.") from None
     if status:
-        words = troubles.decode(errors="replace").strip().rpartition("\n")[2]
-        raise web.HTTPNotFound(text=words.removeprefix("bunraku: ") or "This cannot be read.")
+        message = troubles.decode(errors="replace").strip().rpartition("\n")[2]
+        raise web.HTTPNotFound(text=message.removeprefix("bunraku: ") or "This cannot be read.")
     if len(answer) > LARGEST:
         raise web.HTTPServiceUnavailable(text="That is too much at once.")
     return answer

@@ -44,7 +44,8 @@ class Help:
         async with self._making:
             try:
                 log = [
-                    f"{_clock(one['time'])} {one['unit']}: {one['words']}" for one in await self._logs.lines()
+                    f"{_clock(one['time'])} {one['unit']}: {one['message']}"
+                    for one in await self._logs.lines()
                 ]
             except web.HTTPException as error:
                 log = [error.text or ""]
@@ -54,7 +55,7 @@ class Help:
                 out=str(self._file),
                 journal=self._journal if wanted else None,
                 log=log,
-                status=json.loads(self._view.words),
+                status=json.loads(self._view.text),
                 **self._box,
             )
         host = re.sub(r"[^A-Za-z0-9-]", "", socket.gethostname())

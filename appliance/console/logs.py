@@ -24,7 +24,7 @@ _JOURNALCTL = (
 
 
 class Logs:
-    """Requests for lines: `time` (Unix seconds), `unit`, `words`; the newest last."""
+    """Requests for lines: `time` (Unix seconds), `unit`, `message`; the newest last."""
 
     def __init__(self, guard: Guard, runtime: Path, is_installed: bool) -> None:
         self._guard, self._said, self._is_installed = guard, runtime / SAID, is_installed
@@ -40,8 +40,8 @@ class Logs:
     async def lines(self) -> list[dict[str, Any]]:
         """The last lines, the newest last. Raises 404, 503."""
         lines = await _of_units() if self._is_installed else self._of_play()
-        figures = [line for line in lines if _FIGURES.match(line["words"])]
-        return [line for line in lines if line in figures[-1:] or not _FIGURES.match(line["words"])]
+        figures = [line for line in lines if _FIGURES.match(line["message"])]
+        return [line for line in lines if line in figures[-1:] or not _FIGURES.match(line["message"])]
 
     def _of_play(self) -> list[dict[str, Any]]:
         try:
@@ -51,7 +51,7 @@ class Logs:
                 text="Nothing is kept of what `bunraku play` said: is it running?"
             ) from None
         parts = [line.partition(" ") for line in said]
-        return [_line(float(at), "play", words) for at, _, words in parts if _is_number(at)]
+        return [_line(float(at), "play", text) for at, _, text in parts if _is_number(at)]
 
 
 async def _of_units() -> list[dict[str, Any]]:
@@ -74,14 +74,14 @@ def _of_journal(line: bytes) -> dict[str, Any] | None:
     try:
         entry = json.loads(line)
         unit = str(entry.get("UNIT") or entry["_SYSTEMD_UNIT"])  # UNIT: systemd's messages about a unit
-        at, words = int(entry["__REALTIME_TIMESTAMP"]) / 1e6, entry["MESSAGE"]
+        at, text = int(entry["__REALTIME_TIMESTAMP"]) / 1e6, entry["MESSAGE"]
     except (ValueError, KeyError, TypeError):
         return None
-    return _line(at, unit.removesuffix(".service"), words) if isinstance(words, str) else None
+    return _line(at, unit.removesuffix(".service"), text) if isinstance(text, str) else None
 
 
-def _line(at: float, unit: str, words: str) -> dict[str, Any]:
-    return {"time": at, "unit": unit, "words": words[:_LONGEST]}
+def _line(at: float, unit: str, text: str) -> dict[str, Any]:
+    return {"time": at, "unit": unit, "message": text[:_LONGEST]}
 
 
 def _is_number(text: str) -> bool:

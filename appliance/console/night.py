@@ -63,7 +63,7 @@ class Night:
     def picture(self, now: float) -> str:
         """The figure from the audience, and in words what the page tells."""
         figure = _figure(self._stage.with_ghost, self._stage.facts.get("parents", ()))
-        words = [
+        lines = [
             f'<text x="12" y="{24 + 19 * place}">{escape(line)}</text>'
             for place, line in enumerate(_said(self._box.value, now))
         ]
@@ -72,7 +72,7 @@ class Night:
             f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="#0d0f11"/>'
             f'<path d="M0 {_FLOOR}H{_WIDTH}" stroke="#3d434b"/>'
             f'<g stroke="#eee2ce" stroke-width="9" stroke-linecap="round">{figure}</g>'
-            f'<g fill="#f3ece0" font-family="sans-serif" font-size="14">{"".join(words)}</g></svg>'
+            f'<g fill="#f3ece0" font-family="sans-serif" font-size="14">{"".join(lines)}</g></svg>'
         )
 
     async def _list(self, request: web.Request) -> web.Response:

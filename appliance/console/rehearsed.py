@@ -34,7 +34,7 @@ class Rehearsed:
         return [web.post("/api/cue", self.keep), web.get("/api/cue/show.zip", self.download)]
 
     async def keep(self, request: web.Request) -> web.Response:
-        """Write a cue. Raises 404 with the show's own words where it refuses it."""
+        """Write a cue. Raises 404 with the message of the show where it refuses it."""
         self._guard.require_device(request)
         name = (await said(request)).get("name")
         if not isinstance(name, str) or not 0 < len(name.strip()) <= _LONGEST_NAME or not name.isprintable():
@@ -45,8 +45,8 @@ class Rehearsed:
         cue = present_cue(name.strip(), self._box.value, self._stage.facts)
         async with self._writing:
             places = {"show": str(show), "into": str(self._folder)}
-            words = await answer_of("keep_cue", _PATIENCE_S, cue=cue, **places)
-        return web.json_response({"words": json.loads(words)})
+            message = await answer_of("keep_cue", _PATIENCE_S, cue=cue, **places)
+        return web.json_response({"message": json.loads(message)})
 
     async def download(self, request: web.Request) -> web.StreamResponse:
         """The copy, packed in the layout of a stick."""

@@ -29,7 +29,7 @@ class Reports:
     def __init__(self, after_s: float, every_s: float) -> None:
         self._after_s, self._every_s = after_s, every_s
         self._since: dict[tuple[str, str], float] = {}
-        self._words: dict[tuple[str, str], str] = {}
+        self._messages: dict[tuple[str, str], str] = {}
         self._told: set[tuple[str, str]] = set()
         self._is_on = False
         self._lines: list[str] = []
@@ -42,17 +42,17 @@ class Reports:
             self._is_on = True
             if status["uptime_s"] < _JUST_S:  # else the page's process was restarted, not the box
                 self._lines.append(f"The box is on. Show: {status['show']}.")
-        active = {(one["name"], one["about"]): one["words"] for one in _active(value)}
-        for key, words in active.items():
+        active = {(one["name"], one["about"]): one["message"] for one in _active(value)}
+        for key, message in active.items():
             if now - self._since.setdefault(key, now) >= self._after_s and key not in self._told:
                 self._told.add(key)
-                self._words[key] = words
-                self._lines.append(f"Fallback: {words[:_LONGEST]}")
+                self._messages[key] = message
+                self._lines.append(f"Fallback: {message[:_LONGEST]}")
         for key in self._since.keys() - active.keys():
             del self._since[key]
             if key in self._told:
                 self._told.discard(key)
-                self._lines.append(f"Over: {self._words.pop(key)[:_LONGEST]}")
+                self._lines.append(f"Over: {self._messages.pop(key)[:_LONGEST]}")
         if not self._lines or now - self._sent_at < self._every_s:
             return []
         self._sent_at = now

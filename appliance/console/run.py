@@ -34,7 +34,9 @@ from appliance.console.guard import Guard
 from appliance.console.hands import Hands
 from appliance.console.happened import Happened
 from appliance.console.help import Help
+from appliance.console.learn import Learn
 from appliance.console.logs import Logs
+from appliance.console.midi import Midi
 from appliance.console.night import Night
 from appliance.console.phones import Phones
 from appliance.console.pose_map import PoseMap
@@ -86,20 +88,22 @@ async def _serve(settings: Settings) -> int:
     prove = Prove(guard, folder, Path(settings.kept).parent, settings.box, settings.is_installed)
     logs = Logs(guard, folder, settings.is_installed)
     rehearsed = Path(settings.kept).parent / FOLDER
-    venue = Venue(guard, folder, settings.box, settings.is_installed, rehearsed)
+    venue = Venue(guard, folder, settings.box, settings.is_installed, Path(settings.kept).parent)
+    learn = Learn(guard, Path(settings.kept).parent, settings.journal, settings.box, settings.is_installed)
     night = Night(stage, box, Path(settings.kept).parent)
     helping = Help(guard, box, logs, folder, settings.journal, settings.box)
     hands, rig = Hands(guard, desk, folder), Rig(folder)
     phones = Phones(guard, door, settings.phones, folder, fallbacks)
     others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes(), *phones.routes()]
     update = Update(guard, folder, settings.is_installed, Proving(folder).show_goes)
+    others += Midi(guard, stage, box).routes()
     others += [*night.routes(), *helping.routes(), *update.routes()]
     others += certificate.routes(Path(settings.kept).parent)
     named = ("--box", settings.box["box"]) if "box" in settings.box else ()
     others += SensorChanges(guard, stage, named).routes()
     if settings.rehearsal:
         others += Rehearsed(guard, stage, box, Path(settings.kept).parent).routes()
-        others += [*hands.routes(), *PoseMap(stage).routes()]
+        others += [*hands.routes(), *PoseMap(stage).routes(), *learn.routes()]
     parts = (guard, devices, desk, stage, box, watchers, happened, about, fallbacks)
     told = {"rehearsal": settings.rehearsal, "installed": settings.is_installed}
     app = Server(*parts, lambda: {**told, "cue_kept": (rehearsed / ZIP).is_file()}, others).app()
@@ -111,6 +115,7 @@ async def _serve(settings: Settings) -> int:
     context, serve = _https(settings) if settings.https else None, runner.server
     assert serve is not None
     notifier.ready("The page is served.")
+    await learn.go_on()
     tasks = [
         asyncio.create_task(door.accept(listening, serve, context)),
         asyncio.create_task(door.watch()),
@@ -129,6 +134,7 @@ async def _serve(settings: Settings) -> int:
         task.cancel()
     await watchers.close()
     await prove.close()
+    await learn.close()
     await hands.close()
     phones.close()
     await runner.cleanup()
@@ -167,7 +173,7 @@ async def _pulse(notifier: Notifier, health: ProcessHealthWriter) -> None:
 async def _refresh(box: BoxView, watchers: Watchers) -> None:
     while True:
         box.refresh()
-        watchers.put_words(box.words)
+        watchers.put_text(box.text)
         await asyncio.sleep(_REFRESH_S)
 
 

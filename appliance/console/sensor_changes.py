@@ -22,7 +22,7 @@ _EMULATED = "These sensors are emulated for a rehearsal: there is nothing to cha
 
 
 class SensorChanges:
-    """Runs one command at a time and tells its words as they come. box: options that name the box file."""
+    """Runs one command at a time and passes its output on. box: options that name the box file."""
 
     def __init__(self, guard: Guard, stage: StageView, box: Sequence[str]) -> None:
         self._guard, self._stage = guard, stage
@@ -34,7 +34,7 @@ class SensorChanges:
         return [web.post("/api/sensors", self.change)]
 
     async def change(self, request: web.Request) -> web.StreamResponse:
-        """A line of JSON for each sentence, {"words": ...}; the last one is {"done": ...}."""
+        """A line of JSON for each sentence, {"message": ...}; the last one is {"done": ...}."""
         self._guard.require_device(request)
         wanted = await said(request)
         try:
@@ -77,14 +77,14 @@ class SensorChanges:
                 async with asyncio.timeout(_PATIENCE_S):
                     while left > 0 and (line := await child.stdout.readline()):
                         left -= len(line)
-                        if words := line.decode(errors="replace").strip().removeprefix("bunraku: "):
-                            telling.put_nowait({"words": words})
+                        if message := line.decode(errors="replace").strip().removeprefix("bunraku: "):
+                            telling.put_nowait({"message": message})
                     status = await child.wait()
             except (TimeoutError, ValueError):
                 child.kill()
                 status = await child.wait()
                 telling.put_nowait(
-                    {"words": "This took too long and was ended. Run it again: that mends it."}
+                    {"message": "This took too long and was ended. Run it again: that mends it."}
                 )
             telling.put_nowait({"done": status == 0})
 

@@ -85,14 +85,14 @@ class Server:
         return app
 
     async def _status(self, request: web.Request) -> web.Response:
-        return web.Response(text=self._box.words, content_type="application/json")
+        return web.Response(text=self._box.text, content_type="application/json")
 
     async def _metrics(self, request: web.Request) -> web.Response:
         return web.Response(body=metrics(self._box.value).encode(), headers={"Content-Type": CONTENT_TYPE})
 
     async def _watch(self, request: web.Request) -> web.StreamResponse:
         is_known = self._guard.device(request) is not None
-        return await self._watchers.serve(request, self._box.words, peer(request), is_known)
+        return await self._watchers.serve(request, self._box.text, peer(request), is_known)
 
     async def _frame(self, request: web.Request) -> web.Response:
         frame = self._watchers.polled("ghost" in request.query)
@@ -168,13 +168,13 @@ class Server:
             raise web.HTTPBadRequest(text="Arguments are numbers and texts, 32 at most.")
         try:
             command(address, arguments)  # show control says the same; this keeps its port free of it
-            done, words = await self._desk.send_command(address, arguments)
+            done, message = await self._desk.send_command(address, arguments)
         except ValueError as error:
-            done, words = False, str(error)
+            done, message = False, str(error)
         except NoAnswerError as error:
             raise web.HTTPServiceUnavailable(text=str(error)) from None
         self._refresh_soon()
-        return web.json_response({"done": done, "words": words})
+        return web.json_response({"done": done, "message": message})
 
     def _refresh_soon(self) -> None:
         """All browsers see what a command changed without waiting for the next second."""
@@ -185,7 +185,7 @@ class Server:
 
     async def _refresh(self) -> None:
         self._box.refresh()
-        self._watchers.put_words(self._box.words)
+        self._watchers.put_text(self._box.text)
 
 
 def _are_plain(arguments: object) -> bool:

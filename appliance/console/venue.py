@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ from aiohttp import web
 from appliance.console.body import said
 from appliance.console.child import answer_of
 from appliance.console.guard import Guard
+from appliance.console.learning import FOLDER as LEARNING
+from appliance.console.learning import Learning
+from appliance.console.rehearsed import FOLDER as REHEARSED
 
 _LARGEST_FILE = 1 << 18  # bytes, as in show/yaml_file.py
 _PATIENCE_S = 90.0  # the whole show is checked on a new box file, as from a stick
@@ -24,15 +28,15 @@ _SHOW = re.compile(r"[0-9a-f]{0,64}\+[0-9a-f]{0,64}")
 class Venue:
     """Each in a separate process, one at a time.
 
-    runtime: where the box's processes meet; box: as in Settings; rehearsed: where the copy of the
-    show with its new cues lies.
+    runtime: where the box's processes meet; box: as in Settings; kept: where the copy of the show with its
+    new cues lies, and what was learned.
     """
 
     def __init__(
-        self, guard: Guard, runtime: Path, box: dict[str, str], is_installed: bool, rehearsed: Path
+        self, guard: Guard, runtime: Path, box: dict[str, str], is_installed: bool, kept: Path
     ) -> None:
         self._guard, self._box, self._is_installed = guard, box, is_installed
-        self._rehearsed = rehearsed
+        self._kept = kept
         self._anew = runtime / ANEW
         self._busy = asyncio.Lock()
 
@@ -42,7 +46,8 @@ class Venue:
             web.get("/api/box/file", self._file),
             web.post("/api/box/file", self._change),
             web.post("/api/box/show", self._dance_again),
-            web.post("/api/cue/dance", self._dance_rehearsed),
+            web.post("/api/cue/dance", partial(self._dance_here, REHEARSED, "rehearsal")),
+            web.post("/api/learn/dance", partial(self._dance_here, LEARNING, "learning")),
         ]
 
     async def _file(self, request: web.Request) -> web.Response:
@@ -67,12 +72,14 @@ class Venue:
             raise web.HTTPBadRequest(text="There is no such show.")
         return await self._done("dance_again", show=show)
 
-    async def _dance_rehearsed(self, request: web.Request) -> web.Response:
+    async def _dance_here(self, folder: str, source: str, request: web.Request) -> web.Response:
         self._guard.require_device(request)
         await said(request)
         if not self._is_installed:
             raise web.HTTPBadRequest(text="This box keeps no shows: give bunraku play the copy, with --show.")
-        return await self._done("adopt_show", folder=str(self._rehearsed))
+        if folder == LEARNING and Learning(self._kept / folder).told().get("state") != "learned":
+            raise web.HTTPConflict(text="No show was learned that reaches the bar.")
+        return await self._done("adopt_show", folder=str(self._kept / folder), source=source)
 
     async def _done(self, function: str, **keywords: Any) -> web.Response:
         if self._busy.locked():

@@ -44,7 +44,7 @@ def verdict(
     if missing:
         return Verdict("warning", "sensors_missing", {**counts, "names": ", ".join(missing)})
     if active := [one for one in fallbacks if one["active"]]:
-        return Verdict("warning", "fallbacks", {**counts, "words": active[0]["words"]})
+        return Verdict("warning", "fallbacks", {**counts, "message": active[0]["message"]})
     if status.level <= 0.0:
         return Verdict("held", "dark", counts)
     late = status.late + status.skipped

@@ -1,4 +1,4 @@
-"""Browsers that watch: one slot each for words and for a frame, overwritten, so that the newest wins."""
+"""Browsers that watch: one slot each for the status and for a frame, overwritten, so that the newest wins."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _FEW = 8  # browsers that get each frame; with more of them each gets every seco
 class _Watcher:
     """One browser. is_known: its device gave the PIN; began: monotonic seconds."""
 
-    def __init__(self, address: str, is_known: bool, words: str, transport: asyncio.Transport | None) -> None:
+    def __init__(self, address: str, is_known: bool, text: str, transport: asyncio.Transport | None) -> None:
         self.address, self.is_known, self.began = address, is_known, time.monotonic()
         self.transport = transport
-        self.words: str | None = words
+        self.text: str | None = text
         self.frame: bytes | None = None
         self.wants_frames = self.wants_ghost = False
         self.ready = asyncio.Event()
@@ -40,9 +40,9 @@ class _Watcher:
             while True:
                 await self.ready.wait()
                 self.ready.clear()
-                words, self.words = self.words, None
-                if words is not None:
-                    await browser.send_str(words)
+                text, self.text = self.text, None
+                if text is not None:
+                    await browser.send_str(text)
                 frame, self.frame = self.frame, None
                 if frame is not None:
                     await browser.send_bytes(frame)
@@ -68,10 +68,10 @@ class Watchers:
         """Ticks from one frame to the next."""
         return 1 if sum(one.wants_frames for one in self._watchers) <= _FEW else 2
 
-    def put_words(self, words: str) -> None:
+    def put_text(self, text: str) -> None:
         """For each browser, in place of what it has not taken yet."""
         for one in self._watchers:
-            one.words = words
+            one.text = text
             one.ready.set()
 
     def put_frame(self, frame: bytes, with_ghost: bytes) -> None:
@@ -88,12 +88,12 @@ class Watchers:
         return self._polled[with_ghost]
 
     async def serve(
-        self, request: web.Request, words: str, address: str, is_known: bool
+        self, request: web.Request, text: str, address: str, is_known: bool
     ) -> web.StreamResponse:
         """One browser, from its first word to its last. Where all places are taken, a stranger's is given to
         a device that gave the PIN, and to a stranger from an address that has fewer.
         """
-        watcher = _Watcher(address, is_known, words, request.transport)
+        watcher = _Watcher(address, is_known, text, request.transport)
         if len(self._watchers) >= MOST and not self._make_room(watcher):
             raise web.HTTPServiceUnavailable(text="Too many browsers watch already. Close one.")
         browser = web.WebSocketResponse(

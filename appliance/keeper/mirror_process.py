@@ -28,7 +28,7 @@ _AGAIN = (
     f"The audience sees nothing of it, and it is tried again within {RETRY_S:g} s. If it goes on, read the "
     "keeper's messages."
 )
-_LONGEST_WORDS, _LARGEST_MESSAGE = 2000, 1 << 16  # characters; bytes
+_LONGEST_TEXT, _LARGEST_MESSAGE = 2000, 1 << 16  # characters; bytes
 _SAID, _TURN = "said", "turn"  # kinds of message
 
 
@@ -119,11 +119,11 @@ class MirrorProcess:
                 return
             if not message:
                 return
-            kind, words = json.loads(message)
+            kind, text = json.loads(message)
             if kind == _SAID:
-                self._say(words)
+                self._say(text)
                 continue
-            self._silent_s, self._mirrors_complaint = 0.0, words
+            self._silent_s, self._mirrors_complaint = 0.0, text
             if self._trouble:
                 self._trouble = ""
                 self._say(f"{self._mirrored.name}: it is carried to the disk again.")
@@ -166,7 +166,7 @@ class MirrorProcess:
         status = 1
         try:
             _detach(channel, parent)
-            mirror = Mirror(self._mirrored, lambda words: _send(channel, _SAID, words))
+            mirror = Mirror(self._mirrored, lambda text: _send(channel, _SAID, text))
             with closing(CheckpointReader(self._runtime)) as place:
                 mirror_until(
                     lambda: _is_closed(channel),
@@ -194,10 +194,10 @@ def _detach(channel: socket.socket, parent: int) -> None:
     channel.setblocking(False)
 
 
-def _send(channel: socket.socket, kind: str, words: str) -> None:
+def _send(channel: socket.socket, kind: str, text: str) -> None:
     """To a parent that may be stopped: what finds no room is dropped, and a complaint is sent each turn."""
     with suppress(OSError):
-        channel.send(json.dumps([kind, words[:_LONGEST_WORDS]]).encode())
+        channel.send(json.dumps([kind, text[:_LONGEST_TEXT]]).encode())
 
 
 def _is_closed(channel: socket.socket) -> bool:

@@ -26,16 +26,16 @@ class MirroredRecord:
         state: Path,
         file: SlotFile | WholeFile,
         meaning: Callable[[bytes], object],
-        words: str,
+        message: str,
     ) -> None:
         """meaning: what of a payload has to differ before it is written again; None: it is none of ours.
 
-        words: the complaint, with its `{reason}`.
+        message: the complaint, with its `{reason}`.
         """
         self.name, self.fallback = name, fallback
         self.recovered = f"{state}: {name[0].lower()}{name[1:]} is kept there again."
         self._block, self.folder, self._file, self._meaning = block, state, file, meaning
-        self._words = words
+        self._message = message
         self._on_disk: object = None
         self._folder: tuple[int, int] | None = None
 
@@ -57,7 +57,7 @@ class MirroredRecord:
 
     def explain(self, error: Exception) -> str:
         """The complaint."""
-        return self._words.replace("{reason}", reason_of(error))
+        return self._message.replace("{reason}", reason_of(error))
 
     def close(self) -> None:
         """Release both files."""
@@ -78,22 +78,22 @@ def mirrored_checkpoint(runtime: Path, state: Path) -> MirroredRecord:
         place = unpacked(payload)
         return None if place is None else replace(place, tick=0)
 
-    words = (
+    message = (
         f"{state}: the place of the dance cannot be kept there ({{reason}}). The dance goes on, even after a "
         "crash; after a power cut it begins at the beginning. Free or mend the disk, or give another folder "
         "as `state:` in the box file."
     )
     file = SlotFile(state / PLACE.name)
     name = "The place of the dance"
-    return MirroredRecord(name, PLACE_NOT_KEPT, PLACE.reader(runtime), state, file, meaning, words)
+    return MirroredRecord(name, PLACE_NOT_KEPT, PLACE.reader(runtime), state, file, meaning, message)
 
 
 def mirrored_sensor_memory(runtime: Path, state: Path) -> MirroredRecord:
     """The same folders."""
-    words = (
+    message = (
         f"{state}: neutral poses and calibrations cannot be kept there ({{reason}}). The show goes on; after "
         "a power cut sensors need a moment of stillness again. Make the folder writable, or give another one "
         "as `state:` in the box file."
     )
     block, file = memory_record(state).reader(runtime), memory_file(state)
-    return MirroredRecord("The sensors' memory", SENSORS_NOT_KEPT, block, state, file, bytes, words)
+    return MirroredRecord("The sensors' memory", SENSORS_NOT_KEPT, block, state, file, bytes, message)

@@ -46,7 +46,7 @@ class Form:
     optional: int = 0
     may_be_nameless: bool = False
 
-    def words(self) -> str:
+    def syntax(self) -> str:
         """The arguments, for people."""
         text = f"[{self.text}]" if self.text and self.may_be_nameless else self.text
         fewest = len(self.numbers) - self.optional

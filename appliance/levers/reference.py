@@ -46,10 +46,10 @@ def _row(one: Address) -> str:
 
 def arguments(one: Address) -> str:
     """The arguments of an address, with the fade that is taken where none is given."""
-    if one.arguments or one.form.words() == "nothing":
+    if one.arguments or one.form.syntax() == "nothing":
         return one.arguments.strip()
     default = f"; {one.fade_s:g}" if one.fade_s else ""
-    return one.form.words().replace(f"[{FADE}]", f"[fade in seconds{default}]")
+    return one.form.syntax().replace(f"[{FADE}]", f"[fade in seconds{default}]")
 
 
 def _answers() -> Iterator[str]:

@@ -347,8 +347,8 @@ def _made(source: str, parameter: str) -> Lever[float]:
 
 def _points_said(points: tuple[float, ...], seconds: float) -> str:
     count = len(points) // 2
-    words = {0: "The path is the phrase's own again.", 1: "The path stays at this point of the map."}
-    return words.get(count, f"The path is a line of {count} points, there and back.")
+    messages = {0: "The path is the phrase's own again.", 1: "The path stays at this point of the map."}
+    return messages.get(count, f"The path is a line of {count} points, there and back.")
 
 
 MADE_NUMBERS: dict[str, dict[str, Lever[float]]] = {

@@ -58,10 +58,10 @@ class OrderedWalk:
         return None if self._walking is None else self._walking.values
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Tells the technician what to look at now."""
         step = None if self._walking is None else self._walking.step
-        return "" if step is None else f"{step.fixture}: {step.attribute}, {step.words}"
+        return "" if step is None else f"{step.fixture}: {step.attribute}, {step.description}"
 
     def levels(self, show_state: ShowState, now: float) -> dict[int, bytes] | None:
         """512 levels for each universe; None: there is no walk, the dance counts."""

@@ -42,8 +42,8 @@ def print_rig(
     if problems:
         raise ConfigError(problems)
     if mapping is not None and mapping not in names:
-        words = f"The show has no mapping '{mapping}'. {did_you_mean(mapping, names)}"
-        raise UnknownNameError("--mapping", words)
+        message = f"The show has no mapping '{mapping}'. {did_you_mean(mapping, names)}"
+        raise UnknownNameError("--mapping", message)
     config = at_venue(show.config.lights, box.lights)
     patch = Patch(config.fixtures, show.directory)
     config = with_usual_mapping(config, patch, show.skeleton)

@@ -51,8 +51,8 @@ def walk_rig(
         say(f"{len(to_see)} steps of {step_s:g} s or more; Ctrl-C ends the walk, and all goes dark.")
         walk(patch, to_see, step_s, box.lights.rate_hz, send_levels, say, stopped)
         for universe in universes:
-            for words in filter(None, (universe.wire.trouble, universe.wire.remark)):
-                say(words)
+            for message in filter(None, (universe.wire.trouble, universe.wire.remark)):
+                say(message)
 
 
 def _require_known(show: Show, fixtures: list[str], attribute: str | None) -> None:

@@ -25,7 +25,7 @@ class Step:
 
     fixture: str
     attribute: str
-    words: str
+    description: str
     place: int
 
 
@@ -36,10 +36,10 @@ def steps(patch: Patch, fixtures: Sequence[str] = (), attribute: str | None = No
             continue
         for place, slot in enumerate(patch.slots):
             if slot.fixture is fixture and attribute in (None, slot.name, slot.base):
-                yield Step(fixture.name, slot.name, _words(slot), place)
+                yield Step(fixture.name, slot.name, _meaning(slot), place)
         if any(head.fixture is fixture for head in patch.heads.heads) and attribute in (None, AIM):
-            words = f"points at the origin of the stage, {CHEST_M:g} m above the floor"
-            yield Step(fixture.name, AIM, words, -1)
+            description = f"points at the origin of the stage, {CHEST_M:g} m above the floor"
+            yield Step(fixture.name, AIM, description, -1)
 
 
 def introduction(patch: Patch, fixture: str) -> str:
@@ -110,7 +110,7 @@ class Walk:
                 values[place] = 0.0
 
 
-def _words(slot: Slot) -> str:
+def _meaning(slot: Slot) -> str:
     channels = [f"{channel % UNIVERSE_CHANNELS + 1}" for channel in slot.channels]
     where = f"channel {' and '.join(channels)}" if channels else "by its colours"
     if slot.base in (PAN, TILT):
@@ -174,6 +174,6 @@ def walk(
             if said is None or walking.step.fixture != said.fixture:
                 say(introduction(patch, walking.step.fixture))
             said = walking.step
-            say(f"  {said.attribute}, {said.words}")
+            say(f"  {said.attribute}, {said.description}")
         now = show(levels)
     show(dark)

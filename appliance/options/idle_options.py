@@ -16,8 +16,8 @@ def refuse_idle(context: typer.Context, names: Iterable[str], where: str) -> Non
     idle = [options[name] for name in names if is_written(context, name)]
     if idle:
         one = len(idle) == 1
-        words = f"{', '.join(idle)} {'does' if one else 'do'} nothing {where}"
-        raise typer.BadParameter(f"{words}. Leave {'it' if one else 'them'} out.")
+        message = f"{', '.join(idle)} {'does' if one else 'do'} nothing {where}"
+        raise typer.BadParameter(f"{message}. Leave {'it' if one else 'them'} out.")
 
 
 def is_written(context: typer.Context, name: str) -> bool:

@@ -38,8 +38,8 @@ def reading_options(command: Callable[..., T]) -> Callable[..., T]:
     return run
 
 
-def _option(words: str, metavar: str) -> Any:
-    return Annotated[list[str] | None, typer.Option(help=words, metavar=metavar, rich_help_panel=_GROUP)]
+def _option(text: str, metavar: str) -> Any:
+    return Annotated[list[str] | None, typer.Option(help=text, metavar=metavar, rich_help_panel=_GROUP)]
 
 
 OPTIONS: dict[str, tuple[Any, Any]] = {
@@ -60,11 +60,11 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
 
 def _parsed(name: str, several: list[str]) -> dict[str, Any]:
     """Pattern to value. Raises typer.BadParameter."""
-    return dict(_pair(name, words) for words in several)
+    return dict(_pair(name, text) for text in several)
 
 
-def _pair(name: str, words: str) -> tuple[str, Any]:
-    pattern, separator, value = words.rpartition("=")
+def _pair(name: str, text: str) -> tuple[str, Any]:
+    pattern, separator, value = text.rpartition("=")
     pattern = pattern if separator else "*"
     if name == "root":
         return pattern, value
@@ -72,7 +72,7 @@ def _pair(name: str, words: str) -> tuple[str, Any]:
     if known is not None:
         value = value.casefold().removeprefix("+")
         if value not in known:
-            raise _refusal(name, words, f"one of {', '.join(known)}")
+            raise _refusal(name, text, f"one of {', '.join(known)}")
         return pattern, value
     least, most = (1.0, 1000.0) if name == "true_fps" else (1e-6, 10.0)
     try:
@@ -80,17 +80,17 @@ def _pair(name: str, words: str) -> tuple[str, Any]:
     except ValueError:
         number = 0.0
     if not least <= number <= most:
-        raise _refusal(name, words, f"{_WORDS[name]}, {least:g} to {most:g}, or PATTERN={_EXAMPLES[name]}")
+        raise _refusal(name, text, f"{_KINDS[name]}, {least:g} to {most:g}, or PATTERN={_EXAMPLES[name]}")
     return pattern, number
 
 
-_WORDS = {"true_fps": "a rate", "metres_per_unit": "a unit in metres"}
+_KINDS = {"true_fps": "a rate", "metres_per_unit": "a unit in metres"}
 _EXAMPLES = {
     "true_fps": "FPS ('salsa_*=60')",
     "metres_per_unit": "METRES ('solo_*=0.0254')",
 }
 
 
-def _refusal(name: str, words: str, wanted: str) -> typer.BadParameter:
+def _refusal(name: str, text: str, wanted: str) -> typer.BadParameter:
     option = f"--{name.replace('_', '-')}"
-    return typer.BadParameter(f"'{words}' is not {wanted}.", param_hint=option)
+    return typer.BadParameter(f"'{text}' is not {wanted}.", param_hint=option)

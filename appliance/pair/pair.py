@@ -7,7 +7,7 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from appliance.pair import wire
@@ -145,6 +145,10 @@ class Pair:
     def take_message(self) -> bytes | None:
         """The follower: the next message, once it and all before are whole."""
         return None if self._needs_keyframe else self._incoming.take()
+
+    def take_rest(self) -> Iterator[bytes]:
+        """The box that takes over: what has come of messages behind one that is missing."""
+        return iter(()) if self._needs_keyframe else self._incoming.take_rest()
 
     def ask(self, now: float) -> None:
         """The follower: ask for what is missing."""

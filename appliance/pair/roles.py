@@ -10,8 +10,9 @@ FIRST_WAITS_S = 0.4  # at the start, for a box that leads already; the second le
 SECOND_WAITS_S = 6.0
 UNREADY_WAITS_S = 2.0  # a follower that knows no dance yet gives the first's stage time to restart
 YIELDS_S = 0.15  # a leader that gave back and hears nobody leads again
+SHORT_S = 2.0  # a box that lost the lead so soon after it had taken it waits longer before it takes it again
 MOST_PATIENCE_S = 0.5
-PATIENCE_FOR_S = 600.0  # without another false takeover it is forgotten
+PATIENCE_FOR_S = 30.0
 
 
 class Role(IntEnum):
@@ -84,7 +85,9 @@ class Roles:
                     self._become(Role.FOLLOWS, now, "it leads")
                 self.epoch = max(self.epoch, heard.epoch)
             elif (heard.epoch, not self.is_first) > (self.epoch, self.is_first):
-                self._lose_patience_less(now)
+                if now - self._since < SHORT_S:
+                    self.patience_s = min(2.0 * self.patience_s, MOST_PATIENCE_S)
+                    self._deposed_at = now
                 self._become(Role.FOLLOWS, now, "it took over")
                 self.epoch = heard.epoch
         elif heard.role is Role.YIELDS:
@@ -121,11 +124,6 @@ class Roles:
     def _lead(self, now: float, why: str) -> None:
         self.epoch += 1
         self._become(Role.LEADS, now, why)
-
-    def _lose_patience_less(self, now: float) -> None:
-        """Deposed while alive: this box or the network halted for a moment, and may again."""
-        self.patience_s = min(2.0 * self.patience_s, MOST_PATIENCE_S)
-        self._deposed_at = now
 
     def _become(self, role: Role, now: float, why: str) -> None:
         self.role, self._since, self.why = role, now, why

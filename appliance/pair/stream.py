@@ -132,6 +132,13 @@ class Incoming:
             self.next += 1
         return whole
 
+    def take_rest(self) -> Iterator[bytes]:
+        """The leader is gone: what has come of its messages, in order, without those that are missing."""
+        for number in sorted(self._open):
+            if (whole := self._open[number].whole) is not None:
+                yield whole
+        self.begin_at(self.newest + 1)
+
     def missing(self, now: float) -> list[int]:
         """Numbers to ask for now: of messages older than the newest, or of which a part is missing."""
         wanted = []

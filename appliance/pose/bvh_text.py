@@ -262,8 +262,8 @@ def _read_rate(lines: _Lines, true_fps: float | None) -> tuple[float | None, lis
     time = float(said.replace(",", ".", 1)) if _is_number(said.replace(",", ".", 1)) else np.nan
     guessed = _rate_that_is_no_time(time)
     if guessed is not None:
-        words_for = f"line {lines.number}: a frame time of {said} read as {guessed:.5g} poses a second"
-        return guessed, [] if true_fps else [f"{words_for} (otherwise: --true-fps)"]
+        guess = f"line {lines.number}: a frame time of {said} read as {guessed:.5g} poses a second"
+        return guessed, [] if true_fps else [f"{guess} (otherwise: --true-fps)"]
     if _SHORTEST_S <= time <= _LONGEST_S:
         return 1.0 / time, []
     if true_fps is None:

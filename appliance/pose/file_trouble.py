@@ -39,8 +39,8 @@ def sentence(error: OSError, path: Path | None = None) -> str | None:
         return _absent(named)
     if named is None and error.errno not in _DISK:
         return None
-    words = _SENTENCES.get(error.errno or 0, "{}: " + f"{error.strerror or error}. Check this file.")
-    return words.format("A file could not be written" if named is None else named)
+    message = _SENTENCES.get(error.errno or 0, "{}: " + f"{error.strerror or error}. Check this file.")
+    return message.format("A file could not be written" if named is None else named)
 
 
 def _absent(path: Path) -> str:

@@ -72,11 +72,11 @@ class KeptRows:
                 done = one if len(places) == 1 else several
                 why = f" ({self.why})" if self.lost[0][1] == places[0] else ""
                 count = counted(len(places), "row" if self.unit == "line" else self.unit)
-                found.append(f"{place_words(places, self.unit)}: {count} lost{why}, {done}")
+                found.append(f"{place_text(places, self.unit)}: {count} lost{why}, {done}")
         return found + ([f"{self.stopped}; what follows is left out"] if self.stopped else [])
 
 
-def place_words(places: Sequence[int], unit: str) -> str:
+def place_text(places: Sequence[int], unit: str) -> str:
     """Rising places in words: 'line 7', 'lines 7 to 9, 12'."""
     spans: list[list[int]] = []
     for place in places:

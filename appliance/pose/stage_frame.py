@@ -54,12 +54,12 @@ class FileConventions:
 class Guess(NamedTuple):
     """A change made to a recording, in words, and the option that overrides it ('': asked for)."""
 
-    words: str
+    message: str
     option: str
 
     def sentence(self) -> str:
         """'turned from Z up to Y up (otherwise: --up y)'."""
-        return f"{self.words} (otherwise: {self.option})" if self.option else self.words
+        return f"{self.message} (otherwise: {self.option})" if self.option else self.message
 
 
 AS_GUESSED = FileConventions()
@@ -74,13 +74,13 @@ def in_stage_frame(
     """
     guesses = []
     if conventions.metres_per_unit is None:
-        scale, words = _guessed_scale(recording.skeleton, unit_m)
+        scale, message = _guessed_scale(recording.skeleton, unit_m)
     else:
-        scale, words = conventions.metres_per_unit / unit_m, ""
+        scale, message = conventions.metres_per_unit / unit_m, ""
     if scale != 1.0:
         recording = _scaled(recording, scale)
-    if words:
-        guesses.append(Guess(words, "--metres-per-unit"))
+    if message:
+        guesses.append(Guess(message, "--metres-per-unit"))
     if not len(recording):
         return recording, guesses
     wanted = conventions.root
@@ -92,9 +92,9 @@ def in_stage_frame(
     if (conventions.up or ("z" if _is_z_up(recording) else "y")) == "z":
         guesses.append(Guess("turned from Z up to Y up", "" if conventions.up else "--up y"))
         recording = _turned_upright(recording)
-    recording, words = _faced(recording, conventions.facing)
-    if words:
-        guesses.append(Guess(words, "" if conventions.facing else "--facing z"))
+    recording, message = _faced(recording, conventions.facing)
+    if message:
+        guesses.append(Guess(message, "" if conventions.facing else "--facing z"))
     floor = floor_m(recording.skeleton, sampled_positions(recording)) if recording.skeleton.feet else 0.0
     if abs(floor) > FLOOR_M:
         recording = replace(recording, roots=recording.roots - np.array([0.0, floor, 0.0]))
@@ -115,8 +115,10 @@ def _guessed_scale(skeleton: Skeleton, unit_m: float) -> tuple[float, str]:
     if not SMALLEST_M <= sizes[unit] <= LARGEST_M:
         return 1.0, ""
     usual = next(name for name, metres in UNITS.items() if metres == unit_m)
-    words = f"lengths read as {unit}: in {usual} there would be {span / unit_m:.2g} of them from hand to foot"
-    return UNITS[unit] / unit_m, words
+    message = (
+        f"lengths read as {unit}: in {usual} there would be {span / unit_m:.2g} of them from hand to foot"
+    )
+    return UNITS[unit] / unit_m, message
 
 
 def _scaled(recording: Recording, scale: float) -> Recording:
@@ -210,23 +212,23 @@ def _faced(recording: Recording, facing: str | None) -> tuple[Recording, str]:
 
     Whole quarter turns, so that axes stay axes. facing: of the dance; None: guessed.
     """
-    words, given = [], 0 if facing is None else FACINGS[facing]
+    messages, given = [], 0 if facing is None else FACINGS[facing]
     skeleton = recording.skeleton
     rest = rest_positions(skeleton)
     at_rest = _quarters(fronts(skeleton, rest)) if stands(skeleton, rest) else 0
     if at_rest and facing != "z":
         recording = _axes_turned(recording, _quarter_turn(-at_rest))
-        words.append(f"the zero pose, which faces {_side(at_rest)}, turned to the audience")
+        messages.append(f"the zero pose, which faces {_side(at_rest)}, turned to the audience")
         given = 0 if facing is None else (given - at_rest) % 4
     if facing is None:
         given = _quarters(fronts(skeleton, sampled_positions(recording)))
         if given:
-            words.append(f"the dance, which mostly faces {_side(given)}, turned to the audience")
+            messages.append(f"the dance, which mostly faces {_side(given)}, turned to the audience")
     if given and facing != "z":
         recording = _room_turned(recording, _quarter_turn(-given))
         if facing is not None:
-            words.append("turned to the audience")
-    return recording, "; ".join(words)
+            messages.append("turned to the audience")
+    return recording, "; ".join(messages)
 
 
 def _quarters(front: Array | None) -> int:

@@ -62,10 +62,10 @@ class Controls:
     def nudge(self, corner: int, dx: float, dy: float) -> tuple[bool, str]:
         """Move one corner, 0 to 3; whether it was done, and where it is now."""
         x, y = self.alignment.corners[corner]
-        done, words = self.place(corner, (x + dx, y + dy))
+        done, message = self.place(corner, (x + dx, y + dy))
         x, y = self.alignment.corners[corner]
         here = f"The {_CORNER_NAMES[corner]} corner is at ({x:.4f}, {y:.4f})."
-        return done, here if done else f"{words} {here}"
+        return done, here if done else f"{message} {here}"
 
     def place(self, corner: int, point: Point) -> tuple[bool, str]:
         """Put one corner there, 0 to 3; whether it was done, and a sentence."""

@@ -221,9 +221,9 @@ class Run:
             if key is None:
                 self._controls.is_over = True
                 continue
-            words = press(key, self._controls, self._window.size)
-            if words:
-                self._say(words)
+            message = press(key, self._controls, self._window.size)
+            if message:
+                self._say(message)
         if self._controls.wants_fullscreen:
             self._controls.wants_fullscreen = False
             self._window.toggle_fullscreen()
@@ -244,8 +244,8 @@ class Run:
         width, height = self._window.size
         share = self._resolution.share
         self._publish_health(now, state, share)
-        has_words = self._controls.shows_info or self._controls.shows_test_card
-        where = self._options.card() if has_words else ()
+        has_lettering = self._controls.shows_info or self._controls.shows_test_card
+        where = self._options.card() if has_lettering else ()
         drawn_at = "" if share == 1.0 else f" at {share:.0%}"
         age = "-" if figures.age_p50_ms is None else f"{figures.age_p50_ms:.0f} / {figures.age_p99_ms:.0f} ms"
         self._lines = (

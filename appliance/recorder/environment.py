@@ -17,7 +17,7 @@ from appliance.show.bundle import LARGEST_FILE
 CPU_INFO = Path("/proc/cpuinfo")
 _UNKNOWN = "unknown"
 _ABILITIES = ("cpu family", "model", "stepping", "flags", "CPU variant", "CPU revision", "Features")
-_WORDS = {
+_LABELS = {
     "machine": "the machine",
     "cpu": "the processor",
     "python": "Python",
@@ -45,8 +45,8 @@ def fingerprints(directory: Path, names: Sequence[str]) -> dict[str, str]:
 def differing_software(recorded: dict[str, Any], here: dict[str, str]) -> list[str]:
     """Differences of machine and software from those of the recording, in words."""
     return [
-        f"{words} ({recorded.get(name, _UNKNOWN)} then, {here[name]} here)"
-        for name, words in _WORDS.items()
+        f"{message} ({recorded.get(name, _UNKNOWN)} then, {here[name]} here)"
+        for name, message in _LABELS.items()
         if recorded.get(name) != here[name]
     ]
 

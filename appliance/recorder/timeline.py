@@ -49,16 +49,16 @@ def timeline(number: int, run: Run) -> dict[str, Any]:
         "failed": of((ticks["flags"] & NOT_FINITE) != 0),
         "slowest_ms": slowest.round(2).tolist(),
         "events": [
-            [round(event["now"] - begun, 2), event["kind"], words_of(event)]
+            [round(event["now"] - begun, 2), event["kind"], message_of(event)]
             for _, event in run.events[-MOST_EVENTS:]
         ],
     }
 
 
-def words_of(event: dict[str, Any]) -> str:
+def message_of(event: dict[str, Any]) -> str:
     """An order, and the reply to it."""
     asked = event.get("order", {})
-    parts = [asked.get("name", ""), asked.get("text", ""), *asked.get("values", ()), event.get("words", "")]
+    parts = [asked.get("name", ""), asked.get("text", ""), *asked.get("values", ()), event.get("message", "")]
     refused = ["(refused)"] * (event.get("done") is False)
     return _LONG_WORD.sub("…", " ".join(filter(None, map(str, [*parts, *refused]))))
 

@@ -28,7 +28,7 @@ def about(chosen: Path | None, box: Path | None, home: Path = HOME) -> dict[str,
         if choice
         else [],
         "refused": list(choice.refused) if choice else [],
-        "aside": [one.words for one in choice.aside] if choice else [],
+        "aside": [one.message for one in choice.aside] if choice else [],
         "box_file": None if box is None else str(box),
         "version": version("bunraku"),
         "release": current.resolve().name if (current := home / "current").is_dir() else None,

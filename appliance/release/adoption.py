@@ -36,21 +36,21 @@ class Places(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """choice: to be kept; taken: something new dances from now on; words: what people should know."""
+    """choice: to be kept; taken: something new dances from now on; messages: what people should know."""
 
     choice: Choice
     taken: bool
-    words: tuple[str, ...]
+    messages: tuple[str, ...]
 
     def packed(self) -> bytes:
         """For the process that waits for it."""
-        return json.dumps([self.choice.plain(), self.taken, self.words]).encode()
+        return json.dumps([self.choice.plain(), self.taken, self.messages]).encode()
 
     @staticmethod
     def unpacked(answer: bytes) -> Outcome:
         """As packed; raises ValueError."""
-        choice, taken, words = json.loads(answer)
-        return Outcome(Choice.of(choice), bool(taken), tuple(words))
+        choice, taken, messages = json.loads(answer)
+        return Outcome(Choice.of(choice), bool(taken), tuple(messages))
 
 
 def read_choice(data: Path) -> Choice:
@@ -75,7 +75,10 @@ def adopt(places: Places, arrivals: list[Arrival], check: Check, late: bool = Fa
     lost = _lost(places.data, seen)
     fresh = [one for one in arrivals if one.listing and _is_new(one, seen, lost)]
     refused = [
-        words for one in arrivals if one.listing and one not in fresh for words in seen[one.source]["refused"]
+        message
+        for one in arrivals
+        if one.listing and one not in fresh
+        for message in seen[one.source]["refused"]
     ]
     if not fresh:
         return Outcome(before._replace(refused=tuple(refused)), False, ())
@@ -114,10 +117,10 @@ def _take(
             newest, problems = _on_shelf(shelf, places, arrival, choice, check)
         except UnreadableError as error:
             cure = "Was it pulled? Plug it in again, or copy the show again."
-            return None, [_printable(f"{arrival.words.capitalize()}: {error} {_GOES_ON} {cure}")], False
+            return None, [_printable(f"{arrival.label.capitalize()}: {error} {_GOES_ON} {cure}")], False
         except NoRoomError as error:
             no_room = (
-                f"{arrival.words.capitalize()}: no room for its show ({error}). {_GOES_ON} Free some room."
+                f"{arrival.label.capitalize()}: no room for its show ({error}). {_GOES_ON} Free some room."
             )
         else:
             return newest, problems, root == places.data
@@ -136,13 +139,13 @@ def _on_shelf(
         danced = (show_id, show) if with_show else (before.show_id, before.show)
         boxed = (box_id, original) if with_box else (before.box_id, before.box)
         if problems := check(danced[1], boxed[1]):
-            first_problems = first_problems or [_as_on_the_stick(words, copies) for words in problems]
+            first_problems = first_problems or [_as_on_the_stick(message, copies) for message in problems]
             continue
         if with_box:
             boxed = (box_id, shelf.furnish(original, places.moved))
         source = _named(arrival, with_show, with_box)
         return Pair(danced[1], boxed[1], f"{danced[0]}+{boxed[0]}", source), first_problems
-    return None, [*first_problems, f"{arrival.words.capitalize()} is refused. {_GOES_ON}"]
+    return None, [*first_problems, f"{arrival.label.capitalize()} is refused. {_GOES_ON}"]
 
 
 def _combinations(arrival: Arrival) -> Iterator[tuple[bool, bool]]:
@@ -157,19 +160,19 @@ def _combinations(arrival: Arrival) -> Iterator[tuple[bool, bool]]:
 
 def _named(arrival: Arrival, with_show: bool, with_box: bool) -> str:
     what = "show and box file" if with_show and with_box else "show" if with_show else "box file"
-    return f"{what} from {arrival.words}"
+    return f"{what} from {arrival.label}"
 
 
-def _as_on_the_stick(words: str, copies: dict[str, str]) -> str:
+def _as_on_the_stick(message: str, copies: dict[str, str]) -> str:
     """The path that people find on their stick, not the copy that was checked."""
     for copy, source in copies.items():
-        words = words.replace(copy, source)
-    return _printable(words)
+        message = message.replace(copy, source)
+    return _printable(message)
 
 
-def _printable(words: str) -> str:
+def _printable(message: str) -> str:
     """A file's name may be no text; these words must be printable everywhere."""
-    return words.encode("utf-8", "backslashreplace").decode()
+    return message.encode("utf-8", "backslashreplace").decode()
 
 
 def _write_choice(data: Path, choice: Choice, seen: dict[str, Any]) -> list[str]:
@@ -191,7 +194,7 @@ def _write_refusals(folder: Path, seen: dict[str, Any]) -> None:
     for source, one in seen.items():
         path = folder / f"{source}.txt"
         if one["refused"]:
-            write_whole(path, "".join(f"{words}\n" for words in one["refused"]).encode())
+            write_whole(path, "".join(f"{message}\n" for message in one["refused"]).encode())
         else:
             path.unlink(missing_ok=True)
 
@@ -220,7 +223,7 @@ def _read_seen(data: Path) -> dict[str, Any]:
         return {
             str(source): {
                 "listing": one["listing"],
-                "refused": [str(words) for words in one["refused"]],
+                "refused": [str(message) for message in one["refused"]],
                 "taken": str(one["taken"]),
             }
             for source, one in seen.items()

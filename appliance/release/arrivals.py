@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 SHOW, BOX = "show", "box.yaml"
-_WORDS = {"stick": "the stick", "page": "the page", "rehearsal": "the rehearsal"}
+_LABELS = {"stick": "the stick", "page": "the page", "rehearsal": "the rehearsal", "learning": "the learning"}
 _MOST_ENTRIES = 4000  # files, folders and everything else: on a damaged stick a folder may contain itself
 _UNREADABLE = [f"{SHOW}/?", 0, 0]  # it is there, and what reads it says that it cannot be read
 
@@ -17,7 +17,7 @@ _UNREADABLE = [f"{SHOW}/?", 0, 0]  # it is there, and what reads it says that it
 class Arrival(NamedTuple):
     """A show bundle, a box file, or both. listing: names, sizes and times of all files; [] without any."""
 
-    source: str  # stick, boot, page, rehearsal
+    source: str  # stick, boot, page, rehearsal, learning
     folder: Path
     listing: list[list[Any]]
 
@@ -42,9 +42,9 @@ class Arrival(NamedTuple):
         return self._replace(listing=listing)
 
     @property
-    def words(self) -> str:
+    def label(self) -> str:
         """Its name for people."""
-        return _WORDS.get(self.source, "the boot partition")
+        return _LABELS.get(self.source, "the boot partition")
 
 
 def look(source: str, folder: Path) -> Arrival:

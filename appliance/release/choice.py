@@ -58,10 +58,10 @@ class Pair(NamedTuple):
 
 
 class Aside(NamedTuple):
-    """A pair that did not dance, by its id; words: a sentence about it, for people."""
+    """A pair that did not dance, by its id; message: a sentence about it, for people."""
 
     id: str
-    words: str
+    message: str
 
 
 class Choice(NamedTuple):

@@ -149,12 +149,12 @@ def _danced_s(folder: Path, pid: int, now: float) -> float | None:
 
 def _put_aside(chosen: Path, choice: Choice, starts: int, say: Callable[[str], None]) -> Choice:
     before, after = choice.pairs[:2]
-    words = (
+    message = (
         f"The {before.source} did not dance in {starts} starts and is put aside. The audience sees the dance "
         f"that {_source(after)}. Run bunraku check on it, mend it, and bring it again."
     )
-    left = choice._replace(pairs=choice.pairs[1:], aside=(*choice.aside, Aside(before.id, words)))
-    return _publish(chosen, choice, left, words, say)
+    left = choice._replace(pairs=choice.pairs[1:], aside=(*choice.aside, Aside(before.id, message)))
+    return _publish(chosen, choice, left, message, say)
 
 
 def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Choice:
@@ -162,17 +162,17 @@ def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Ch
     there = next((number for number, one in enumerate(choice.pairs) if one.is_there), len(choice.pairs) - 1)
     if there == 0:
         return choice
-    words = (
+    message = (
         f"The {choice.first.source} cannot be found any more. The audience sees the dance that "
         f"{_source(choice.pairs[there])}. Look at the data partition: bunraku doctor."
     )
-    left = choice._replace(pairs=choice.pairs[there:], refused=(words, *choice.refused))
-    return _publish(chosen, choice, left, words, say)
+    left = choice._replace(pairs=choice.pairs[there:], refused=(message, *choice.refused))
+    return _publish(chosen, choice, left, message, say)
 
 
-def _publish(chosen: Path, before: Choice, after: Choice, words: str, say: Callable[[str], None]) -> Choice:
+def _publish(chosen: Path, before: Choice, after: Choice, message: str, say: Callable[[str], None]) -> Choice:
     """Publishes the choice that dances from now on to all processes of the box."""
-    say(words)
+    say(message)
     with contextlib.suppress(OSError):
         after.write(chosen)
         if before.first.box != after.first.box:

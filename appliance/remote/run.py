@@ -241,7 +241,8 @@ class Remote:
         self._ltc = LtcInput(timecode.device) if timecode.source == "ltc" else None
         self._port: Port | None = None
         self._retry_at = 0.0
-        bindings = MidiBindings(box.state_folder or folder)
+        self._bindings_in = (box.state_folder or folder).absolute()
+        bindings = MidiBindings(self._bindings_in)
         self.midi = None if box.midi is None else Midi(box.midi, bindings, self._give, _NETWORK_NAME)
         self.trouble = ""
         self._said = ""
@@ -301,6 +302,7 @@ class Remote:
             "rate": clock.rate.name,
             "error_s": round(self.follower.error_s, 3),
             "midi": [] if self.midi is None else list(self.midi.devices),
+            "bindings": "" if self.midi is None else str(self._bindings_in),
             "moved": None if newest is None else newest._asdict(),
         }
 

@@ -56,8 +56,8 @@ def bounded(problems: Sequence[AnyProblem], more: int = 0) -> list[AnyProblem]:
     """The first MOST_PROBLEMS, and how many there are besides."""
     shown, more = list(problems[:MOST_PROBLEMS]), more + max(0, len(problems) - MOST_PROBLEMS)
     if more:
-        words = f"{more} more {'things are' if more > 1 else 'thing is'} wrong below this line."
-        shown.append(replace(shown[-1], message=words, cure="Mend these first."))
+        message = f"{more} more {'things are' if more > 1 else 'thing is'} wrong below this line."
+        shown.append(replace(shown[-1], message=message, cure="Mend these first."))
     return shown
 
 

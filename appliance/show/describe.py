@@ -17,8 +17,8 @@ _PLAIN = {int: "a whole number", float: "a number", bool: "true or false", str: 
 def kind(annotation: Any) -> str:
     """'a whole number', 'one of joint, vmc', '4 numbers in brackets', ... for a field's annotation."""
     parts = [part for part in _flat(annotation) if part is not type(None)]
-    words = " or ".join(_one_kind(part) for part in parts)
-    return f"{words} or null" if type(None) in _flat(annotation) else words
+    kinds = " or ".join(_one_kind(part) for part in parts)
+    return f"{kinds} or null" if type(None) in _flat(annotation) else kinds
 
 
 def bounds(field: FieldInfo) -> str:

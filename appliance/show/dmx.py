@@ -14,7 +14,7 @@ LAST_UNIVERSE = 63999
 SLOTS = 512  # channels of a universe
 FASTEST_HZ = 44.0  # a full universe lasts 22.7 ms on the wire (ANSI E1.11)
 NUMBERS = {"artnet": (0, 32767), "sacn": (1, LAST_UNIVERSE)}  # 15 bits; E1.31 section 6.2.7
-IN_WORDS = {
+WIRE_NAMES = {
     "artnet": "Art-Net",
     "sacn": "sACN",
     "usb-pro": "ENTTEC DMX USB Pro",
@@ -87,7 +87,7 @@ class DmxConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _keys_of_this_wire(cls, values: Any) -> Any:
-        if not isinstance(values, dict) or values.get("wire") not in IN_WORDS:
+        if not isinstance(values, dict) or values.get("wire") not in WIRE_NAMES:
             return values
         for name, wires in _OWN_KEYS.items():
             if name in values and values["wire"] not in wires:
@@ -101,7 +101,7 @@ class DmxConfig(Section):
             _require("A box", 0, LAST_UNIVERSE, "universe", self.universe)
         if self.wire in NUMBERS:
             key = "universe" if self.number is None else "number"
-            _require(IN_WORDS[self.wire], *NUMBERS[self.wire], key, self.number_on_wire)
+            _require(WIRE_NAMES[self.wire], *NUMBERS[self.wire], key, self.number_on_wire)
         if self.host == "255.255.255.255" and not self.broadcast:
             raise refusal(
                 "This address means every machine of the network.",
@@ -151,7 +151,7 @@ def _each_destination_once(wires: list[DmxConfig]) -> list[DmxConfig]:
         if wire.destination in taken[:place]:
             first = taken.index(wire.destination)
             raise refusal(
-                f"dmx[{first}] and dmx[{place}] send to the same place by {IN_WORDS[wire.wire]}.",
+                f"dmx[{first}] and dmx[{place}] send to the same place by {WIRE_NAMES[wire.wire]}.",
                 "Remove one, or give it another universe."
                 if wire.wire in NUMBERS
                 else "Say by device or serial which adapter each of them is.",

@@ -75,9 +75,9 @@ class ModeConfig(Section):
     def _each_byte_once(cls, channels: list[str]) -> list[str]:
         for place, channel in enumerate(channels):
             if channel != UNUSED and channel in channels[:place]:
-                words = f"'{channel}' is on channels {channels.index(channel) + 1} and {place + 1}."
+                message = f"'{channel}' is on channels {channels.index(channel) + 1} and {place + 1}."
                 cure = f"Number them ('{channel} 1', '{channel} 2'), or write '{UNUSED}' for one of them."
-                raise refusal(words, cure, at=place)
+                raise refusal(message, cure, at=place)
             coarse = next((channel.removesuffix(fine) for fine in FINE if channel.endswith(fine)), "")
             if coarse and coarse not in channels:
                 raise refusal(

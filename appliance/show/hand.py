@@ -119,19 +119,19 @@ class HandConfig(Section):
             )
         if self.fixed is not None and (self.fixed.position is not None) != by_position:
             if by_position:
-                words, cure = (
+                message, cure = (
                     "A fixed hand by position needs one.",
                     "Write fixed: {position: [0.3, 1.4, 0.2]}.",
                 )
             else:
-                words, cure = "This hand has a position, but holds by orientation.", "Write by: position."
-            raise refusal(words, cure, at="fixed")
+                message, cure = "This hand has a position, but holds by orientation.", "Write by: position."
+            raise refusal(message, cure, at="fixed")
         if self.fixed is not None and by_position and "orientation" in self.fixed.model_fields_set:
-            words = "A hand holds by orientation or by position, and this one has both."
-            raise refusal(words, "Remove one of them.", at=("fixed", "orientation"))
+            message = "A hand holds by orientation or by position, and this one has both."
+            raise refusal(message, "Remove one of them.", at=("fixed", "orientation"))
         if self.tracker is not None and not (by_position and self.osc):
-            words = "A tracker gives a position: 'tracker' belongs to {osc: true, by: position}."
-            raise refusal(words, "Add what is missing, or remove it.", at="tracker")
+            message = "A tracker gives a position: 'tracker' belongs to {osc: true, by: position}."
+            raise refusal(message, "Add what is missing, or remove it.", at="tracker")
         return self
 
     @property

@@ -119,8 +119,8 @@ class LightsConfig(Section):
     def _each_channel_once(cls, fixtures: list[FixtureConfig], info: ValidationInfo) -> list[FixtureConfig]:
         names = [fixture.name for fixture in fixtures]
         refuse_repeats(names, "Two fixtures are called '{value}'.", "Give one another name.")
-        for place, words, cure in overlaps(fixtures, _directory(info)):
-            raise refusal(words, cure, at=place)
+        for place, message, cure in overlaps(fixtures, _directory(info)):
+            raise refusal(message, cure, at=place)
         return fixtures
 
     @field_validator("mappings")
@@ -132,8 +132,8 @@ class LightsConfig(Section):
             for number, rule in enumerate(mapping.rules):
                 fault = _misfit(rule, info.data.get("fixtures"), _directory(info))
                 if fault is not None:
-                    words = f"In the mapping '{mapping.name}': {fault[0]}"
-                    raise refusal(words, fault[1], at=(place, "rules", number))
+                    message = f"In the mapping '{mapping.name}': {fault[0]}"
+                    raise refusal(message, fault[1], at=(place, "rules", number))
         return mappings
 
     @field_validator("safe")

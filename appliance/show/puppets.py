@@ -142,12 +142,14 @@ def _partner_problems(puppets: Sequence[PuppetConfig], file: YamlFile) -> Iterat
     for place in answering:
         at, own = ("puppets", place, "partner"), puppets[place]
         if place != answering[0]:
-            words = f"'{own.name}' answers '{own.partner}', but '{names[answering[0]]}' is a partner already."
-            yield file.problem(at, words, "Keep one `partner` in the show.")
+            message = (
+                f"'{own.name}' answers '{own.partner}', but '{names[answering[0]]}' is a partner already."
+            )
+            yield file.problem(at, message, "Keep one `partner` in the show.")
         elif own.partner == own.name or own.partner not in names:
             others = [name for name in names if name != own.name]
-            words = f"'{own.name}' answers '{own.partner}', which is no other puppet."
-            yield file.problem(at, words, did_you_mean(own.partner or "", others))
+            message = f"'{own.name}' answers '{own.partner}', which is no other puppet."
+            yield file.problem(at, message, did_you_mean(own.partner or "", others))
 
 
 def puppet_problems(
@@ -161,15 +163,17 @@ def puppet_problems(
     for place, puppet in enumerate(puppets):
         if place == 0:
             for name in (name for name in LED_BY_THE_SHOW if name in puppet.model_fields_set):
-                words = f"'{name}' does not stand with the first puppet: it dances what the show says."
+                message = f"'{name}' does not stand with the first puppet: it dances what the show says."
                 cure = "Write it under `motion`, `hands` or `dancer`, or give it to another puppet."
-                yield file.problem(("puppets", 0, name), words, cure)
+                yield file.problem(("puppets", 0, name), message, cure)
         elif puppet.phrase is not None and puppet.phrase not in motion.sources:
-            words = f"The puppet '{puppet.name}' starts from '{puppet.phrase}', which the show does not have."
+            message = (
+                f"The puppet '{puppet.name}' starts from '{puppet.phrase}', which the show does not have."
+            )
             cure = did_you_mean(puppet.phrase, motion.sources)
-            yield file.problem(("puppets", place, "phrase"), words, cure)
+            yield file.problem(("puppets", place, "phrase"), message, cure)
         for number, hand in enumerate(puppet.hands if place else ()):
             if not hand.from_start:
-                words = "Nothing lets this hand hold: cues and `/hold` lead the hands of the first puppet."
+                message = "Nothing lets this hand hold: cues and `/hold` lead the hands of the first puppet."
                 at = ("puppets", place, "hands", number, "from_start")
-                yield file.problem(at, words, "Remove it, or give the hand to the first puppet.")
+                yield file.problem(at, message, "Remove it, or give the hand to the first puppet.")

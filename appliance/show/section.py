@@ -73,8 +73,8 @@ def refuse_repeats(values: Sequence[object], message: str, cure: str) -> None:
     """Raise for the first repeated value; the message may name {value}, {first} and {place}."""
     for place, value in enumerate(values):
         if value in values[:place]:
-            words = message.format(value=value, first=values.index(value), place=place)
-            raise refusal(words, cure, at=place)
+            text = message.format(value=value, first=values.index(value), place=place)
+            raise refusal(text, cure, at=place)
 
 
 def each_name_once(kind: str) -> Callable[[list[Any]], list[Any]]:

@@ -228,9 +228,9 @@ class Show:
 
     def require_moving(self, joints: Sequence[str]) -> None:
         """Refuse hands on joints that the network does not move; `joints` are those that it does."""
-        words = "The network does not move the joint '{}'."
+        message = "The network does not move the joint '{}'."
         problems = [
-            self.file.problem((*at, "joint"), words.format(hand.joint), did_you_mean(hand.joint, joints))
+            self.file.problem((*at, "joint"), message.format(hand.joint), did_you_mean(hand.joint, joints))
             for at, hand in self.config.hands_at
             if hand.joint not in joints
         ]
@@ -246,13 +246,13 @@ class Show:
         skeleton = self.skeleton
         above = [j for j, parent in enumerate(skeleton.parents) if parent == 0]
         highest = max(above, key=lambda j: float(skeleton.offsets[j][1]), default=0)
-        words = (
+        message = (
             f"'{skeleton.names[0]}' is the root of the skeleton: a hand there turns the whole figure, and "
             "the rest of the body hardly answers."
         )
         cure = f"To lead the body hold '{skeleton.names[highest]}'; to turn the figure leave it as it is."
         return [
-            self.file.problem((*at, "joint"), words, cure)
+            self.file.problem((*at, "joint"), message, cure)
             for at, hand in self.config.hands_at
             if hand.joint == skeleton.names[0] and hand.kind not in ("kept", "springs")
             if hand.by == "orientation"  # a position draws the figure there, which is what is meant
@@ -268,17 +268,17 @@ class Show:
         problems = []
         dancer = self.config.dancer
         if dancer.interaction_iterations == 0:
-            words = "The hands move nothing: interaction_iterations is 0."
+            message = "The hands move nothing: interaction_iterations is 0."
             cure = f"Write {max(dancer.coding_iterations - 1, 1)}, or remove the hands."
-            problems.append(self.file.problem(("dancer", "interaction_iterations"), words, cure))
+            problems.append(self.file.problem(("dancer", "interaction_iterations"), message, cure))
         for place, cue in enumerate(self.config.cues):
             if cue.iterations is not None and cue.iterations[1] == 0 and cue.hands != []:
-                words = (
+                message = (
                     f"The hands move nothing in the cue '{cue.name}': none of its iterations is interactive."
                 )
                 coding = cue.iterations[0]
                 cure = f"Write [{coding}, {max(coding - 1, 1)}], or `hands: []` where they are to let go."
-                problems.append(self.file.problem(("cues", place, "iterations"), words, cure))
+                problems.append(self.file.problem(("cues", place, "iterations"), message, cure))
         return problems
 
 

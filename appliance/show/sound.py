@@ -49,8 +49,9 @@ class SoundConfig(Section):
     channels: Literal[2, 8] = key("Loudspeakers: a pair, or eight in a ring around the stage.", 2)
     rate: int = key("Samples a second.", 48000, within=(22050, 96000))
     block: int = key(
-        "Samples computed at once: fewer answer sooner, more drop out later; a multiple of 32.",
-        256,
+        "Samples computed at once: fewer answer sooner, more drop out later; a multiple of 32. A card that "
+        "gets them too late again and again is given twice as many, up to 512.",
+        128,
         within=(64, 1024),
     )
 

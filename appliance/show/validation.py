@@ -40,10 +40,10 @@ def _problem(model: type[Section], file: YamlFile, error: ErrorDetails) -> Probl
         at = context["at"] if context["at"] is not None else ()
         below = at if isinstance(at, tuple) else (at,)
         return file.problem((*location, *below), context["message"], context["cure"])
-    return file.problem(location, *_words(model, location, error))
+    return file.problem(location, *_message(model, location, error))
 
 
-def _words(model: type[Section], location: Location, error: ErrorDetails) -> tuple[str, str]:
+def _message(model: type[Section], location: Location, error: ErrorDetails) -> tuple[str, str]:
     """Message and cure for an error that pydantic found by itself."""
     around = _section_at(model, location[:-1])
     if error["type"] == "extra_forbidden":
@@ -77,9 +77,9 @@ def _complaint(error: ErrorDetails, field: FieldInfo | None) -> str:
 def _cure(error: ErrorDetails, field: FieldInfo | None) -> str:
     if field is None:
         return ""
-    words, limits = describe.choices(field.annotation), describe.bounds(field)
-    if error["type"] == "literal_error" and len(words) > 1:
-        near = nearest(error["input"], words)  # the message lists them all
+    choices, limits = describe.choices(field.annotation), describe.bounds(field)
+    if error["type"] == "literal_error" and len(choices) > 1:
+        near = nearest(error["input"], choices)  # the message lists them all
         return f"Did you mean '{near}'?" if near else str(field.description or "")
     if isinstance(error["loc"][-1], int):
         limits = _share_of(error)

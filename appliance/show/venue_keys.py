@@ -27,12 +27,12 @@ _OF_AN_OUTPUT = ("host", "port", "universe", "device")
 
 
 class VenueKey(NamedTuple):
-    """A key with its value now. kind: text, number, list (of texts) or switch; words: what it is for."""
+    """A key with its value now. kind: text, number, list (of texts) or switch; purpose: what it is for."""
 
     location: Location
     value: Any
     kind: str
-    words: str
+    purpose: str
     within: str
 
 

@@ -35,9 +35,9 @@ def misplaced(show: Show, box: BoxConfig) -> list[Problem]:
     names = [fixture.name for fixture in show.config.lights.fixtures]
     changed = [place.fixture for place in box.lights.places]
 
-    def problem(fixture: str, words: str, cure: str) -> Problem:
+    def problem(fixture: str, message: str, cure: str) -> Problem:
         number = (changed.index(fixture),) if fixture in changed else ()
-        return box.file.problem(("lights", "places", *number), words, cure)
+        return box.file.problem(("lights", "places", *number), message, cure)
 
     problems = [
         problem(name, f"The show has no fixture '{name}'.", did_you_mean(name, names))
@@ -45,13 +45,13 @@ def misplaced(show: Show, box: BoxConfig) -> list[Problem]:
         if name not in names
     ]
     fixtures = at_venue(show.config.lights, box.lights).fixtures
-    for place, words, cure in overlaps(fixtures, show.directory):
-        problems.append(problem(fixtures[place].name, words, cure))
+    for place, message, cure in overlaps(fixtures, show.directory):
+        problems.append(problem(fixtures[place].name, message, cure))
     for fixture in fixtures:
         end = fixture.address + channel_count(fixture, show.directory) - 1
         if end > UNIVERSE_CHANNELS:
-            words = f"'{fixture.name}' would end on channel {end}; a universe has {UNIVERSE_CHANNELS}."
-            problems.append(problem(fixture.name, words, "Write a lower address, or another universe."))
+            message = f"'{fixture.name}' would end on channel {end}; a universe has {UNIVERSE_CHANNELS}."
+            problems.append(problem(fixture.name, message, "Write a lower address, or another universe."))
     return problems
 
 

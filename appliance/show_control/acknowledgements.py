@@ -23,7 +23,7 @@ Reply = Callable[[bool, str], None]  # whether the dance follows, and a sentence
 
 class _Waiting(NamedTuple):
     generation: int
-    words: str
+    message: str
     until: float
     reply: Reply
 
@@ -35,7 +35,7 @@ class Acknowledgements:
         self._observer = observer
         self._waiting: deque[_Waiting] = deque()
 
-    def expect(self, generation: int, words: str, now: float, reply: Reply) -> None:
+    def expect(self, generation: int, message: str, now: float, reply: Reply) -> None:
         """Reply once the stage follows this generation, or after 0.6 s that it does not yet."""
         if not self._observer.lives(now):
             reply(False, _ABSENT)
@@ -43,7 +43,7 @@ class Acknowledgements:
         if len(self._waiting) == order_dispatch.WAITING:
             self._waiting.popleft().reply(False, _TOO_MANY)
         until = now + order_dispatch.PATIENCE_S + order_dispatch.ANSWER_S
-        self._waiting.append(_Waiting(generation, words, until, reply))
+        self._waiting.append(_Waiting(generation, message, until, reply))
 
     def send_due(self, now: float) -> None:
         """Reply to what the stage follows by now, and to what has waited for too long."""
@@ -52,7 +52,7 @@ class Acknowledgements:
         applied, remark = self._observer.applied()
         while self._waiting and self._waiting[0].generation <= applied:
             one = self._waiting.popleft()
-            one.reply(True, f"{one.words} {remark if one.generation == applied else ''}".strip())
+            one.reply(True, f"{one.message} {remark if one.generation == applied else ''}".strip())
         while self._waiting and self._waiting[0].until < now:
             self._waiting.popleft().reply(False, _SILENT)
 

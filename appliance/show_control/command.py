@@ -43,7 +43,7 @@ def command(address: str, arguments: Sequence[object]) -> Command:
     require_read(address, arguments)
     text, numbers = _text(form, arguments)
     if text is None or not form.admits(numbers):
-        raise ValueError(f"{address} takes {form.words()}.")
+        raise ValueError(f"{address} takes {form.syntax()}.")
     return Command(address, tuple(float(number) for number in numbers), text)
 
 

@@ -35,8 +35,8 @@ class ConsoleMessages:
         held, cue = held_back(show_state), show_state.cue
         if (held, cue) == (self._held_back, self._cue) or now - self._said_at < _PAUSE_S:
             return ""
-        words = [f"Cue {cue}."] if cue and cue != self._cue else []
+        messages = [f"Cue {cue}."] if cue and cue != self._cue else []
         if held != self._held_back:
-            words.append(held or "Picture and lights are back.")
+            messages.append(held or "Picture and lights are back.")
         self._said_at, self._held_back, self._cue = now, held, cue
-        return " ".join(words)
+        return " ".join(messages)

@@ -150,7 +150,7 @@ class LiveInput:
         is_partial = not OF_BODY.isdisjoint(self._missing)
         return self._without() if is_partial and self.came(now) else ""
 
-    def words(self, now: float) -> str:
+    def message(self, now: float) -> str:
         """A sentence about it, for the one that lets the show start from it."""
         if not self.came(now):
             return "No live dancer is heard: the phrase plays on until its program sends."

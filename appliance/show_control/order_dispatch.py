@@ -98,9 +98,9 @@ class OrderDispatch:
     def _report(self, answer: Answer) -> None:
         if (one := self._sent.pop(answer.ask, None)) is not None:
             if not (answer.done and one.order.quiet):
-                one.then(answer.done, answer.words)
+                one.then(answer.done, answer.message)
         elif (late := self._given_up.pop(answer.ask, None)) is not None and answer.done:
-            late.then(True, answer.words)
+            late.then(True, answer.message)
 
     def _send(self, place: Receiver, now: float) -> None:
         way = self._ways[place]

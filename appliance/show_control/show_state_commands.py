@@ -84,8 +84,10 @@ def _stop(show_state: ShowState, command: Command, facts: Facts | None, now: flo
         return show_state, "The show stands still already. /go lets it go on."
     if not show_state.going and fade_s == 0.0:  # a button let go: the fade of its press is not to be cut
         return show_state, "The show stops already, and its fade runs on. /go lets it go on."
-    words = f"Picture and lights fade out over {fade_s:g} s, then the phrase stands still. /go lets it go on."
-    return _going(show_state, 0.0, now, fade_s), words
+    message = (
+        f"Picture and lights fade out over {fade_s:g} s, then the phrase stands still. /go lets it go on."
+    )
+    return _going(show_state, 0.0, now, fade_s), message
 
 
 def _going(show_state: ShowState, going: float, now: float, fade_s: float) -> ShowState:
@@ -94,8 +96,8 @@ def _going(show_state: ShowState, going: float, now: float, fade_s: float) -> Sh
 
 
 def _panic(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    words = "The picture is black, and the lights show their safe look. /go lifts it."
-    return replace(show_state, panic=True), words
+    message = "The picture is black, and the lights show their safe look. /go lifts it."
+    return replace(show_state, panic=True), message
 
 
 def _blackout(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:

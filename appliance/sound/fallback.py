@@ -18,8 +18,8 @@ NO_CARD = Fallback(
 )
 DROPOUTS = Fallback(
     "sound-dropouts",
-    "The sound card got its samples too late, and crackled. Give `sound: {block: ...}` a larger number in "
-    "the box file.",
+    "The sound card got its samples too late, and crackled. After some of these it gets longer blocks, which "
+    "answer later. If it goes on, give `sound: {block: ...}` a larger number in the box file.",
 )
 STAGE_UNSEEN = Fallback(
     "sound-rests",

@@ -74,12 +74,12 @@ def obey_for_sensors(order: Order, parts: StageParts, wearing: SensorFit, now: f
         return False, str(error)
     if order.name == "neutral":
         is_asked = wearing.take_neutral(sensor or None, now)
-        words = "The neutral pose is taken at the next stillness: stand still now."
+        message = "The neutral pose is taken at the next stillness: stand still now."
     else:
         is_asked = wearing.reset_heading(sensor or None, now)
-        words = "Where the dancer faces now is the front."
+        message = "Where the dancer faces now is the front."
     if is_asked:
-        return True, words
+        return True, message
     names = ", ".join(wearing.named(sensor or None))
     return False, (
         f"Not heard at this moment: {names}. Nothing is changed. Look at its light and battery, ask again."
@@ -108,10 +108,10 @@ def _require_heard(names: list[str], link: SensorLink, now: float) -> None:
 def _iterate(order: Order, parts: StageParts) -> str:
     (coding, interaction), seconds = ITERATIONS.given(order.text, order.values)
     iterations = parts.led.iterations
-    words = iterations.ask(coding, interaction, seconds)
+    message = iterations.ask(coding, interaction, seconds)
     if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.led.hands.puppeteers):
-        words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
-    return words
+        message = f"{message} None of the iterations is interactive: the hands move nothing.".lstrip()
+    return message
 
 
 def _allow(order: Order, parts: StageParts) -> str:

@@ -18,7 +18,7 @@ METRES_PER_DEGREE = 0.01  # how far the root may be off where joints may be off 
 @dataclass(frozen=True)
 class Difference:
     """A tick that came out otherwise than it was recorded: `joint` is off the most, by `degrees`; the root by
-    `metres`. words: what else is another.
+    `metres`. message: what else is another.
     """
 
     tick: int
@@ -26,12 +26,12 @@ class Difference:
     joint: str
     degrees: float
     metres: float
-    words: str = ""
+    message: str = ""
 
     def sentence(self) -> str:
         """For people."""
         off = f"{self.joint} is off by {self.degrees:.3g} degrees, the root by {1000 * self.metres:.3g} mm"
-        return f"tick {self.tick}, at {self.at_s:.2f} s: {self.words or off}."
+        return f"tick {self.tick}, at {self.at_s:.2f} s: {self.message or off}."
 
 
 class Comparison:
@@ -46,18 +46,18 @@ class Comparison:
         self.first: Difference | None = None
         self.worst: Difference | None = None
         self._begun, self._tolerance = begun, tolerance_degrees
-        self._words = ""
+        self._message = ""
 
     def look(self, recorded: Any, tick: Tick) -> None:
         """Compare a record with the frame that the tick has just made of it."""
         self.ticks += 1
-        words = self._words or _other(recorded, tick)
-        self._words = ""
+        message = self._message or _other(recorded, tick)
+        self._message = ""
         root, pose = (
             (recorded[name], np.stack([getattr(frame, name) for frame in tick.frame.puppets]))
             for name in ("root", "pose")
         )
-        if all(then.tobytes() == here.tobytes() for then, here in (root, pose)) and not words:
+        if all(then.tobytes() == here.tobytes() for then, here in (root, pose)) and not message:
             return
         degrees = _degrees_between(*pose)
         joint = int(degrees.argmax()) % len(tick.parts.skeleton)
@@ -68,18 +68,18 @@ class Comparison:
             tick.parts.skeleton.names[joint],
             float(degrees.max()),
             metres,
-            words,
+            message,
         )
         if self.worst is None or _size(found) > _size(self.worst):
-            self.worst = replace(found, words="")
-        if self.first is None and (words or self._is_beyond(found)):
+            self.worst = replace(found, message="")
+        if self.first is None and (message or self._is_beyond(found)):
             self.first = found
 
     def note_order(self, name: str, done_then: bool, done_here: bool) -> None:
         """An order was carried out again before the next tick."""
         if done_then != done_here:
             then, here = ("carried out", "refused") if done_then else ("refused", "carried out")
-            self._words = f"before it the order '{name}' was {then} then, and is {here} here"
+            self._message = f"before it the order '{name}' was {then} then, and is {here} here"
 
     def _is_beyond(self, found: Difference) -> bool:
         if not self._tolerance:

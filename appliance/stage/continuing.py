@@ -20,6 +20,8 @@ from appliance.stage.stage_puppet import StagePuppet
 
 FADE_S, BACK_S = 1.5, 0.7  # into going on by itself, and back when the guest moves
 MOVES_DEGREES_S = 12.0  # mean speed of a guest's joints, above which the guest moves; dancers have some 70
+LED_S = 1.0  # in which a puppet would be led to a near goal
+SWAY = 0.04  # share of a tick in the mean way to the goal: half a second
 _LOOK_TICKS = 10
 
 
@@ -58,7 +60,7 @@ class Continuing:
 
     SNAPSHOT = (
         *("_continuations", "_memories", "_guest", "follow", "lead", "delay_s", "temperature", "top_p"),
-        "goal",
+        *("goal", "_off"),
     )
 
     def __init__(
@@ -90,6 +92,7 @@ class Continuing:
             self.follow, self.lead, self.delay_s = keys.follow, keys.lead, keys.delay
         self.temperature, self.top_p = temperature, top_p
         self.goal: tuple[float, ...] = ()
+        self._off = 0.0, 0.0  # metres to the goal, without the sway of single steps
 
     def lay_over(self, tick: int, now: float, seed: int) -> None:
         """Lay what goes on over what the puppets have started from, for this tick of the stage."""
@@ -132,6 +135,12 @@ class Continuing:
                 x, z = puppet.place.placement.inverse.point(x, z)
             shift = puppet.grounding.shift
             one.goal = x - float(shift[0]), z - float(shift[2])
+            here = puppet.grounding.root
+            away = x - float(here[0]) - self._off[0], z - float(here[2]) - self._off[1]
+            self._off = self._off[0] + SWAY * away[0], self._off[1] + SWAY * away[1]
+            puppet.lead.ask(self._off[0] / LED_S, self._off[1] / LED_S)
+        else:
+            self._off = 0.0, 0.0
         return bool(self.goal) or self._guest.still_s >= self._after_s
 
 

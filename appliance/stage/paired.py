@@ -160,6 +160,8 @@ class PairedStage:
         now = clock.now()
         self._look(now)
         if self.pair.leads:
+            for message in self.pair.take_rest():
+                self._run(message, clock, pulse)
             self._take_over(clock)
             return
         if now - self._beat_at >= TICK_S:

@@ -71,13 +71,13 @@ class Resumption:
                 "ended without a frame. The show begins at the beginning. Export its journal for us."
             )
         try:
-            words = self._take(place, reconciler, now)
+            message = self._take(place, reconciler, now)
         except ValueError as error:
             return f"{why}: the show begins at the beginning. {error}"
         self.went_on = True
         where = f" in the cue '{place.cue}'" if place.cue else ""
         where += f" at {_where(place, reconciler.parts)}"
-        return f"{why} the show goes on{where}. {words}".rstrip()
+        return f"{why} the show goes on{where}. {message}".rstrip()
 
     def write_start(self, reconciler: Reconciler) -> None:
         """Right before the first tick: count this start."""
@@ -108,7 +108,7 @@ class Resumption:
         rate = place.rate or (reconciler.rate if self._after_power_cut else 0.0)
         now_rate = 0.0 if reconciler.stands(now) else rate
         made = reconciler.danced_before(*(one.made for one in place.puppets))
-        words = [
+        messages = [
             one.go_on(noted, now_rate, material)
             for one, noted, material in zip(parts.puppets, place.puppets, made, strict=False)
         ]
@@ -119,7 +119,7 @@ class Resumption:
         reconciler.motion = place.motion
         level, seed, begins_at = place.liveliness
         parts.liveliness.go_on(level, seed, begins_at + place.tick + 1)
-        return " ".join(filter(None, words))
+        return " ".join(filter(None, messages))
 
     def _place(self, reconciler: Reconciler, tick: int) -> Checkpoint:
         liveliness = reconciler.parts.liveliness

@@ -14,6 +14,7 @@ from appliance.dancer.blending import Blending
 from appliance.dancer.forward_kinematics import Figure
 from appliance.dancer.grounding import Grounding
 from appliance.dancer.hands import Hands
+from appliance.dancer.lead import Lead
 from appliance.dancer.live import Live
 from appliance.dancer.loop import Placement, turns_about_y
 from appliance.dancer.material.material_file import Material
@@ -68,7 +69,7 @@ class StagePuppet:
 
     SNAPSHOT = (
         *("motion", "blending", "grounding", "hands", "live", "iterations", "network_failed", "_danced"),
-        "frame",
+        *("lead", "frame"),
     )
 
     puppet: Puppet
@@ -88,6 +89,7 @@ class StagePuppet:
     figures_refused: int = 0
     liveliness: float = 1.0
     continued: float = 0.0
+    lead: Lead = field(default_factory=Lead)
     noise: FloatArray = field(init=False)
     _whole: FloatArray = field(init=False)  # (T, J, 4)
     _roots: FloatArray = field(init=False)  # (T, 3)
@@ -160,6 +162,7 @@ class StagePuppet:
         """Put the danced pose on the floor and into the world."""
         frame, grounding = self.frame, self.grounding
         self.puppet.restore(self.hands.holds, frame.holds)
+        grounding.lead(*self.lead.step())
         try:
             figure = grounding.ground_pose(
                 self._danced,

@@ -92,14 +92,14 @@ class Watch:
             return ""
         if not lost:
             self.fallbacks.count(rows.FOLDER_LOST.name, now)
-            return rows.FOLDER_LOST.words
-        words = (
+            return rows.FOLDER_LOST.message
+        message = (
             f"The folder where the box's processes meet was deleted, or files in it: {lost} The dance goes "
             "on, but commands, lights and picture may not come back once they end. Start the box again: "
             "systemctl restart bunraku.target, or `bunraku play`."
         )
-        self.fallbacks.set(rows.FOLDER_LOST.name, words)
-        return words if self._changes("folder", lost, True) else ""
+        self.fallbacks.set(rows.FOLDER_LOST.name, message)
+        return message if self._changes("folder", lost, True) else ""
 
     def check(self, now: float, health: Health, sensors: Sequence[SensorState] = ()) -> list[str]:
         """Once a second: bring the fallbacks up to date; sentences about what changed since the last call.

@@ -10,15 +10,17 @@ from contextlib import contextmanager
 import typer
 
 from appliance.pose.file_trouble import sentence
+from appliance.studio.heartbeat import heartbeat
 
 REFUSED, INTERRUPTED = 2, 130  # exit statuses
 
 
 @contextmanager
 def clear_errors(command: str) -> Iterator[None]:
-    """Turn an error that the artist can fix into one message and exit status 2."""
+    """Turn an error that the artist can fix into one message and exit status 2; never long silent."""
     try:
-        yield
+        with heartbeat():
+            yield
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] not in ("torch", "onnx", "matplotlib"):
             raise
@@ -27,12 +29,12 @@ def clear_errors(command: str) -> Iterator[None]:
             "Install the studio with: pip install bunraku-studio (in a checkout: make studio)"
         )
     except (ValueError, RuntimeError, OSError) as error:
-        words = (
+        message = (
             sentence(error) if isinstance(error, OSError) else str(error) if _is_for_people(error) else None
         )
-        if words is None:
+        if message is None:
             raise
-        _refuse(words)
+        _refuse(message)
 
 
 def _is_for_people(error: Exception) -> bool:

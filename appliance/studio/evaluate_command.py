@@ -95,7 +95,7 @@ def _checked(options: EvaluateOptions) -> list[Iterations]:
         )
     if options.other_dancer is not None and not options.compared:
         raise StudioError("--other-dancer is a baseline, and --no-baselines wants none. Leave one out.")
-    return [_iterations(words) for words in options.iterations] or list(puppetry.ITERATIONS)
+    return [_iterations(text) for text in options.iterations] or list(puppetry.ITERATIONS)
 
 
 def _measurements(
@@ -143,10 +143,10 @@ def _answer(
         return puppetry.measure(measurements, joints, iterations, advance=advance, recorded=recorded)
 
 
-def _iterations(words: str) -> Iterations:
-    coding, _, interaction = words.partition("/")
+def _iterations(text: str) -> Iterations:
+    coding, _, interaction = text.partition("/")
     if not (coding.isdigit() and interaction.isdigit() and int(coding) > 0):
-        raise StudioError(f"'{words}' is no K/J: write for example 10/9, coding and interaction iterations.")
+        raise StudioError(f"'{text}' is no K/J: write for example 10/9, coding and interaction iterations.")
     return int(coding), int(interaction)
 
 

@@ -9,10 +9,12 @@ from typing import Annotated
 
 import typer
 
+from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import reading_options
 from appliance.pose.file_trouble import sentence
-from appliance.pose.reading_options import ReadingOptions
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
 from appliance.pose.stage_frame import Guess
 from appliance.show.bundle import named_show
 
@@ -95,18 +97,13 @@ def retarget(
     """
     from appliance.exchange.exchange_error import ExchangeError
     from appliance.exchange.formats import known_ending
-    from appliance.pose.body_facts import with_stance
-    from appliance.pose.bvh import read_bvh
     from appliance.studio.exchange.glb_reading import Choice
     from appliance.studio.exchange.reading import read_as_told
     from appliance.studio.exchange.retargeting import retarget as put_on
 
     known_ending(out)
     dance = _told(phrase, *read_as_told(phrase, reading, Choice(skin, animation)))
-    if to.is_dir():  # a show's skeleton is in the stage's frame already
-        other = with_stance(read_bvh(to / "skeleton.bvh"))
-    else:
-        other = _told(to, *read_as_told(to, reading)).skeleton
+    other = _skeleton_of(to, reading)
     try:
         found = put_on(dance, other)
     except ValueError as error:
@@ -117,6 +114,19 @@ def retarget(
     print(
         f"{out}: {found.seconds:.1f} s of {phrase.name} with the {len(found.skeleton)} joints of {to.name}."
     )
+
+
+def _skeleton_of(like: Path | None, reading: ReadingOptions = AS_THE_FILES_SAY) -> Skeleton:
+    """The skeleton of a recording or a show; None: of the show that comes with the box."""
+    from appliance.pose.body_facts import with_stance
+    from appliance.pose.bvh import read_bvh
+    from appliance.show.bundle import default_show_path
+    from appliance.studio.exchange.reading import read_as_told
+
+    folder = like or default_show_path()
+    if folder.is_dir():  # a show's skeleton is in the stage's frame already
+        return with_stance(read_bvh(folder / "skeleton.bvh"))
+    return _told(folder, *read_as_told(folder, reading)).skeleton
 
 
 def _write(out: Path, recording: Recording) -> None:
@@ -136,15 +146,25 @@ def _told(file: Path, recording: Recording, guesses: list[Guess]) -> Recording:
 
 @app.command("import")
 def import_(
-    points: Annotated[Path, typer.Argument(help="Points: .npy (frames, points, 3), or .csv.")],
+    context: typer.Context,
+    points: Annotated[
+        Path,
+        typer.Argument(help="Points: .npy, .csv. A video's landmarks: .json, .npz, OpenPose's folder."),
+    ],
     out: Annotated[Path, typer.Option(help="The recording: .bvh, .glb, .npz or .csv.")],
     names: Annotated[
         Path | None, typer.Option(help="Text file: a name on each line, or a name, a comma, its parent.")
     ] = None,
     like: Annotated[
         Path | None,
-        typer.Option(help="Recording whose skeleton the points belong to, by their names."),
+        typer.Option(
+            callback=named_show,
+            help="Recording whose skeleton the points belong to, by their names; for landmarks a show too.",
+        ),
     ] = None,
+    landmarks: Annotated[
+        bool, typer.Option("--landmarks", help="This .npy or .csv has MediaPipe's 33 landmarks.")
+    ] = False,
     fps: Annotated[
         float | None,
         typer.Option(min=1.0, max=1000.0, help="Frames a second. Default: by a column of times, else 50."),
@@ -165,22 +185,33 @@ def import_(
     A bone is as long as the usual distance between its points. The hierarchy comes from the names (LeftArm,
     l_wrist, RightKnee ...), from parents in --names, or from --like. A missing point is NaN, an empty field,
     or 0, 0, 0 for a while. At the end it says how far the figure is from the points, in centimetres.
+
+    Landmarks that a network found in a video are repaired, and danced by the skeleton of --like. Without it
+    that is the skeleton of the show that comes with the box.
     """
     from appliance.exchange.formats import known_ending
     from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
     from appliance.studio.exchange.importing import PointsOptions, import_points
+    from appliance.studio.exchange.landmarks_file import is_landmarks, read_landmarks
 
     known_ending(out)
-    options = PointsOptions(names, like, fps, unit.value if unit else None, up.value, gap)
-    imported = import_points(points, options, print)
-    dance = imported.recording
+    if landmarks or is_landmarks(points):
+        from appliance.studio.exchange.landmarks_dance import dance_of
+
+        refuse_idle(context, ("names", "unit", "up"), "with landmarks, whose names and axes are known")
+        found = dance_of(points, read_landmarks(points, fps), _skeleton_of(like), gap)
+        dance, lines = found.recording, [f"{points.name}: {line}." for line in found.lines]
+    else:
+        options = PointsOptions(names, like, fps, unit.value if unit else None, up.value, gap)
+        imported = import_points(points, options, print)
+        dance, lines = imported.recording, imported.report()
     _write(out, dance)
-    for line in imported.report():
+    for line in lines:
         print(line)
     print(f"{out}: {dance.seconds:.1f} s, {len(dance.skeleton)} joints.")
     picture = picture or out.with_suffix(".png")
     try:
         print(draw_filmstrip(picture, dance.skeleton, dance.poses, dance.roots, dance.fps, title=out.stem))
     except (MissingPicturesError, OSError) as error:  # the recording is written: only its picture is missing
-        words = sentence(error, picture) if isinstance(error, OSError) else None
-        print(f"There is no picture: {words or error}", file=sys.stderr)
+        message = sentence(error, picture) if isinstance(error, OSError) else None
+        print(f"There is no picture: {message or error}", file=sys.stderr)

@@ -11,6 +11,7 @@ from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.clear_errors import clear_errors
+from appliance.studio.model_or_show import OfRegion, OfShow
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -19,8 +20,12 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 @reading_options
 def granular(
     context: typer.Context,
-    checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training.")],
     out: Annotated[Path, typer.Option(help="The phrase, a BVH file; its figures and picture lie beside it.")],
+    checkpoint: Annotated[
+        Path | None,
+        typer.Argument(help="checkpoint.pt of a training; left out with --show.", show_default=False),
+    ] = None,
+    show: OfShow = None,
     recordings: Annotated[
         Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
     ] = None,
@@ -33,7 +38,14 @@ def granular(
         float,
         typer.Option(min=0.01, max=25.0, help="Most changes a second in a walk."),
     ] = 1.0,
-    hop: Annotated[int, typer.Option(min=1, help="Ticks of 20 ms from one window to the next.")] = 1,
+    hop: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Ticks of 20 ms from one window to the next.",
+            show_default="1, of a show's network a quarter of its window",
+        ),
+    ] = None,
     samples: Annotated[
         bool, typer.Option("--samples", help="Every window drawn for itself, instead of a walk.")
     ] = False,
@@ -52,14 +64,32 @@ def granular(
             min=0.0, max=1.0, help="The network on its own motion, with this share of --from mixed in."
         ),
     ] = None,
+    region: OfRegion = None,
+    phrase: Annotated[
+        Path | None,
+        typer.Option(
+            help="With --region: BVH that the rest of the body dances.", show_default="that of --show"
+        ),
+    ] = None,
     *,
     reading: ReadingOptions,
 ) -> None:
     """Make an endless phrase from only a dancer's latents: Granular Dance.
 
     A walk through the prior (or samples, with --samples), the path between two takes, or the network fed with
-    what it danced before. The phrase plays in a show as any other.
+    what it danced before. The phrase plays in a show as any other. With --show the show's sequence network
+    does it at once, as on stage. With --region a part of the body does, and the rest dances a phrase.
     """
+    if (checkpoint is None) == (show is None):
+        raise typer.BadParameter(
+            "Give a CHECKPOINT, or --show, whose network dances at once (--show default)."
+        )
+    if show is not None:
+        refuse_idle(context, ("recordings", "feedback"), "with --show")
+    if not region:
+        refuse_idle(context, ("phrase",), "without --region")
+    elif phrase is None and show is None:
+        raise typer.BadParameter("With --region give the --phrase that the rest of the body dances.")
     walk, noise = ("spread", "speed", "samples"), ("offset", "seed")
     if feedback is not None:
         refuse_idle(context, (*walk, *noise, "hop", "other", "mix"), "with --feedback")
@@ -79,6 +109,7 @@ def granular(
         run(
             GranularOptions(
                 checkpoint=checkpoint,
+                show=show,
                 out=out,
                 recordings=recordings,
                 seconds=seconds,
@@ -92,6 +123,8 @@ def granular(
                 mix=mix,
                 offset=offset,
                 feedback=feedback,
+                phrase=phrase,
+                regions=tuple(region or ()),
                 reading=reading,
             )
         )

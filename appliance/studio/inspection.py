@@ -52,13 +52,13 @@ class Inspection:
             f"{f['name']}: {f['seconds']:.1f} s, {rate} (--true-fps), {len(f['joints'])} joints, root "
             f"{f['root']} (--root)",
             f"  body: {f['height_m']:.2f} m tall (--metres-per-unit), {f['zero_pose']} at rest",
-            f"  faces {_facing_words(f['facing_degrees'], f['facing_share'])} (--facing), floor at "
+            f"  faces {_facing_text(f['facing_degrees'], f['facing_share'])} (--facing), floor at "
             f"{f['floor_m']:.2f} m",
         ]
         found += [f"  changed: {note}" for note in f["changed"]] or [
             "  read as it is: Y up (--up), no change"
         ]
-        found += [f"  masked: {words}" for words in f["masked"]]
+        found += [f"  masked: {message}" for message in f["masked"]]
         if f["masked_frames"]:
             found.append(f"  {f['masked_frames']} of {f['frames']} frames are masked (none: --all-frames)")
         found += [f"  ? {doubt}" for doubt in f["doubts"]]
@@ -158,7 +158,7 @@ def doubts(skeleton: Skeleton, height: float) -> list[str]:
     return asked
 
 
-def _facing_words(degrees: int, share: float) -> str:
+def _facing_text(degrees: int, share: float) -> str:
     if share < 0.5:
         return "all around"
     side = (

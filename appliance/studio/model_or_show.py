@@ -19,6 +19,15 @@ OfShow = Annotated[
     ),
 ]
 
+OfRegion = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--region",
+        help="The part of the body that changes, the rest keeps the phrase: arms, legs, torso, 'left upper "
+        "arm', or a joint, with all below it; repeatable.",
+    ),
+]
+
 
 def require_either(context: typer.Context, model: Path | None, show: Path | None) -> None:
     """Raises BadParameter unless there is one of both, and for options that do nothing with a show."""

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from appliance.dancer.material.maker import open_network
 from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
-from appliance.levers.sources import IMPROVISE, PATH, VARY
+from appliance.levers.sources import GRANULAR, IMPROVISE, PATH, VARY
 from appliance.pose.reading_options import ReadingOptions
 from appliance.show.show import load_show
 from appliance.studio.data.catalogue import ALWAYS, Catalogue
@@ -24,7 +24,7 @@ from appliance.studio.trained_on import open_model
 if TYPE_CHECKING:
     from appliance.studio.coded_windows import Network
 
-MODELS = {VARY: "sequence", PATH: "pose", IMPROVISE: "improviser"}
+MODELS = {VARY: "sequence", GRANULAR: "sequence", PATH: "pose", IMPROVISE: "improviser"}
 TWO_HALVES_S = 8.0  # a longer phrase counts as two takes, so that each has another one to be compared with
 
 

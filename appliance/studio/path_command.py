@@ -11,7 +11,7 @@ from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.clear_errors import clear_errors
-from appliance.studio.model_or_show import OfShow, require_either
+from appliance.studio.model_or_show import OfRegion, OfShow, require_either
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -45,26 +45,47 @@ def path(
     seed: Annotated[int, typer.Option(help="Phases of the wobble.")] = 1,
     start: Annotated[float, typer.Option(min=0.0, help="Second of the phrase to begin at.")] = 0.0,
     seconds: Annotated[float, typer.Option(min=0.5, max=600.0, help="How long the dance is.")] = 10.0,
+    region: OfRegion = None,
     recordings: Moved = None,
     *,
     reading: ReadingOptions,
 ) -> None:
     """Make a dance of a path through the space of a dancer's poses ('Beyond Imitation').
 
-    A phrase's own path with a wobble, or a line that you draw over the map that bunraku map writes.
+    A phrase's own path with a wobble, or a line that you draw over the map that bunraku map writes. With
+    --region only a part of the body follows it, and the rest dances the phrase.
     """
     require_either(context, model, show)
-    has_phrase = phrase is not None or (show is not None and draw is None)
-    if (wobble is None) == (draw is None) or has_phrase != (wobble is not None):
-        raise typer.BadParameter("Give a PHRASE with --wobble AMPLITUDE FREQUENCY, or --draw FILE.")
+    needs_phrase = wobble is not None or bool(region)
+    has_phrase = phrase is not None or (show is not None and needs_phrase)
+    if (wobble is None) == (draw is None) or has_phrase != needs_phrase:
+        raise typer.BadParameter(
+            "Give a PHRASE with --wobble AMPLITUDE FREQUENCY, or --draw FILE; --draw with --region takes a "
+            "PHRASE too."
+        )
     if wobble is not None and not (0 <= wobble[0] <= 5 and 0 < wobble[1] <= 10):
         raise typer.BadParameter("--wobble takes an amplitude of 0 to 5 and a frequency up to 10 Hz.")
     if draw is not None:
-        refuse_idle(context, ("seed", "start"), "with --draw")
+        refuse_idle(context, ("seed",) if region else ("seed", "start"), "with --draw")
     with clear_errors("path"):
         from appliance.studio.pose_space.path import PathOptions, run
 
-        run(PathOptions(model, out, show, phrase, recordings, wobble, draw, seed, start, seconds, reading))
+        run(
+            PathOptions(
+                model=model,
+                out=out,
+                show=show,
+                phrase=phrase,
+                recordings=recordings,
+                wobble=wobble,
+                draw=draw,
+                seed=seed,
+                start=start,
+                seconds=seconds,
+                regions=tuple(region or ()),
+                reading=reading,
+            )
+        )
 
 
 @app.command(name="map")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from appliance.pose import quaternion
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, Dataset
+from appliance.studio.data.regions import joints_of, put_on_region
 from appliance.studio.data.remembered import Remembered
 from appliance.studio.evaluation.coders import MovedJoints, Poses
 from appliance.studio.evaluation.evaluation import load_takes
@@ -62,6 +64,19 @@ def standing(
         roots=np.concatenate([dance.roots, dance.roots[::-1]]),
     )
     return plant_feet(there_and_back, progress=progress).excerpt(0.0, len(poses) / FPS)
+
+
+def only_in(regions: Sequence[str], poses: Poses, given: Recording, dataset: Dataset) -> Poses:
+    """Poses (T, M, 4) of a dance in these regions of the body, of the given phrase elsewhere.
+
+    Raises StudioError for a region that the body does not have.
+    """
+    moving = list(dataset.moving)
+    whole = given.poses[: len(poses)].copy()
+    whole[:, moving] = poses[: len(whole)]
+    joints = joints_of(regions, dataset.skeleton, moving)
+    mixed: Poses = put_on_region(dataset.skeleton, given.poses, whole, joints)[:, moving].astype(np.float32)
+    return mixed
 
 
 def as_on_stage(dance: Recording, floor: Floor, progress: Progress = iter) -> Recording:

@@ -247,9 +247,9 @@ def _plan(training: Training | AnyTraining, device: str) -> str:
     done = f", {100 * training.fraction:.0f} % done" if training.step else ""
     where = "the GPU" if device == "cuda" else f"the CPU ({counted(torch.get_num_threads(), 'thread')})"
     shared = f" in each of {processes.count} processes" if processes.count > 1 else ""
-    network, words = _described(training)
+    network, message = _described(training)
     return (
-        f"{settings.network}, {words}: {parameters(network) / 1e6:.2f} million parameters; {bound} on "
+        f"{settings.network}, {message}: {parameters(network) / 1e6:.2f} million parameters; {bound} on "
         f"{where}{shared}{done}."
     )
 
@@ -258,8 +258,8 @@ def _described(training: Training | AnyTraining) -> tuple[nn.Module, str]:
     """A training's network, and its sizes in words."""
     if isinstance(training, Training):
         sizes = training.autoencoder.shape
-        words = f"windows of {sizes.window} poses, latent {sizes.latent}, width {sizes.width}"
-        return training.autoencoder.network, words
+        message = f"windows of {sizes.window} poses, latent {sizes.latent}, width {sizes.width}"
+        return training.autoencoder.network, message
     if isinstance(training, PoseMixturesTraining):
         shape = training.network.shape
         return training.network, (

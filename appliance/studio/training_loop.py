@@ -136,8 +136,8 @@ class TrainingLoop(ABC, Generic[Report]):
         except (OSError, RuntimeError) as error:  # torch's writer says RuntimeError for a full disk
             partial.unlink(missing_ok=True)
             kept = "The one before is kept: make" if path.exists() else "Make"
-            words = f"{path}: the checkpoint cannot be written; is the disk full?"
-            raise StudioError(f"{words} {kept} room, then continue with --resume.") from error
+            message = f"{path}: the checkpoint cannot be written; is the disk full?"
+            raise StudioError(f"{message} {kept} room, then continue with --resume.") from error
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a checkpoint."""

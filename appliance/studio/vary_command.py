@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -12,17 +11,9 @@ from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.clear_errors import clear_errors
-from appliance.studio.model_or_show import OfShow, require_either
+from appliance.studio.model_or_show import OfRegion, OfShow, require_either
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-
-
-class Region(StrEnum):
-    """Parts of the body that may change by themselves."""
-
-    arms = "arms"
-    legs = "legs"
-    torso = "torso"
 
 
 @app.command()
@@ -57,9 +48,7 @@ def vary(
         Path | None, typer.Option(help="BVH of another phrase to mix in, instead of noise.")
     ] = None,
     share: Annotated[float, typer.Option(min=0.0, max=1.0, help="How much of --mix.")] = 0.5,
-    region: Annotated[
-        list[Region] | None, typer.Option(help="The part of the body that changes; repeatable.")
-    ] = None,
+    region: OfRegion = None,
     free: Annotated[bool, typer.Option("--free", help="Samples from the prior, without a phrase.")] = False,
     on_map: Annotated[
         Path | None,
@@ -110,7 +99,7 @@ def vary(
                 seconds=seconds,
                 mix=mix,
                 share=share,
-                regions=tuple(one.value for one in region or ()),
+                regions=tuple(region or ()),
                 on_map=on_map,
                 keeps_timing=same_timing,
                 reading=reading,

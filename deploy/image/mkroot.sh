@@ -13,7 +13,7 @@ usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--deb FILE] [--key KEY
 Builds the root file system of a box into OUT: a tar where OUT ends with .tar, else a folder.
 
   --arch ARCH        amd64 (default) or arm64. A foreign one's packages are unpacked, and what their own scripts
-                     would do is done from here: of that processor's programs only two run (qemu-user-static).
+                     would do is done from here: of that processor's programs only three run (qemu-user-static).
   --without-kernel   no kernel, no firmware: for systemd-nspawn
   --deb FILE         the package of a box that `make deb` made; left out: one made now from the working tree
   --key KEY          sign that one, so that the box knows whose releases it takes; --next-key KEY.pub as there
@@ -126,7 +126,7 @@ settle_unpacked() {
     ln -sf regulatory.db-debian "$root/usr/lib/firmware/regulatory.db"
     ln -sf regulatory.db.p7s-debian "$root/usr/lib/firmware/regulatory.db.p7s"
     rm -rf "$root/etc/init.d" # systemctl would ask a program of the root about it
-    for name in NetworkManager chrony wpa_supplicant; do
+    for name in NetworkManager avahi-daemon chrony wpa_supplicant; do
         systemctl --root="$root" enable "$name.service" >/dev/null 2>&1 || fail "$name.service cannot be enabled."
     done
     target_python -m compileall -q -s "$root" -p / --invalidation-mode unchecked-hash "$root/usr/lib/python$PYTHON"
@@ -155,7 +155,8 @@ install_release() {
         deb=$(ls "$work"/bunraku_*.deb)
     fi
     if [ $foreign = yes ]; then
-        dpkg --root="$root" --force-script-chrootless --force-architecture --no-triggers --install "$deb"
+        dpkg --root="$root" --force-script-chrootless --force-architecture --no-triggers --install "$deb" &&
+            prepare_show
     else
         cp "$deb" "$root/bunraku.deb"
         chroot "$root" dpkg --install /bunraku.deb
@@ -180,6 +181,13 @@ settle() {
     echo LANG=C.UTF-8 >"$root/etc/default/locale"
     rm -rf "$root"/var/lib/apt/lists/* "$root"/var/cache/* "$root"/var/log/* "$root"/tmp/*
     first_start_done
+}
+
+# The built-in show's start-up data, which the package's own script computes where its Python runs.
+prepare_show() {
+    cp "$(command -v "qemu-$machine-static")" "$root/emulator"
+    chroot "$root" /emulator -cpu cortex-a72 /opt/bunraku/current/bin/python -I -m appliance.cli.prepare_show
+    rm "$root/emulator"
 }
 
 # A program of the root, in an emulated processor.

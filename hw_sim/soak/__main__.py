@@ -58,7 +58,7 @@ def main(
     for line in table(seen):
         print(line)
     write(out, seen, is_over=True)
-    print(f"Written: {out}/soak.json, soak.csv, {_picture(out, seen)}; output of the box: {out}/box/words")
+    print(f"Written: {out}/soak.json, soak.csv, {_picture(out, seen)}; output of the box: {out}/box/output")
     raise typer.Exit(0 if all(limit.holds for limit in limits_of(seen)) else FAILED)
 
 

@@ -35,8 +35,8 @@ class SoakedBox:
 
     def __init__(self, show: Path, folder: Path, ears: Ears) -> None:
         self.folder, self.runtime = folder, Path(f"/dev/shm/bunraku-soak-{os.getpid()}")
-        self.words = folder / "words"
-        self.words.mkdir(parents=True)
+        self.output = folder / "output"
+        self.output.mkdir(parents=True)
         self.show = _with_lamps(show, folder / "show")
         self.sensor_port, self.control_port = free_ports(2)
         self._keys = folder / "sensors.keys"
@@ -45,11 +45,11 @@ class SoakedBox:
         self.box_file.write_text(yaml.safe_dump(self._settings(ears)))
         environment = {name: value for name, value in os.environ.items() if name != "RUNTIME_DIRECTORY"}
         self.units = [
-            Unit(name, (sys.executable, "-m", "appliance.cli", *arguments), self.words / name, environment)
+            Unit(name, (sys.executable, "-m", "appliance.cli", *arguments), self.output / name, environment)
             for name, arguments in self._processes()
         ]
         self.sensors = Unit(
-            *(EMULATOR, self.emulation("venue"), self.words / EMULATOR, environment),
+            *(EMULATOR, self.emulation("venue"), self.output / EMULATOR, environment),
             priority=PRIORITY,  # they stand for hardware, which waits for no processor
         )
         self.load: Unit | None = None

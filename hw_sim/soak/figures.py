@@ -94,11 +94,11 @@ def limits_of(soak: Soak) -> list[Limit]:
     ]
     grown = [one for unit in soak.box.units if (one := growth(unit, soak.seconds)) is not None]
     for one in grown:
-        words = f"{one.first.rss_mb:.1f} -> {one.last.rss_mb:.1f} MB, {one.last.handles} handles"
+        message = f"{one.first.rss_mb:.1f} -> {one.last.rss_mb:.1f} MB, {one.last.handles} handles"
         found.append(
             Limit(
                 f"memory and handles of {one.name}",
-                f"{words} in {_time(one.lived_s)}",
+                f"{message} in {_time(one.lived_s)}",
                 f"at most {MOST_GROWTH_MB:g} MB more after the first minute, no more handles or threads",
                 one.rss_mb <= MOST_GROWTH_MB and one.handles <= 0 and one.threads <= 0,
             )
@@ -142,7 +142,7 @@ def table(soak: Soak) -> list[str]:
         away = ", what it needs is not on this machine" if process["away"] else ""
         lines.append(
             f"{name}: started {process['starts']} times, killed {process['kills']} times{away}; "
-            f"{process['words'] or 'lived too briefly to tell'}"
+            f"{process['resources'] or 'lived too briefly to tell'}"
         )
     temperature = figures["temperature_c"]
     lines += [
@@ -185,7 +185,7 @@ def _process(unit: Unit, run_s: float) -> dict[str, Any]:
         "kills": unit.kills,
         "deaths": unit.deaths,
         "away": unit.is_away,
-        "words": ""
+        "resources": ""
         if grown is None
         else f"in {_time(grown.lived_s)} {grown.first.rss_mb:.1f} -> {grown.last.rss_mb:.1f} MB, "
         f"handles {grown.first.handles} -> {grown.last.handles}, "

@@ -102,8 +102,8 @@ def _await_first_frame(soak: Soak, stopped: Callable[[], bool]) -> None:
         _look_after(soak, now)
         soak.frames.poll(_LOOK_S)
         if now > until or soak.box.stage.deaths:
-            words = soak.box.stage.words.read_text().strip()
-            raise ProbeError(f"The box does not dance:\n{words}")
+            output = soak.box.stage.output.read_text().strip()
+            raise ProbeError(f"The box does not dance:\n{output}")
 
 
 def _dance(
@@ -195,4 +195,4 @@ def _change_load(soak: Soak, name: str) -> None:
     options = dict(LOADS)[name]
     if options:
         temporary = ("--temp-path", str(soak.box.folder))
-        soak.box.load = Unit(LOAD, ("stress-ng", *options, *temporary), soak.box.words / LOAD)
+        soak.box.load = Unit(LOAD, ("stress-ng", *options, *temporary), soak.box.output / LOAD)

@@ -29,11 +29,11 @@ class Unit:
         self,
         name: str,
         command: Sequence[str],
-        words: Path,
+        output: Path,
         environment: Mapping[str, str] = os.environ,
         priority: int | None = None,
     ) -> None:
-        self.name, self.command, self.words = name, tuple(command), words
+        self.name, self.command, self.output = name, tuple(command), output
         self.starts = self.kills = self.deaths = 0
         self.is_away = False
         self.history: list[tuple[float, Vitals]] = []
@@ -95,11 +95,11 @@ class Unit:
     def _start(self) -> None:
         self.starts += 1
         self.longest, self.history = max(self.longest, self.history, key=len), []
-        with self.words.open("ab") as words:
+        with self.output.open("ab") as output:
             self._process = subprocess.Popen(
                 self.command,
                 stdin=subprocess.DEVNULL,
-                stdout=words,
+                stdout=output,
                 stderr=subprocess.STDOUT,
                 env=self._environment,
                 start_new_session=True,  # Ctrl-C is for the soak, which then ends them

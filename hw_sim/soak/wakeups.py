@@ -12,7 +12,7 @@ from hw_sim.soak.delays import SLOT_MS, Delays, Seconds
 PRIORITY = 70  # the stage's
 PERIOD_US = 20_000  # the stage's
 _NO_WISH_US = 1_000_000  # else it keeps the processor from sleeping deeply, and the box would profit
-_LAST_WORDS_S = 5.0
+_LAST_OUTPUT_S = 5.0
 
 
 class Wakeups:
@@ -55,8 +55,8 @@ class Wakeups:
             while data := os.read(process.stdout.fileno(), 65536):
                 self._take(data, now)
         if process.poll() is not None and not self.complaint:
-            words = self._rest.decode(errors="replace").strip() or f"status {process.returncode}"
-            self.complaint = f"cyclictest ended by itself ({words}). It needs real-time rights: be root."
+            message = self._rest.decode(errors="replace").strip() or f"status {process.returncode}"
+            self.complaint = f"cyclictest ended by itself ({message}). It needs real-time rights: be root."
 
     def later_than(self, limit_ms: float) -> int:
         """How many of its wake-ups came later than this, and slots that it slept through."""
@@ -73,7 +73,7 @@ class Wakeups:
             return
         self._process.terminate()
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(_LAST_WORDS_S)
+            self._process.wait(_LAST_OUTPUT_S)
         self._process.kill()
         self._process.wait()
         if self._process.stdout is not None:

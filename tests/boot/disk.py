@@ -52,11 +52,11 @@ class DataDisk:
             image.truncate(megabytes << 20)
         _run("resize2fs", "-f", str(self.image))
 
-    def changed(self, words: str) -> None:
+    def changed(self, arguments: str) -> None:
         """By a line of shell in its root, while it is in use nowhere."""
         self.repaired()
         with tempfile.TemporaryDirectory() as root:
-            mounted = f'mount -o loop "$1" "$2" && cd "$2" && {words} && cd / && umount "$2"'
+            mounted = f'mount -o loop "$1" "$2" && cd "$2" && {arguments} && cd / && umount "$2"'
             private = ("unshare", "--mount", "--propagation", "private")
             _run(*private, "sh", "-ec", mounted, "sh", str(self.image), root)
         self.await_release()
@@ -79,5 +79,5 @@ class DataDisk:
             time.sleep(0.02)
 
 
-def _run(*words: str) -> str:
-    return subprocess.run(words, capture_output=True, text=True, check=True).stdout
+def _run(*arguments: str) -> str:
+    return subprocess.run(arguments, capture_output=True, text=True, check=True).stdout

@@ -121,11 +121,11 @@ class Hall:
         self.switch_sensor_off()
         emulate = [sys.executable, "-m", "hw_sim", "emulate", "--sensor", SENSOR, "--motion", "dance"]
         emulate += ["--keys", str(self.folder / "sensors.keys"), "--host", BOX, "--port", str(SENSORS)]
-        with (self.folder / "sensor.txt").open("ab") as words:
+        with (self.folder / "sensor.txt").open("ab") as output:
             self.sensor = subprocess.Popen(
                 self.network.command(*emulate, "--network", "perfect", "--stand-still", "0"),
                 stdin=subprocess.DEVNULL,
-                stdout=words,
+                stdout=output,
                 stderr=subprocess.STDOUT,
             )
 

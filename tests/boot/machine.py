@@ -87,13 +87,13 @@ class Machine:
             _remove_groups(self.cgroup)
             raise
 
-    def run(self, *words: str, check: bool = True, patience_s: float = PATIENCE_S) -> str:
+    def run(self, *arguments: str, check: bool = True, patience_s: float = PATIENCE_S) -> str:
         """What a command says that runs inside, as root, with nothing of this process's environment."""
-        entered = ["nsenter", "--target", str(self.pid1), "--all", *words]
+        entered = ["nsenter", "--target", str(self.pid1), "--all", *arguments]
         done = subprocess.run(entered, capture_output=True, text=True, timeout=patience_s, env=_ENVIRONMENT)
         if check and done.returncode != 0:
             raise AssertionError(
-                f"{' '.join(words)}: {done.returncode}\n{done.stdout}{done.stderr}\n{self.log()}"
+                f"{' '.join(arguments)}: {done.returncode}\n{done.stdout}{done.stderr}\n{self.log()}"
             )
         return done.stdout
 

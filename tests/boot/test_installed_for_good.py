@@ -137,5 +137,5 @@ def _watch_is_over(box: Box) -> bool:
     return box.machine.show(_WATCH, "ActiveState") in ("inactive", "failed")
 
 
-def _bash(box: Box, words: str, patience_s: float = 60.0) -> str:
-    return box.machine.run("bash", "-c", words, patience_s=patience_s)
+def _bash(box: Box, message: str, patience_s: float = 60.0) -> str:
+    return box.machine.run("bash", "-c", message, patience_s=patience_s)

@@ -38,7 +38,7 @@ def test_latency_is_measured_with_the_rights_of_a_stage(dancing: Box, device: De
     finally:
         device.ask("/api/command", {"address": "/go"})
     assert document["figures"]["ticks"] > 100 and document["software"]["bunraku"]
-    assert {limit["words"] for limit in document["limits"]} >= {"transport, median", "late ticks"}
+    assert {limit["message"] for limit in document["limits"]} >= {"transport, median", "late ticks"}
     machine.await_that(lambda: machine.show(PROVE, "ActiveState") == "inactive", "it does not end")
     assert not machine.run("find", "/run/bunraku/prove", "-name", "wanted").strip()
 
@@ -46,7 +46,7 @@ def test_latency_is_measured_with_the_rights_of_a_stage(dancing: Box, device: De
 def test_the_doctor_sees_the_box_from_its_unit(dancing: Box, device: Device) -> None:
     assert device.ask("/api/prove", {"kind": "doctor"})[0] == 200
     found = {one["what"]: one for one in device.proven("doctor")["findings"]}
-    assert "Hz" in found["stage"]["words"]
+    assert "Hz" in found["stage"]["message"]
     assert found[f"{STAGE}.service"]["verdict"] != "wrong"
 
 
@@ -54,8 +54,8 @@ def _play(box: Box) -> tuple[bool, str] | None:
     """Whether the box that is measured may ask for real time, and its scheduling; None before it dances."""
     procs = f"/sys/fs/cgroup/system.slice/{PROVE}.service/cgroup.procs"
     for pid in box.machine.run("cat", procs, check=False).split():
-        words = box.machine.run("cat", f"/proc/{pid}/cmdline", check=False).split("\0")
-        if "play" in words and "at_s" in box.machine.run("cat", "/run/bunraku/prove/progress"):
+        arguments = box.machine.run("cat", f"/proc/{pid}/cmdline", check=False).split("\0")
+        if "play" in arguments and "at_s" in box.machine.run("cat", "/run/bunraku/prove/progress"):
             limits = box.machine.run("cat", f"/proc/{pid}/limits", check=False).splitlines()
             granted = any(line.split()[:4] == ["Max", "realtime", "priority", "70"] for line in limits)
             return granted, _policy(box, pid)

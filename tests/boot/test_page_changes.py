@@ -26,7 +26,7 @@ def test_a_changed_box_file_counts_at_once_and_the_one_before_comes_back(
         "/api/box/file", {"text": told["text"], "values": [[["control", "port"], "x"]], "now": True}
     )
     assert (
-        status == 200 and "control.port" in answer["problems"][0]["words"] and answer["problems"][0]["line"]
+        status == 200 and "control.port" in answer["problems"][0]["message"] and answer["problems"][0]["line"]
     )
     before = device.ask("/api/box")[1]["shows"][0]["id"]
     change = {"text": told["text"], "values": [[location, False]], "now": True}
@@ -54,8 +54,8 @@ def test_a_kept_cue_is_in_the_show_that_the_box_dances(dancing: Box, device: Dev
         return answers[-1][0] != 409
 
     device.await_that(knows_the_settings, "the page knows no settings of the stage")
-    status, words = answers[-1]
-    assert status == 200, words
+    status, message = answers[-1]
+    assert status == 200, message
     status, answer = device.ask("/api/cue/dance", {})
     assert (status, answer.get("problems")) == (200, []), answer
     device.await_that(lambda: "found" in _cues(device), "the new cue is not in the show")

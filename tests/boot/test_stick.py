@@ -19,7 +19,7 @@ def _name_of_the_show(box: Box) -> str:
     return str(
         box.machine.await_that(
             lambda: [
-                words[0] for where, words in box.hall.ask("/status", 0.5) if where == "/bunraku/status/show"
+                text[0] for where, text in box.hall.ask("/status", 0.5) if where == "/bunraku/status/show"
             ],
             "show control does not answer",
         )[0]
@@ -40,9 +40,7 @@ def test_a_new_show_is_danced_and_kept_and_a_broken_one_refused_with_file_and_li
     show = show_on(tmp_path / "broken", "Broken") / "show.yaml"
     show.write_text(show.read_text().replace("coding_iterations: 10", "coding_iteration: 10"))
     line = next(
-        number
-        for number, words in enumerate(show.read_text().splitlines(), 1)
-        if "coding_iteration:" in words
+        number for number, text in enumerate(show.read_text().splitlines(), 1) if "coding_iteration:" in text
     )
     box.power_on(stick=Stick.made(tmp_path / "broken.img", tmp_path / "broken").image)
     box.await_frames()

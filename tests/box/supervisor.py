@@ -17,20 +17,20 @@ class Supervisor:
     def heard(self) -> list[str]:
         """All that came until now, one entry a datagram."""
         self.socket.setblocking(False)
-        words = []
+        messages = []
         while True:
             try:
-                words.append(self.socket.recv(4096).decode())
+                messages.append(self.socket.recv(4096).decode())
             except BlockingIOError:
-                return words
+                return messages
 
     def waits_for(self, word: str, within_s: float) -> str:
         """The next datagram that begins with `word`; raises TimeoutError when none comes."""
         until = time.monotonic() + within_s
         while (left_s := until - time.monotonic()) > 0:
             self.socket.settimeout(left_s)
-            if (words := self.socket.recv(4096).decode()).startswith(word):
-                return words
+            if (message := self.socket.recv(4096).decode()).startswith(word):
+                return message
         raise TimeoutError(f"{word} was not heard within {within_s:g} s")
 
     def close(self) -> None:

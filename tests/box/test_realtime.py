@@ -43,12 +43,12 @@ def test_the_collector_rests_and_other_threads_stay_ordinary() -> None:
 
 
 def test_without_rights_it_runs_and_says_what_that_costs() -> None:
-    facts, words = run(WITHOUT_RIGHTS)
+    facts, output = run(WITHOUT_RIGHTS)
     assert facts.split()[0] == "2"
-    assert "No real-time priority" in words
-    assert "25 to 340 ms late" in words
-    assert "Memory is not locked" in words
-    assert "ulimit -r 70" in words
+    assert "No real-time priority" in output
+    assert "25 to 340 ms late" in output
+    assert "Memory is not locked" in output
+    assert "ulimit -r 70" in output
 
 
 def test_what_a_unit_has_given_is_used_where_nothing_more_may_be_asked_for() -> None:
@@ -62,6 +62,6 @@ from appliance.box.realtime import borrowed_priority
 with borrowed_priority(10):
     pass
 """
-    facts, words = run(given + WITHOUT_RIGHTS + measured)
+    facts, output = run(given + WITHOUT_RIGHTS + measured)
     assert facts.split()[-1] == "0", "another thread is ordinary"
-    assert "No real-time priority" not in words
+    assert "No real-time priority" not in output

@@ -128,9 +128,9 @@ def at(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return at
 
 
-def refused(bunraku: Command, words: str, place: Path, at: dict[str, Path]) -> str:
+def refused(bunraku: Command, arguments: str, place: Path, at: dict[str, Path]) -> str:
     """What a command that must fail says, judged: sentences, about the file that was given."""
-    said = bunraku(*(word.format(place, **at) for word in words.split()), status=REFUSED).err.strip()
+    said = bunraku(*(word.format(place, **at) for word in arguments.split()), status=REFUSED).err.strip()
     assert not NO_SENTENCE.search(said), said
     assert said.endswith((".", "?")), said
     return said
@@ -140,21 +140,21 @@ def test_there_are_60_kinds_of_bad_input() -> None:
     assert len(readers()) + len(WRITERS.strip().splitlines()) > 60
 
 
-@pytest.mark.parametrize(("words", "bad"), readers())
+@pytest.mark.parametrize(("arguments", "bad"), readers())
 def test_what_cannot_be_read_is_refused_in_a_sentence(
-    words: str, bad: str, at: dict[str, Path], bunraku: Command
+    arguments: str, bad: str, at: dict[str, Path], bunraku: Command
 ) -> None:
-    assert at[bad].name in refused(bunraku, words, at[bad], at)
+    assert at[bad].name in refused(bunraku, arguments, at[bad], at)
 
 
-@pytest.mark.parametrize("words", WRITERS.strip().splitlines())
+@pytest.mark.parametrize("arguments", WRITERS.strip().splitlines())
 def test_what_cannot_be_written_is_refused_in_a_sentence(
-    words: str, at: dict[str, Path], disk: Callable[[int, Path], None], bunraku: Command, tmp_path: Path
+    arguments: str, at: dict[str, Path], disk: Callable[[int, Path], None], bunraku: Command, tmp_path: Path
 ) -> None:
-    folder = at["edited"] if "{edited}" in words else tmp_path
+    folder = at["edited"] if "{edited}" in arguments else tmp_path
     (at["edited"] / "show.yaml").touch()
     disk(errno.EROFS, folder)
-    assert "read-only" in refused(bunraku, words, tmp_path, at).lower()
+    assert "read-only" in refused(bunraku, arguments, tmp_path, at).lower()
 
 
 def test_one_frame_is_too_little_to_learn_from(at: dict[str, Path], bunraku: Command) -> None:

@@ -20,8 +20,8 @@ SHOWS = bundled_shows()
 
 @pytest.mark.parametrize("given", [("martial",), ("--show", "martial")])
 def test_check_takes_its_name(bunraku: Command, tmp_path: Path, given: tuple[str, ...]) -> None:
-    words = bunraku("check", *given, "--box", write_box(tmp_path)).out
-    assert f"{load_show(SHOWS['martial']).config.name}: the bundle is whole." in words
+    output = bunraku("check", *given, "--box", write_box(tmp_path)).out
+    assert f"{load_show(SHOWS['martial']).config.name}: the bundle is whole." in output
 
 
 def test_check_says_that_a_map_leads_nowhere(

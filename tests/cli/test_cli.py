@@ -43,8 +43,8 @@ def test_version(bunraku: Command) -> None:
 
 
 def test_help_names_the_commands(bunraku: Command) -> None:
-    words = bunraku("--help").out
-    assert all(command in words for command in ("play", "check", "filmstrip", "version"))
+    output = bunraku("--help").out
+    assert all(command in output for command in ("play", "check", "filmstrip", "version"))
 
 
 @pytest.mark.parametrize(
@@ -67,29 +67,33 @@ def test_a_broken_show_is_refused_with_file_and_cause(
 ) -> None:
     show = write_show(tmp_path / "show")
     (show / file).write_text(text)
-    words = bunraku("play", "--show", show, "--box", str(write_box(tmp_path)), "--seconds", "1", status=2).err
-    assert re.search(complaint, words.replace("\n", " "))
+    output = bunraku(
+        "play", "--show", show, "--box", str(write_box(tmp_path)), "--seconds", "1", status=2
+    ).err
+    assert re.search(complaint, output.replace("\n", " "))
 
 
 def test_a_broken_box_file_is_refused_with_its_line(tmp_path: Path, bunraku: Command) -> None:
     box = write_box(tmp_path, "limits:\n  tick_budget: 5")
-    words = bunraku("play", "--show", str(write_show(tmp_path / "show")), "--box", box, status=2).err
-    assert "box.yaml:2" in words
-    assert "tick_budget_ms" in words
+    output = bunraku("play", "--show", str(write_show(tmp_path / "show")), "--box", box, status=2).err
+    assert "box.yaml:2" in output
+    assert "tick_budget_ms" in output
 
 
 def test_a_phrase_shorter_than_a_window_is_refused(tmp_path: Path, bunraku: Command) -> None:
     show = write_show(tmp_path / "show")
     write_bvh(show / "phrase.bvh", swaying_phrase().excerpt(0.0, 0.1))
-    words = bunraku("play", "--show", show, "--box", str(write_box(tmp_path)), "--seconds", "1", status=2).err
-    assert "5 poses" in words
+    output = bunraku(
+        "play", "--show", show, "--box", str(write_box(tmp_path)), "--seconds", "1", status=2
+    ).err
+    assert "5 poses" in output
 
 
 def test_check_passes_a_sound_show_and_reports_its_cost(tmp_path: Path, bunraku: Command) -> None:
     show = packed_show(tmp_path)
-    words = bunraku("check", show).out
-    assert "the bundle is whole" in words
-    assert "3 coding iterations cost" in words
+    output = bunraku("check", show).out
+    assert "the bundle is whole" in output
+    assert "3 coding iterations cost" in output
 
 
 def test_check_reads_a_box_file_against_the_show(tmp_path: Path, bunraku: Command) -> None:
@@ -97,9 +101,9 @@ def test_check_reads_a_box_file_against_the_show(tmp_path: Path, bunraku: Comman
     box = write_box(tmp_path, "sensors: {udp: null}")
     assert "Universe 1 has no wire, so these stay dark: wash" in bunraku("check", show, "--box", box).out
     box.write_text("outputs:\n  posistagenet: [{joints: [Chset]}]\nlights:\n  places: [{fixture: wahs}]\n")
-    words = bunraku("check", show, "--box", box, status=2).err
-    assert "box.yaml:2: The show's skeleton has no joint 'Chset'. Did you mean 'Chest'?" in words
-    assert "box.yaml:4: The show has no fixture 'wahs'. Did you mean 'wash'?" in words
+    output = bunraku("check", show, "--box", box, status=2).err
+    assert "box.yaml:2: The show's skeleton has no joint 'Chset'. Did you mean 'Chest'?" in output
+    assert "box.yaml:4: The show has no fixture 'wahs'. Did you mean 'wash'?" in output
 
 
 def test_check_refuses_a_changed_file(tmp_path: Path, bunraku: Command) -> None:
@@ -113,9 +117,9 @@ def test_check_and_play_say_the_same_of_a_changed_show(tmp_path: Path, bunraku: 
     play = ("play", "--alone", "--show", show, "--box", box, "--seconds", "0.2")
     assert "as it was packed" not in bunraku(*play).out
     (show / "phrase.bvh").write_text((show / "phrase.bvh").read_text() + "\n")
-    words = f"{show} is not as it was packed. It is danced as it is; a box takes it from no stick."
-    assert words in bunraku("check", show, status=2).err
-    assert words in bunraku(*play).out
+    output = f"{show} is not as it was packed. It is danced as it is; a box takes it from no stick."
+    assert output in bunraku("check", show, status=2).err
+    assert output in bunraku(*play).out
     bunraku("pack", show)
     assert "as it was packed" not in bunraku(*play).out
 
@@ -159,10 +163,10 @@ def test_without_a_sensors_key_check_refuses_and_play_dances(
     if keys is not None:
         (tmp_path / "sensors.keys").write_text(keys)
     assert said in bunraku("check", show, "--box", box, status=2).err
-    words = bunraku("play", "--show", show, "--box", box, "--seconds", "0.2").out
-    assert said in words
-    assert "the dancer moves freely" in words
-    assert re.search(r"Danced [1-9]\d* ticks", words)
+    output = bunraku("play", "--show", show, "--box", box, "--seconds", "0.2").out
+    assert said in output
+    assert "the dancer moves freely" in output
+    assert re.search(r"Danced [1-9]\d* ticks", output)
 
 
 @pytest.mark.parametrize(
@@ -181,12 +185,12 @@ def test_a_box_that_no_wearable_reaches_is_reported(
         tmp_path, f"sensors: {{udp: {udp}, keys: sensors.keys}}\ncontrol: null\noutputs: {{osc: []}}"
     )
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
-    for words in (
+    for output in (
         bunraku("check", show, "--box", box).out,
         bunraku("play", "--show", show, "--box", box, "--seconds", "0.2").out,
     ):
-        assert ("No wearable on Wi-Fi reaches the box" in words) == bool(said)
-        assert said in words
+        assert ("No wearable on Wi-Fi reaches the box" in output) == bool(said)
+        assert said in output
 
 
 def test_a_filmstrip_of_a_recording_and_of_a_journal(tmp_path: Path, bunraku: Command) -> None:
@@ -212,8 +216,8 @@ def test_a_broken_plug_in_costs_only_its_own_commands(capsys: pytest.CaptureFixt
     broken = EntryPoint("studio", "tests.stage.no_such_module:app", "bunraku.commands")
     mine = EntryPoint("mine", "tests.cli.test_cli:plugged", "bunraku.commands")
     assert "emote" in parser("emote", plug_ins([broken, mine])).commands
-    [words] = capsys.readouterr().err.splitlines()
-    assert words.startswith("bunraku: the commands of 'studio' are not available here (No module named")
+    [output] = capsys.readouterr().err.splitlines()
+    assert output.startswith("bunraku: the commands of 'studio' are not available here (No module named")
 
 
 plugged = typer.Typer()

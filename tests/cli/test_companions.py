@@ -136,7 +136,7 @@ def test_a_companion_that_cannot_start_is_reported_and_retried() -> None:
 
 
 def test_a_companion_that_does_not_end_is_killed(diary: Diary, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(companions, "LAST_WORDS_S", 0.2)
+    monkeypatch.setattr(companions, "LAST_OUTPUT_S", 0.2)
     stubborn = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); "
     stubborn += "open(sys.argv[1], 'a').write('0\\n'); time.sleep(60)"
     with Companions([diary.child(stubborn)], print, lambda: True):

@@ -95,7 +95,7 @@ def test_a_show_control_that_hangs_is_started_again_and_told(tmp_path: Path) -> 
         began = time.monotonic()
         for name, kind in kinds.items():
             wait_until(lambda: set(children_running(box.process.pid, kind)) - set(stopped.values()))  # noqa: B023
-            assert f"hung: it gave no sign for {WATCHDOG_S[name]:g} s" in box.words
+            assert f"hung: it gave no sign for {WATCHDOG_S[name]:g} s" in box.output
         print(f"All started again {time.monotonic() - began:.1f} s after they stood still.")
         wait_until(page.is_open)
         health = ProcessHealth(box.runtime)

@@ -34,13 +34,13 @@ def rehearsal(folder: Path, *options: str) -> subprocess.Popen[str]:
     )
 
 
-def said_until(process: subprocess.Popen[str], words: str) -> str:
+def said_until(process: subprocess.Popen[str], text: str) -> str:
     """What it printed, up to the line with these words."""
     assert process.stdout is not None
     said = ""
     for line in process.stdout:
         said += line
-        if words in line:
+        if text in line:
             return said
     raise AssertionError(said)
 

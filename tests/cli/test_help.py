@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from appliance.cli.app import PLUG_INS, parser, plug_ins
-from appliance.cli.examples import EXAMPLES, ORDER, OTHER_WORDS
+from appliance.cli.examples import EXAMPLES, ORDER, SYNONYMS
 from appliance.cli.help_page import MACHINERY
 from tests.command import Command
 
@@ -36,7 +36,7 @@ ALL = sorted(paths(whole()))
 
 def test_every_command_has_an_example_and_its_place() -> None:
     assert sorted(EXAMPLES) == ALL, "appliance/cli/examples.py has an example for each command, and no other"
-    assert set(OTHER_WORDS) == set(ORDER)
+    assert set(SYNONYMS) == set(ORDER)
 
 
 @pytest.mark.parametrize("path", [path for path in ALL if path not in ("preflight", "release")])
@@ -55,11 +55,11 @@ def test_a_page_of_help(path: str, bunraku: Command) -> None:
 
 @pytest.mark.parametrize("example", sorted({one for examples in EXAMPLES.values() for one in examples}))
 def test_an_example_parses(example: str) -> None:
-    words = shlex.split(example.partition(" > ")[0])[1:]
+    arguments = shlex.split(example.partition(" > ")[0])[1:]
     command, context = whole(), None
-    while getattr(command, "commands", None) and words and not words[0].startswith("-"):
-        command = command.commands[words.pop(0)]
-    context = command.make_context("bunraku", words)
+    while getattr(command, "commands", None) and arguments and not arguments[0].startswith("-"):
+        command = command.commands[arguments.pop(0)]
+    context = command.make_context("bunraku", arguments)
     assert context.params is not None
 
 
@@ -75,17 +75,17 @@ def test_an_example_parses(example: str) -> None:
     ],
 )
 def test_the_nearest_command_by_spelling_or_meaning(word: str, meant: str, bunraku: Command) -> None:
-    words = bunraku(word, status=2).err
-    assert words == f"bunraku: There is no command '{word}'. Did you mean '{meant}'?\n"
+    text = bunraku(word, status=2).err
+    assert text == f"bunraku: There is no command '{word}'. Did you mean '{meant}'?\n"
 
 
 def test_a_word_that_is_near_to_none(bunraku: Command) -> None:
     assert "bunraku -h lists all" in bunraku("qqqq", status=2).err
 
 
-@pytest.mark.parametrize("words", ["--version", "play --version", "sensors --version"])
-def test_the_version_by_any_command(words: str, bunraku: Command) -> None:
-    assert bunraku(*words.split()).out == bunraku("version").out
+@pytest.mark.parametrize("arguments", ["--version", "play --version", "sensors --version"])
+def test_the_version_by_any_command(arguments: str, bunraku: Command) -> None:
+    assert bunraku(*arguments.split()).out == bunraku("version").out
 
 
 def test_flags_take_no_value_and_values_have_words(bunraku: Command) -> None:

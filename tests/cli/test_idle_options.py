@@ -8,7 +8,7 @@ from tests.command import Command
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         ("play --alone --window", "--window does nothing with --alone"),
         ("project --offscreen 64x64 --key", "--key does nothing without --raw or --frames"),
@@ -21,9 +21,9 @@ from tests.command import Command
         ("filmstrip a.bvh --show default", "--show does nothing without --look"),
     ],
 )
-def test_it_is_named_and_nothing_is_done(arguments: str, words: str, bunraku: Command) -> None:
+def test_it_is_named_and_nothing_is_done(arguments: str, message: str, bunraku: Command) -> None:
     said = " ".join(bunraku(*arguments.split(), status=2).err.replace("│", " ").split())
-    assert words in said and "out." in said, said
+    assert message in said and "out." in said, said
 
 
 def test_an_option_that_the_user_did_not_write_is_no_reason(bunraku: Command) -> None:

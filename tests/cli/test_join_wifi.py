@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from appliance.cli.console import card_lines
-from appliance.cli.join_wifi import WORDS, Places, join_wifi
+from appliance.cli.join_wifi import MESSAGE_FILE, Places, join_wifi
 from appliance.release.wifi import NAME, PROFILE
 from appliance.show.box import BoxConfig
 
@@ -44,14 +44,14 @@ class Box:
         return join_wifi(self.places, self._run, self._wait, self._name)
 
     @property
-    def words(self) -> str:
-        path = self.folder / "run" / WORDS
+    def output(self) -> str:
+        path = self.folder / "run" / MESSAGE_FILE
         return path.read_text() if path.exists() else ""
 
     def _run(self, command: Sequence[str]) -> subprocess.CompletedProcess[str]:
         self.ran.append(tuple(command))
-        words = self.fails.get(command[0])
-        return subprocess.CompletedProcess(command, words is not None, "", words or "")
+        output = self.fails.get(command[0])
+        return subprocess.CompletedProcess(command, output is not None, "", output or "")
 
     def _wait(self, seconds: float) -> None:
         self.waited_s += seconds
@@ -83,7 +83,7 @@ def test_the_network_on_the_card_is_joined_and_kept(box: Box) -> None:
     assert (box.folder / "kept" / NAME).stat().st_mode & 0o077 == 0
     assert ("iw", "reg", "set", "DE") in box.ran
     assert box.named == "puppet"
-    assert box.words == ""
+    assert box.output == ""
 
 
 def test_the_stick_counts_before_the_card_and_outlives_being_pulled(box: Box) -> None:
@@ -103,8 +103,8 @@ def test_a_fault_is_said_with_its_line_and_the_network_before_stays(box: Box) ->
     before = (box.folder / "kept" / PROFILE).read_bytes()
     (box.folder / "boot" / NAME).write_text(GOOD.replace("password", "pasword"))
     assert box.power_on() == 1
-    assert f"{NAME}:3: Unknown key 'pasword'." in box.words
-    assert "keeps the network from before" in box.words
+    assert f"{NAME}:3: Unknown key 'pasword'." in box.output
+    assert "keeps the network from before" in box.output
     assert not box.ran
     assert (box.folder / "kept" / PROFILE).read_bytes() == before
 
@@ -125,11 +125,13 @@ def test_a_network_that_is_not_joined_is_said_and_tried_again(box: Box) -> None:
     (box.folder / "boot" / NAME).write_text(GOOD)
     box.fails["nmcli"] = "Error: Connection activation failed: Secrets were required\n"
     assert box.power_on() == 1
-    assert "not in the Wi-Fi 'hall' (Error: Connection activation failed: Secrets were required)" in box.words
+    assert (
+        "not in the Wi-Fi 'hall' (Error: Connection activation failed: Secrets were required)" in box.output
+    )
     assert (box.folder / "kept" / PROFILE).exists(), "NetworkManager goes on trying"
     box.fails.clear()
     assert box.power_on() == 0
-    assert box.words == ""
+    assert box.output == ""
 
 
 def test_the_box_makes_the_network_itself(box: Box) -> None:
@@ -148,7 +150,7 @@ def test_an_access_point_that_fails_is_said_and_tried_at_the_next_power_on(box: 
     (box.folder / "boot" / NAME).write_text(AP)
     box.fails["bunraku-access-point"] = "the radio of wlan7 cannot be an access point."
     assert box.power_on() == 1
-    assert box.words == "the radio of wlan7 cannot be an access point.\n"
+    assert box.output == "the radio of wlan7 cannot be an access point.\n"
     box.fails.clear()
     assert box.power_on() == 0
 
@@ -157,7 +159,7 @@ def test_a_box_without_a_card_waits_for_one_and_says_so(box: Box) -> None:
     (box.folder / "boot" / NAME).write_text(GOOD)
     (box.folder / "cards/wlan7/phy80211").rmdir()
     assert box.power_on() == 1
-    assert "no Wi-Fi card" in box.words
+    assert "no Wi-Fi card" in box.output
     assert box.waited_s >= 10
 
 
@@ -165,4 +167,4 @@ def test_a_disk_that_cannot_be_written_is_said(box: Box) -> None:
     (box.folder / "boot" / NAME).write_text(GOOD)
     (box.folder / "kept").rmdir()
     assert box.power_on() == 1
-    assert "cannot be written" in box.words
+    assert "cannot be written" in box.output

@@ -26,7 +26,7 @@ def recorded(tmp_path: Path) -> Path:
     night = Night(write_show(tmp_path / "show"), tmp_path / "runtime")
     night.dance(30)
     night.order("rate", 0.5)
-    night.recorder.event("said", 1000.5, words="The network gives poses again.")
+    night.recorder.event("said", 1000.5, message="The network gives poses again.")
     night.dance(20, late_s=0.012)
     return night.kept(tmp_path / "journal")
 
@@ -93,8 +93,8 @@ def test_of_several_puppets_the_one_that_is_written_is_named_and_may_be_chosen(
     _, _, strips, *_, start_s = drawn
     assert [strip.label for strip in strips] == ["left", "right", "late", "slow"] and start_s == 0.6
     assert strips[0].holds is not None and np.array_equal(strips[3].roots, danced[30:55])
-    words = bunraku("filmstrip", kept, "--show", tmp_path / "show", "--up", "z", status=2).err
-    assert "--show does nothing without --look" in words
+    message = bunraku("filmstrip", kept, "--show", tmp_path / "show", "--up", "z", status=2).err
+    assert "--show does nothing without --look" in message
 
 
 def test_a_recording_has_the_ending_of_its_format(recorded: Path, tmp_path: Path, bunraku: Command) -> None:

@@ -27,7 +27,7 @@ def test_a_file_closed_during_the_search_hides_no_process(tmp_path: Path) -> Non
     for number in (2, 4):
         (process / f"fd/{number}").touch()  # no link, so that it cannot be read as one
     (finding, *_) = ports(HostView(tmp_path, box))
-    assert finding.words.endswith("the box listens."), finding
+    assert finding.message.endswith("the box listens."), finding
 
 
 # Binds a port, says which, and waits until its standard input is closed.

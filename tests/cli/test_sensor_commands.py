@@ -23,7 +23,7 @@ from tests.show_control.doubles import until
 
 
 @pytest.mark.parametrize(
-    ("words", "name", "sensor"),
+    ("arguments", "name", "sensor"),
     [
         (["strobe", "left-wrist"], "strobe", "left-wrist"),
         (["neutral"], "neutral", ""),
@@ -32,13 +32,13 @@ from tests.show_control.doubles import until
     ],
 )
 def test_commands_reach_the_box_and_its_answer_is_printed(
-    box: RunningBox, bunraku: Command, words: list[str], name: str, sensor: str
+    box: RunningBox, bunraku: Command, arguments: list[str], name: str, sensor: str
 ) -> None:
-    out, _ = bunraku("sensors", *words, "--box", box.box_file)
+    out, _ = bunraku("sensors", *arguments, "--box", box.box_file)
     assert out == f"{name} it is.\n"
     assert box.orders == [Order(name, text=sensor)]
     box.done = False
-    _, err = bunraku("sensors", *words, "--box", box.box_file, status=2)
+    _, err = bunraku("sensors", *arguments, "--box", box.box_file, status=2)
     assert err == f"bunraku: {name} it is.\n"
 
 
@@ -58,7 +58,7 @@ def test_a_stage_that_never_answers_is_reported_after_the_timeout(box: RunningBo
     box.stage.obeys = False
     client = ControlClient(("127.0.0.1", box.control.port), patience_s=3.0)
     answer = client.ask("/sensors/strobe", "left-wrist")
-    assert not answer.done and "does not answer" in answer.words
+    assert not answer.done and "does not answer" in answer.message
 
 
 def test_changes_of_the_key_file_reach_the_box(box: RunningBox, tmp_path: Path, bunraku: Command) -> None:
@@ -216,7 +216,7 @@ def test_without_a_box_a_change_counts_later(tmp_path: Path, bunraku: Command) -
 
 
 @pytest.mark.parametrize(
-    ("words", "complaint"),
+    ("arguments", "complaint"),
     [
         (["revoke", "haed"], "Did you mean 'head'?"),
         (["rename", "spare-1", "left-wrist"], "already"),
@@ -228,10 +228,10 @@ def test_without_a_box_a_change_counts_later(tmp_path: Path, bunraku: Command) -
     ],
 )
 def test_a_refusal_is_one_clear_line(
-    box: RunningBox, tmp_path: Path, bunraku: Command, words: list[str], complaint: str
+    box: RunningBox, tmp_path: Path, bunraku: Command, arguments: list[str], complaint: str
 ) -> None:
     before = (tmp_path / "sensors.keys").read_bytes()
-    _, err = bunraku("sensors", *words, "--box", box.box_file, status=2)
+    _, err = bunraku("sensors", *arguments, "--box", box.box_file, status=2)
     assert complaint in err
     assert len(err.splitlines()) == 1
     assert (tmp_path / "sensors.keys").read_bytes() == before
@@ -239,7 +239,7 @@ def test_a_refusal_is_one_clear_line(
 
 
 @pytest.mark.parametrize(
-    "words",
+    "arguments",
     [
         ["replace", "left-wrist", "head"],
         ["replace", "spare-1", "head"],  # the names the wrong way round
@@ -248,15 +248,15 @@ def test_a_refusal_is_one_clear_line(
     ],
 )
 def test_a_sensor_of_the_show_is_taken_from_it_only_when_told_so(
-    box: RunningBox, tmp_path: Path, bunraku: Command, words: list[str]
+    box: RunningBox, tmp_path: Path, bunraku: Command, arguments: list[str]
 ) -> None:
     before = (tmp_path / "sensors.keys").read_bytes()
-    _, err = bunraku("sensors", *words, "--box", box.box_file, status=2)
+    _, err = bunraku("sensors", *arguments, "--box", box.box_file, status=2)
     assert "head is a sensor of this show (lost)" in err
     assert "Nothing was changed. Spares: spare-1." in err and "--anyway" in err
     assert (tmp_path / "sensors.keys").read_bytes() == before
     assert box.orders == []
-    bunraku("sensors", *words, "--anyway", "--box", box.box_file)
+    bunraku("sensors", *arguments, "--anyway", "--box", box.box_file)
     assert (tmp_path / "sensors.keys").read_bytes() != before
     assert [order.name for order in box.orders] == ["reload"]
 
@@ -301,7 +301,7 @@ def test_provision_refuses_wrong_options_before_it_opens_a_port(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.stdin", open("/dev/null"))  # noqa: SIM115, PTH123
-    for words, complaint in (
+    for arguments, complaint in (
         (["--name", "two words"], "without spaces"),
         (["--name", "head", "--axes", "24"], "two hexadecimal numbers"),
         (["--name", "head", "--axes", "20,00"], "no axes"),
@@ -310,5 +310,5 @@ def test_provision_refuses_wrong_options_before_it_opens_a_port(
         (["--name", "head", "--network", "n"], "No password came"),
         (["--name", "head"], "There is no serial port /dev/nowhere"),
     ):
-        assert complaint in bunraku("provision", "--port", "/dev/nowhere", *words, status=2).err
+        assert complaint in bunraku("provision", "--port", "/dev/nowhere", *arguments, status=2).err
     assert list(tmp_path.iterdir()) == []

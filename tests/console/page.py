@@ -105,8 +105,8 @@ def page_alone(
     box_file.write_text(yaml.safe_dump(whole | ({"sensors": sensors} if sensors else {})))
     with Process(folder / "page.txt", [*BUNRAKU, "console", "--box", box_file]) as process:
         page = Page(port, box_file)
-        wait_until(lambda: page.is_open() or process.process.poll() is not None, lambda: process.words)
-        assert process.process.poll() is None, process.words
+        wait_until(lambda: page.is_open() or process.process.poll() is not None, lambda: process.output)
+        assert process.process.poll() is None, process.output
         yield page, process
 
 
@@ -125,9 +125,9 @@ def box_with_page(
     emulated = ("--emulate",) if has_sensors else ()
     with playing(show, folder, *emulated, *arguments, settings=whole) as box:
         page = Page(port, box.box_file)
-        wait_until(page.is_open, lambda: box.words)
+        wait_until(page.is_open, lambda: box.output)
         wait_until(
-            lambda: _is_linked(page) if has_sensors else page.status().get("status"), lambda: box.words
+            lambda: _is_linked(page) if has_sensors else page.status().get("status"), lambda: box.output
         )
         try:
             yield box, page

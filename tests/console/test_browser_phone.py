@@ -232,7 +232,7 @@ def test_a_phone_that_sends_nonsense_is_counted_and_holds_nothing(stage: Stage) 
     assert page.get("/api/phones").value[0]["counts"]["no_numbers"] == 9
     wait_until(
         lambda: any(
-            one["name"] == "phone-refused" and NAME in one["words"] for one in page.status()["fallbacks"]
+            one["name"] == "phone-refused" and NAME in one["message"] for one in page.status()["fallbacks"]
         )
     )
     page.post("/api/phones/leave", {"session": session})

@@ -46,7 +46,7 @@ def test_a_sensor_from_its_cable_to_its_end(browser: Browser, tmp_path: Path) ->
         Bench(box.sensors) as bench,
     ):
         page = Page(port, box.box_file)
-        wait_until(page.is_open, lambda: box.words)
+        wait_until(page.is_open, lambda: box.output)
         tab = opened(browser, page)
         state(tab, "left-wrist", "absent")
         press(tab, "#pair")

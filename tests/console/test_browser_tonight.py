@@ -28,7 +28,7 @@ HEARD_WITH = """async () => {
     value.fallbacks = window.fallbacks;
     const active = window.fallbacks.find((one) => one.active);
     value.verdict = active
-      ? { level: "warning", key: "fallbacks", values: { heard: 1, worn: 2, words: active.words } }
+      ? { level: "warning", key: "fallbacks", values: { heard: 1, worn: 2, message: active.message } }
       : { level: "well", key: "well", values: { heard: 2, worn: 2, rate: 50, since: value.since } };
     hear.call(this, value);
     window.heard++;
@@ -48,8 +48,8 @@ def say(tab: Tab, fallbacks: list[dict[str, Any]]) -> None:
 
 def fell(name: str, about: str = "") -> dict[str, Any]:
     row = EVERY[name]
-    words = row.named.format(about=about) if about and row.named else row.words
-    return {"name": name, "times": 3, "active": True, "words": words, "about": about, "process": "stage"}
+    message = row.named.format(about=about) if about and row.named else row.message
+    return {"name": name, "times": 3, "active": True, "message": message, "about": about, "process": "stage"}
 
 
 @ON_BOTH
@@ -63,7 +63,7 @@ def test_nothing_moves_when_fallbacks_come_and_go(tab: Tab, language: str) -> No
     say(tab, [])
     before = tab.evaluate(PLACES, CONTROLS)
     assert all(width > 0 and height > 0 for _, _, _, width, height in before), before
-    longest = max(EVERY, key=lambda name: len(EVERY[name].words))
+    longest = max(EVERY, key=lambda name: len(EVERY[name].message))
     several = [fell("sensor-silent", "left-wrist, right-wrist"), fell("receiver-gone", "10.0.0.9:9004 (vmc)")]
     for said in (
         [fell(longest)],
@@ -185,7 +185,7 @@ def _answered(route: Any, asked: list[tuple[str, Any]]) -> None:
         route.fulfill(json={"runs": None, "show_goes": False, "proofs": []})
         return
     asked.append((route.request.url, route.request.post_data_json))
-    route.fulfill(body='{"done": true, "words": "Done."}\n')
+    route.fulfill(body='{"done": true, "message": "Done."}\n')
 
 
 def _pair(taps: Taps) -> None:

@@ -80,16 +80,16 @@ def give_pin(page: Page, address: str, body: bytes) -> int:
 def test_a_thousand_strangers_take_nothing_from_a_technician(venue: tuple[Box, Page]) -> None:
     box, page = venue
     page.unlock()
-    said = len(box.words.splitlines())
+    said = len(box.output.splitlines())
     with strangers(page, STRANGERS) as crowd:
         for _ in range(6):
             done = page.command("/panic").value
             assert done["done"], done
         wait_until(lambda: are_open(crowd) <= MOST_FROM_ONE)
         told = wait_until(lambda: [one for one in page.status()["fallbacks"] if one["name"] == CROWDED.name])
-        assert told[0]["active"] and told[0]["process"] == "console" and HOST in told[0]["words"]
+        assert told[0]["active"] and told[0]["process"] == "console" and HOST in told[0]["message"]
     assert page.command("/go").value["done"]
-    assert len(box.words.splitlines()) - said < 20, "the log does not grow with the crowd"
+    assert len(box.output.splitlines()) - said < 20, "the log does not grow with the crowd"
     page.cookie = ""
 
 
@@ -100,7 +100,7 @@ def test_a_crowd_where_the_system_gives_few_descriptors(tmp_path: Path) -> None:
         with strangers(page, 200):
             for _ in range(6):
                 assert page.command("/panic").status == 503, "answered: there is no show control here"
-        assert len(process.words.splitlines()) < 20
+        assert len(process.output.splitlines()) < 20
 
 
 def test_the_technician_watches_although_strangers_hold_every_place(own_page: Page) -> None:
@@ -259,8 +259,8 @@ def test_what_is_no_http_leaves_no_traceback_in_the_log(own_page: Page) -> None:
         with socket.create_connection((HOST, own_page.port), PATIENCE_S) as one:
             one.sendall(head)
             assert b" 400 " in one.recv(1 << 10)
-    words = (own_page.box_file.parent / "page.txt").read_text()
-    assert len(words.splitlines()) == 1, words
+    output = (own_page.box_file.parent / "page.txt").read_text()
+    assert len(output.splitlines()) == 1, output
 
 
 def test_a_process_takes_the_descriptors_that_it_may_have() -> None:

@@ -42,8 +42,8 @@ def test_a_box_has_one_certificate_and_the_same_rules_over_https(tmp_path: Path)
     kept = {"console": console, "control": None, "runtime": "runtime", "state": "state"}
     box_file.write_text(yaml.safe_dump(kept))
     with Process(tmp_path / "page.txt", [*BUNRAKU, "console", "--box", box_file]) as process:
-        first = wait_until(lambda: served(port), lambda: process.words)
-        assert f"The page: https://{HOST}:{port}" in process.words
+        first = wait_until(lambda: served(port), lambda: process.output)
+        assert f"The page: https://{HOST}:{port}" in process.output
         pin, _, told = run_bunraku("console", "pin", "--box", box_file).stdout.strip().partition("\n")
         assert told == f"Certificate, SHA-256: {first}"
         trusted = ssl.create_default_context(cafile=str(tmp_path / "state" / FILE))
@@ -58,7 +58,7 @@ def test_a_box_has_one_certificate_and_the_same_rules_over_https(tmp_path: Path)
         page.close()
         process.kill()
         process.start()
-        assert wait_until(lambda: served(port), lambda: process.words) == first
+        assert wait_until(lambda: served(port), lambda: process.output) == first
     assert (tmp_path / "state" / FILE).stat().st_mode & 0o077 == 0
 
 
@@ -67,9 +67,9 @@ def test_one_command_offers_a_phone_the_page_and_what_makes_it_trusted(tmp_path:
     (port,) = free_ports(1, socket.SOCK_STREAM)
     show, console = write_show(tmp_path / "show"), {"port": port, "names": ["bunraku.hall"]}
     with playing(show, tmp_path, "--emulate", "--phone", settings={"console": console}) as box:
-        box.await_words("Another phone: bunraku console phone NAME")
-        code = re.search(r"https://\S+/phone#left-wrist=(\S+)", box.words)
-        assert code is not None and wait_until(lambda: served(port), lambda: box.words)
+        box.await_output("Another phone: bunraku console phone NAME")
+        code = re.search(r"https://\S+/phone#left-wrist=(\S+)", box.output)
+        assert code is not None and wait_until(lambda: served(port), lambda: box.output)
         anyone = ssl._create_unverified_context()
         unknown = http.client.HTTPSConnection(HOST, port, context=anyone, timeout=60)
         unknown.request("GET", "/bunraku.crt")

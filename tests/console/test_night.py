@@ -43,8 +43,8 @@ def test_a_picture_has_the_bones_and_the_words(tmp_path: Path) -> None:
     drawn = ElementTree.fromstring(night(tmp_path, frame()).picture(0.0))
     bones = [one for one in drawn.iter() if one.tag.endswith("path")][1:]
     assert [one.get("d") for one in bones] == ["M320.0 135.0L320.0 220.0", "M320.0 50.0L320.0 135.0"]
-    words = " ".join(one.text or "" for one in drawn.iter() if one.tag.endswith("text"))
-    assert "A & B  dancing" in words and "receiver-gone <10.0.0.9>" in words
+    text = " ".join(one.text or "" for one in drawn.iter() if one.tag.endswith("text"))
+    assert "A & B  dancing" in text and "receiver-gone <10.0.0.9>" in text
 
 
 def test_without_a_frame_there_are_only_words(tmp_path: Path) -> None:

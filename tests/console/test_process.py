@@ -70,7 +70,7 @@ def test_a_box_file_without_a_page_is_no_failure(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("settings", "words"),
+    ("settings", "message"),
     [
         ("host: 0.0.0.0", "no device may open it"),
         ("host: hall.local", "is not an address in numbers"),
@@ -79,12 +79,12 @@ def test_a_box_file_without_a_page_is_no_failure(tmp_path: Path) -> None:
         ("prot: 80", "port"),
     ],
 )
-def test_a_mistake_in_the_box_file_has_its_line_and_cure(tmp_path: Path, settings: str, words: str) -> None:
+def test_a_mistake_in_the_box_file_has_its_line_and_cure(tmp_path: Path, settings: str, message: str) -> None:
     if not settings.startswith("{"):
         settings = f"{{{settings}}}"
     (tmp_path / "box.yaml").write_text(f"console: {settings}\n")
     done = run_bunraku("console", "--box", tmp_path / "box.yaml")
-    assert done.returncode == 2 and words in done.stderr and "box.yaml" in done.stderr
+    assert done.returncode == 2 and message in done.stderr and "box.yaml" in done.stderr
 
 
 def test_a_taken_port_is_said_and_beside_a_stage_another_one_serves() -> None:
@@ -97,12 +97,12 @@ def test_a_taken_port_is_said_and_beside_a_stage_another_one_serves() -> None:
 
 
 def test_its_help_says_how_the_page_starts_and_what_each_command_does() -> None:
-    words = " ".join(run_bunraku("console", "--help").stdout.split())
-    assert "`bunraku play` starts it by itself and prints its address and PIN." in words
-    assert "Example: bunraku console --box box.yaml" in words
+    output = " ".join(run_bunraku("console", "--help").stdout.split())
+    assert "`bunraku play` starts it by itself and prints its address and PIN." in output
+    assert "Example: bunraku console --box box.yaml" in output
     for command, sentence in (
         ("pin", "Print the PIN that a device gives once"),
         ("devices", "List the devices that gave the PIN"),
         ("revoke", "Forget a device: it needs the PIN again"),
     ):
-        assert f" {command} {sentence}" in words
+        assert f" {command} {sentence}" in output

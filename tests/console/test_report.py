@@ -17,7 +17,7 @@ from appliance.console.report import FILE, Reports, report, send, settings_in
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 
-SILENT = {"name": "sensor-silent", "about": "left-wrist", "words": "No readings.", "active": True}
+SILENT = {"name": "sensor-silent", "about": "left-wrist", "message": "No readings.", "active": True}
 
 
 def box(*fallbacks: dict[str, Any], uptime_s: float = 5.0) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def test_nothing_is_sent_unless_the_box_file_asks_for_it(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("report_keys", "words"),
+    ("report_keys", "message"),
     [
         ("{}", "goes nowhere"),
         ("{webhook: example.org}", "is no web address"),
@@ -85,9 +85,9 @@ def test_nothing_is_sent_unless_the_box_file_asks_for_it(tmp_path: Path) -> None
         ("{mail: {to: [a@b.c], sender: a@b.c, host: m, user: me}}", "belong together"),
     ],
 )
-def test_a_report_that_could_not_arrive_is_refused(tmp_path: Path, report_keys: str, words: str) -> None:
+def test_a_report_that_could_not_arrive_is_refused(tmp_path: Path, report_keys: str, message: str) -> None:
     (tmp_path / "box.yaml").write_text(f"console: {{report: {report_keys}}}\n")
-    with pytest.raises(ConfigError, match=words):
+    with pytest.raises(ConfigError, match=message):
         load_box(tmp_path / "box.yaml")
 
 
@@ -101,7 +101,7 @@ def _web_server() -> Iterator[tuple[int, list[tuple[str, Any]]]]:
             self.send_response(200)
             self.end_headers()
 
-        def log_message(self, *words: object) -> None:
+        def log_message(self, *arguments: object) -> None:
             """Nothing."""
 
     with _serving(HTTPServer(("127.0.0.1", 0), Hook)) as port:

@@ -150,7 +150,7 @@ def test_no_command_that_the_page_does_not_have(page: Page) -> None:
         ("/cue", ["\x07"]),
     ):
         answer = page.post("/api/command", {"address": address, "arguments": arguments})
-        assert answer.status == 200 and answer.value["done"] is False and answer.value["words"]
+        assert answer.status == 200 and answer.value["done"] is False and answer.value["message"]
 
 
 def test_whatever_comes_as_a_body_is_refused(page: Page, rng: random.Random, long_run: bool) -> None:

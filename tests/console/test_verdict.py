@@ -19,7 +19,7 @@ GOOD = Status(state="dancing", rate_hz=50.0, level=1.0)
 HEARD = {"name": "left-wrist", "is_worn": True, "heard": True}
 LOST = {"name": "right-wrist", "is_worn": True, "heard": False}
 SPARE = {"name": "spare", "is_worn": False, "heard": False}
-FELL = {"name": "receiver-gone", "active": True, "words": "A receiver is away."}
+FELL = {"name": "receiver-gone", "active": True, "message": "A receiver is away."}
 TRANSLATED = [language for language in languages() if language != "en"]
 NOW, HOUR_AGO = 0.0, 3600.0  # seconds since a tick was late
 
@@ -96,10 +96,10 @@ def test_each_language_has_the_limits_of_a_measurement(language: str) -> None:
     figures = defaultdict(lambda: nothing, **numbers, rss_mb=None, start_to_first_frame_s=None)
     figures["hand_to_light_ms"] = nothing
     for limit in verdict_of_measure(figures):
-        key = f"limit_{re.sub(r'[^a-z0-9]+', '_', limit.words.lower())}"
+        key = f"limit_{re.sub(r'[^a-z0-9]+', '_', limit.label.lower())}"
         assert key in table(language), key
         if language == "en":
-            assert table("en")[key] == limit.words
+            assert table("en")[key] == limit.label
 
 
 def table(language: str) -> dict[str, str]:

@@ -48,12 +48,12 @@ async def next_frame(browser: ClientWebSocketResponse) -> bytes:
     return frame
 
 
-async def next_words(browser: ClientWebSocketResponse) -> dict[str, Any]:
+async def next_status(browser: ClientWebSocketResponse) -> dict[str, Any]:
     async with asyncio.timeout(PATIENCE_S):
         while (message := await browser.receive()).type != WSMsgType.TEXT:
             assert message.type == WSMsgType.BINARY, message
-    words: dict[str, Any] = message.json()
-    return words
+    text: dict[str, Any] = message.json()
+    return text
 
 
 def test_a_browser_gets_the_poses_that_leave_the_box(venue: tuple[Box, Page]) -> None:
@@ -101,8 +101,8 @@ def test_frames_come_only_to_a_browser_that_wants_them_and_words_to_all(venue: t
                 frames += 1
             return kinds.count(WSMsgType.TEXT), frames
 
-    words, frames = asyncio.run(count())
-    assert words == 3
+    text, frames = asyncio.run(count())
+    assert text == 3
     assert frames >= 25, "25 a second and more, on a quiet machine"
 
 
@@ -159,7 +159,7 @@ def test_there_is_room_for_a_number_of_browsers(venue: tuple[Box, Page]) -> None
             with pytest.raises(Exception, match="503"):
                 await watching(session, page)
             for browser in browsers:
-                await next_words(browser)
+                await next_status(browser)
             for browser in browsers:
                 await browser.close()
 
@@ -222,12 +222,12 @@ def test_a_command_of_the_page_is_one_of_a_desk(venue: tuple[Box, Page]) -> None
     _, page = venue
     page.unlock()
     done = page.command("/panic").value
-    assert done["done"] and "black" in done["words"]
+    assert done["done"] and "black" in done["message"]
     wait_until(lambda: page.status()["verdict"]["key"] == "panic")
     page.command("/go")
     wait_until(lambda: page.status()["status"]["panic"] == 0)
     refused = page.command("/cue", "clam").value
-    assert not refused["done"] and "calm" in refused["words"], "the nearest name"
+    assert not refused["done"] and "calm" in refused["message"], "the nearest name"
     assert page.command("/cue", "calm").value["done"]
     wait_until(lambda: {"name": "calm", "now": True} in page.status()["cues"])
     assert page.command("/player/rate", 1).value["done"], "a stream is not answered when it is done"
@@ -255,7 +255,7 @@ def test_the_page_dies_and_comes_back_and_the_dance_does_not_notice(venue: tuple
         told = page.status().get("fallbacks", ())
         return sum(one["times"] for one in told if one["name"] == "console-died")
 
-    assert f"The page: {page.origin}, PIN {page.pin}." in box.words
+    assert f"The page: {page.origin}, PIN {page.pin}." in box.output
     page.unlock()
     before = deaths()
     box.pause()

@@ -132,12 +132,14 @@ class BoxRoot:
         self.lent.add(path)
         return path
 
-    def call(self, *words: str | Path, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    def call(
+        self, *arguments: str | Path, env: dict[str, str] | None = None
+    ) -> subprocess.CompletedProcess[str]:
         """A command inside, as root, without a network."""
         disk = os.open(self.written, os.O_RDONLY)
         mounts = [f"mount --rbind /dev {self.path}/dev", f"mount -t proc proc {self.path}/proc"]
         for path in self.lent | {
-            Path(word) for word in words if Path(word).is_absolute() and Path(word).exists()
+            Path(word) for word in arguments if Path(word).is_absolute() and Path(word).exists()
         }:
             inside = Path(f"{self.path}{path}")
             if path.is_dir():
@@ -146,27 +148,29 @@ class BoxRoot:
                 mounts.append(f"mkdir -p {inside.parent} && touch {inside} && mount --bind {path} {inside}")
         entered = f'{" && ".join(mounts)} && exec chroot {self.path} env -i "$@"'
         settings = {"PATH": _PATH, "CUT_FD": str(disk), **(env or {})}
-        inside_words = [*(f"{name}={value}" for name, value in settings.items()), *map(str, words)]
-        command = ["unshare", "--mount", "--net", "sh", "-c", entered, "sh", *inside_words]
+        inside = [*(f"{name}={value}" for name, value in settings.items()), *map(str, arguments)]
+        command = ["unshare", "--mount", "--net", "sh", "-c", entered, "sh", *inside]
         try:
             return subprocess.run(command, capture_output=True, text=True, pass_fds=(disk,))
         finally:
             os.close(disk)
 
     def release(
-        self, *words: str | Path, env: dict[str, str] | None = None
+        self, *arguments: str | Path, env: dict[str, str] | None = None
     ) -> subprocess.CompletedProcess[str]:
         """bunraku-release."""
-        return self.call("/usr/sbin/bunraku-release", *words, env=env)
+        return self.call("/usr/sbin/bunraku-release", *arguments, env=env)
 
-    def dpkg(self, *words: str | Path, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    def dpkg(
+        self, *arguments: str | Path, env: dict[str, str] | None = None
+    ) -> subprocess.CompletedProcess[str]:
         """dpkg, with a database of the box's own."""
-        return self.call("dpkg", *words, env=env)
+        return self.call("dpkg", *arguments, env=env)
 
-    def run(self, *words: str) -> str:
+    def run(self, *arguments: str) -> str:
         """What a command in this root prints."""
         return subprocess.check_output(
-            ["chroot", str(self.path), *words], text=True, stderr=subprocess.STDOUT
+            ["chroot", str(self.path), *arguments], text=True, stderr=subprocess.STDOUT
         )
 
 
@@ -180,10 +184,10 @@ def prepare(upper: Path) -> None:
         os.setxattr(database, "trusted.overlay.opaque", b"y")
 
 
-def refused(box: BoxRoot, *words: str | Path) -> str:
+def refused(box: BoxRoot, *arguments: str | Path) -> str:
     """What is said; the box has what it had."""
     before = box.current, files_of(box)
-    done = box.release("install", *words)
+    done = box.release("install", *arguments)
     assert done.returncode == 1, done.stdout
     assert (box.current, files_of(box)) == before
     return done.stderr
@@ -194,17 +198,17 @@ def files_of(box: BoxRoot) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path != folder / "releases")
 
 
-def taken(box: BoxRoot, *words: str | Path, env: dict[str, str] | None = None) -> str:
-    done = box.release("install", *words, env=env)
+def taken(box: BoxRoot, *arguments: str | Path, env: dict[str, str] | None = None) -> str:
+    done = box.release("install", *arguments, env=env)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
-def run(*words: str) -> str:
+def run(*arguments: str) -> str:
     """What a command prints that has to do what it should."""
-    done = subprocess.run(words, capture_output=True, text=True)
+    done = subprocess.run(arguments, capture_output=True, text=True)
     if done.returncode != 0:
-        raise RuntimeError(f"{' '.join(words)}: {done.stderr}")
+        raise RuntimeError(f"{' '.join(arguments)}: {done.stderr}")
     return done.stdout
 
 

@@ -93,8 +93,8 @@ def test_what_was_installed_dances_after_each_power_on(fresh: ImageBox, second: 
 
 
 def test_it_goes_back_and_forth_for_good(box: ImageBox) -> None:
-    for words, version in (("back", "1.0.0"), ("use 2.0.0", "2.0.0"), ("use 1.0.0", "1.0.0")):
-        done = box.release(*words.split())
+    for arguments, version in (("back", "1.0.0"), ("use 2.0.0", "2.0.0"), ("use 1.0.0", "1.0.0")):
+        done = box.release(*arguments.split())
         assert done.returncode == 0, done.stderr
         dances(box, version)
         box.cut_power()
@@ -143,7 +143,7 @@ def _all_may_write(name: str) -> Callable[[Path], None]:
 
 
 @pytest.mark.parametrize(
-    ("harm", "words"),
+    ("harm", "message"),
     [
         (_truncated, "files of it are missing or damaged"),
         (lambda release: (release / "bin/bunraku").unlink(), "files of it are missing or damaged"),
@@ -157,18 +157,18 @@ def _all_may_write(name: str) -> Callable[[Path], None]:
     ],
 )
 def test_a_damaged_release_gives_way_to_the_one_that_came_with_the_image(
-    box: ImageBox, second: Path, harm: Callable[[Path], None], words: str
+    box: ImageBox, second: Path, harm: Callable[[Path], None], message: str
 ) -> None:
     place, modes = box.kept / "2.0.0", [path.stat() for path in (box.written, box.kept)]
     harm(place)
     again(box)
     dances(box, "1.0.0")
     assert box.next_choice is None, "it is not tried again at each power-on"
-    assert f"2.0.0  put aside: {words}" in box.release("list").stdout or words == "it is not whole"
+    assert f"2.0.0  put aside: {message}" in box.release("list").stdout or message == "it is not whole"
     for path, stat in zip((box.written, box.kept), modes, strict=True):
         path.chmod(stat.st_mode & 0o777)
         os.chown(path, stat.st_uid, stat.st_gid)
-    if words != "others than root may write there":
+    if message != "others than root may write there":
         assert box.release("use", "2.0.0").returncode == 1
     done = box.release("install", second)
     assert done.returncode == 0, done.stderr
@@ -177,9 +177,9 @@ def test_a_damaged_release_gives_way_to_the_one_that_came_with_the_image(
 
 
 @pytest.mark.parametrize(
-    ("fact", "words"), [("architecture s390x", "it is for s390x"), ("python 3.99", "it needs Python 3.99")]
+    ("fact", "message"), [("architecture s390x", "it is for s390x"), ("python 3.99", "it needs Python 3.99")]
 )
-def test_a_release_for_another_machine_gives_way(box: ImageBox, fact: str, words: str) -> None:
+def test_a_release_for_another_machine_gives_way(box: ImageBox, fact: str, message: str) -> None:
     """As on a disk that came from another box; all its sums are right."""
     place = box.kept / "2.0.0"
     facts = (place / "release").read_text().splitlines()
@@ -190,7 +190,7 @@ def test_a_release_for_another_machine_gives_way(box: ImageBox, fact: str, words
     box.run("sh", "-c", f"cd /data/bunraku-releases/2.0.0 && {_SEAL}")
     again(box)
     dances(box, "1.0.0")
-    assert words in box.release("list").stdout
+    assert message in box.release("list").stdout
 
 
 def test_a_release_that_never_comes_to_dance_is_not_tried_for_ever(box: ImageBox) -> None:
@@ -222,12 +222,12 @@ def test_a_data_partition_that_cannot_be_written_is_said(fresh: ImageBox, second
     assert "bunraku-releases cannot be written. Nothing was changed." in done.stderr
 
 
-@pytest.mark.parametrize("words", ["install", "back"])
+@pytest.mark.parametrize("message", ["install", "back"])
 @pytest.mark.parametrize("cut", range(1, CUTS + 1))
 def test_cut_at_any_change_one_whole_release_dances_at_the_next_power_on(
-    box: ImageBox, make_release: MakeRelease, tmp_path: Path, words: str, cut: int
+    box: ImageBox, make_release: MakeRelease, tmp_path: Path, message: str, cut: int
 ) -> None:
-    command = ("install", make_release("3.0.0")) if words == "install" else (words,)
+    command = ("install", make_release("3.0.0")) if message == "install" else (message,)
     count = _changes(box, command, tmp_path)
     log = tmp_path / "log" / "count"
     log.parent.mkdir()
@@ -237,7 +237,7 @@ def test_cut_at_any_change_one_whole_release_dances_at_the_next_power_on(
     assert box.check_disk() in (0, 1)
     box.switch_on()
     version = box.current
-    assert version in (("2.0.0", "3.0.0") if words == "install" else ("2.0.0", "1.0.0"))
+    assert version in (("2.0.0", "3.0.0") if message == "install" else ("2.0.0", "1.0.0"))
     assert version is not None
     dances(box, version)
     if version == "2.0.0":

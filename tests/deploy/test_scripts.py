@@ -48,7 +48,7 @@ def test_a_script_has_no_trap_that_shellcheck_knows(script: Path) -> None:
 
 
 def test_an_access_point_that_cannot_be_is_refused_before_anything_changes(tmp_path: Path) -> None:
-    for arguments, words in (
+    for arguments, message in (
         (("--channel", "3"), "overlaps its neighbours"),
         (("--password", "short"), "this one has 5"),
         (("--nonsense",), "usage:"),
@@ -56,7 +56,7 @@ def test_an_access_point_that_cannot_be_is_refused_before_anything_changes(tmp_p
     ):
         done = access_point(tmp_path, *arguments)
         assert done.returncode != 0
-        assert words in done.stderr
+        assert message in done.stderr
     assert list(tmp_path.iterdir()) == []
     assert "data partition" in access_point(tmp_path / "missing").stderr
 

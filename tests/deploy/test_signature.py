@@ -38,7 +38,7 @@ def of_another_release(package: Path, maker: Path, other: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("harm", "words"),
+    ("harm", "message"),
     [
         (without_signature, "is not signed: anybody could have made it. Nothing was changed."),
         (signed_for_something_else, "is not what its maker signed. Nothing was changed."),
@@ -47,11 +47,11 @@ def of_another_release(package: Path, maker: Path, other: Path) -> None:
     ids=lambda one: getattr(one, "__name__", ""),
 )
 def test_a_release_that_its_maker_did_not_sign_so_is_refused_unless_told(
-    box: BoxRoot, make_release: MakeRelease, maker: Path, harm: Callable[..., None], words: str
+    box: BoxRoot, make_release: MakeRelease, maker: Path, harm: Callable[..., None], message: str
 ) -> None:
     package = package_of(make_release("1.1.0"))
     harm(package, maker, package_of(make_release("1.2.0")))
-    assert words in refused(box, package)
+    assert message in refused(box, package)
     assert "Whoever wrote the stick will have this box" in taken(box, "--unsigned", package)
     assert box.current == "1.1.0"
 
@@ -128,10 +128,10 @@ def test_a_box_whose_root_forgets_keeps_to_its_key(
 def test_an_older_release_is_taken_only_when_that_is_said(
     box: BoxRoot, make_release: MakeRelease, *, unsigned: bool
 ) -> None:
-    words = ["--unsigned"] if unsigned else []
+    arguments = ["--unsigned"] if unsigned else []
     taken(box, make_release("1.10.0"))
     older = make_release("1.9.0")
-    said = refused(box, *words, older)
+    said = refused(box, *arguments, older)
     assert "bunraku 1.9.0, which is older than 1.10.0, which dances. Nothing was changed" in said
-    taken(box, *words, "--older", older)
+    taken(box, *arguments, "--older", older)
     assert box.current == "1.9.0"

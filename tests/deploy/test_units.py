@@ -171,7 +171,7 @@ def test_the_keeper_outlasts_an_orderly_end_of_all_others() -> None:
 
 def test_the_target_starts_everything_that_is_there_at_power_on() -> None:
     wanted = re.findall(r"^Wants=(.*)$", (UNITS / "bunraku.target").read_text(), re.MULTILINE)
-    by_paths = {f"bunraku-{name}" for name in ("anew", "prove", "update")}
+    by_paths = {f"bunraku-{name}" for name in ("anew", "learn", "prove", "update")}
     started_by_others = {f"{name}.service" for name in by_paths} | {"bunraku-stick.service"}
     assert set(wanted) == set(SERVICES) - started_by_others | {f"{name}.path" for name in by_paths}
 

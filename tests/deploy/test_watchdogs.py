@@ -102,9 +102,9 @@ def test_a_projector_that_waits_takes_the_display_that_comes(
             stderr=subprocess.DEVNULL,
         ) as late:
             try:
-                while "No display" in (words := supervisor.waits_for("READY=1", PATIENCE_S)):
+                while "No display" in (message := supervisor.waits_for("READY=1", PATIENCE_S)):
                     pass
-                assert "shows pictures" in words
+                assert "shows pictures" in message
             finally:
                 late.terminate()
 

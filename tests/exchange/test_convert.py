@@ -241,7 +241,7 @@ def test_damaged_files_are_refused_in_words(ending: str, tmp_path: Path, bunraku
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         (
             "1,2",
@@ -252,7 +252,7 @@ def test_damaged_files_are_refused_in_words(ending: str, tmp_path: Path, bunraku
         ("{row},7", "has 37 values"),
     ],
 )
-def test_a_row_that_is_none_costs_that_row_and_is_named(text: str, words: str, tmp_path: Path) -> None:
+def test_a_row_that_is_none_costs_that_row_and_is_named(text: str, message: str, tmp_path: Path) -> None:
     path = tmp_path / "dance.csv"
     write_recording(path, swaying_phrase())
     lines = path.read_text().splitlines()
@@ -260,7 +260,7 @@ def test_a_row_that_is_none_costs_that_row_and_is_named(text: str, words: str, t
     path.write_text("\n".join(lines))
     found, guesses = read_as_told(path)
     assert len(found) == len(swaying_phrase())
-    assert words in guesses[0].sentence() and "line 7" in guesses[0].sentence()
+    assert message in guesses[0].sentence() and "line 7" in guesses[0].sentence()
 
 
 def test_a_table_without_one_whole_row_is_refused_with_its_line(tmp_path: Path, bunraku: Command) -> None:
@@ -280,8 +280,8 @@ def test_frames_that_are_no_rotations_are_lost_and_named(ending: str, tmp_path: 
     found, guesses = read_as_told(tmp_path / f"dance{ending}")
     assert len(found) == len(meant) - 1
     place = "lines 13 to 14" if ending == ".csv" else "frames 10 to 11"
-    assert f"{place}: 2 " in guesses[0].words and "is no unit quaternion" in guesses[0].words
-    assert "1 " in guesses[1].words and "left out" in guesses[1].words
+    assert f"{place}: 2 " in guesses[0].message and "is no unit quaternion" in guesses[0].message
+    assert "1 " in guesses[1].message and "left out" in guesses[1].message
     apart = np.degrees(quaternion.angle_between(found.poses, meant.poses[:-1]))
     assert apart.max() < 3.0
 
@@ -309,7 +309,7 @@ def test_what_spreadsheets_make_of_a_table_is_read(kind: str, tmp_path: Path) ->
     path.write_text(in_a_spreadsheet(path.read_text(), kind))
     found, guesses = read_as_told(path)
     assert_same_dance(found, meant, ".csv")
-    assert [guess.words for guess in guesses] == (
+    assert [guess.message for guess in guesses] == (
         ["columns that are none of the skeleton left out: one without a title"] if kind == "index" else []
     )
 

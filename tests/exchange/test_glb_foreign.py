@@ -199,7 +199,7 @@ def test_several_root_bones_hang_from_their_armature(tmp_path: Path) -> None:
     assert read_glb(path).skeleton.names == ("Armature", *ALL, "IK_Target")
     found, guesses = read_as_told(path)
     assert found.skeleton.names == ALL
-    assert "left out, with IK_Target: the hips are the root" in guesses[0].words
+    assert "left out, with IK_Target: the hips are the root" in guesses[0].message
 
 
 def test_without_a_skin_the_largest_of_what_moves_is_the_figure(tmp_path: Path) -> None:

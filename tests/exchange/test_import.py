@@ -263,7 +263,7 @@ def test_wrong_tables_are_named_with_their_line(text: str, where: str, tmp_path:
 def test_wrong_shapes_and_unknown_names_end_with_what_to_do(tmp_path: Path, bunraku: Command) -> None:
     names, points, out = tmp_path / "names.txt", tmp_path / "p.npy", tmp_path / "o.bvh"
     names.write_text("Hips\nBlob\n")
-    for array, words in (
+    for array, message in (
         (np.zeros((5, 2, 2)), "it must be (frames, points, 3)"),
         (np.zeros((5, 3, 3)), "3 points, but 2 names"),
         (np.full((5, 2, 3), np.inf), "never seen"),
@@ -272,7 +272,9 @@ def test_wrong_shapes_and_unknown_names_end_with_what_to_do(tmp_path: Path, bunr
         (np.array([["a"]]), "no numbers"),
     ):
         np.save(points, array)
-        assert words in bunraku("import", points, "--names", names, "--out", out, "--unit", "m", status=2).err
+        assert (
+            message in bunraku("import", points, "--names", names, "--out", out, "--unit", "m", status=2).err
+        )
     points.write_bytes(b"hello")
     assert "no NPY file" in bunraku("import", points, "--names", names, "--out", out, status=2).err
     assert not out.exists()

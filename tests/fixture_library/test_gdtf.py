@@ -136,7 +136,7 @@ FAR = fixture(
 
 
 @pytest.mark.parametrize(
-    ("content", "words"),
+    ("content", "message"),
     [
         (b"no archive", "not a zip archive"),
         (archive({"other.xml": "<a/>"}), "no 'description.xml'"),
@@ -154,12 +154,12 @@ FAR = fixture(
     ],
 )
 def test_hostile_and_broken_files_get_one_sentence_and_nothing_is_written(
-    tmp_path: Path, content: bytes, words: str, bunraku: Command
+    tmp_path: Path, content: bytes, message: str, bunraku: Command
 ) -> None:
     source = tmp_path / "x.gdtf"
     source.write_bytes(content)
     said = bunraku("lights", "convert", source, status=2).err
-    assert words in " ".join(said.split())
+    assert message in " ".join(said.split())
     assert [path.name for path in tmp_path.iterdir()] == ["x.gdtf"]
 
 

@@ -110,7 +110,7 @@ NESTED += "</ChildList></Truss>" * 40
 
 
 @pytest.mark.parametrize(
-    ("files", "words"),
+    ("files", "message"),
     [
         ({"description.xml": "<GDTF/>"}, "not an MVR file"),
         ({"GeneralSceneDescription.xml": "<a>"}, "not XML"),
@@ -121,9 +121,9 @@ NESTED += "</ChildList></Truss>" * 40
     ],
 )
 def test_broken_rigs_get_one_sentence_and_nothing_is_written(
-    tmp_path: Path, files: dict[str, bytes | str], words: str, bunraku: Command
+    tmp_path: Path, files: dict[str, bytes | str], message: str, bunraku: Command
 ) -> None:
     source = tmp_path / "x.mvr"
     source.write_bytes(archive(files))
-    assert words in " ".join(bunraku("lights", "convert", source, status=2).err.split())
+    assert message in " ".join(bunraku("lights", "convert", source, status=2).err.split())
     assert [path.name for path in tmp_path.iterdir()] == ["x.mvr"]

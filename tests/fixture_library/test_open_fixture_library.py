@@ -211,7 +211,7 @@ def test_modes_larger_than_a_universe_are_left_out_and_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "words"),
+    ("content", "message"),
     [
         ('{"redirectTo": "maker/other"}', "now called maker/other"),
         ("{}", "not a fixture of the Open Fixture Library"),
@@ -221,12 +221,12 @@ def test_modes_larger_than_a_universe_are_left_out_and_reported() -> None:
     ],
 )
 def test_other_files_are_refused_in_words_and_nothing_is_written(
-    tmp_path: Path, content: str, words: str, bunraku: Command
+    tmp_path: Path, content: str, message: str, bunraku: Command
 ) -> None:
 
     source = tmp_path / "x.json"
     source.write_text(content)
-    assert words in bunraku("lights", "convert", source, status=2).err
+    assert message in bunraku("lights", "convert", source, status=2).err
     assert [path.name for path in tmp_path.iterdir()] == ["x.json"]
 
 

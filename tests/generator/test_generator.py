@@ -204,8 +204,8 @@ def test_a_kept_motion_outlives_the_power_and_is_written_as_a_file(
     kept = one.recipe()
     one.dance()
     for name, why in {"main": "already", "../up": "letters", "vary": "already"}.items():
-        done, words = one.generator.obey(Order("keep", text=name))
-        assert not done and why in words
+        done, message = one.generator.obey(Order("keep", text=name))
+        assert not done and why in message
     assert one.generator.obey(keep)[0]
     one.generator.kept.wait()
     for file in [*(one.folder / "kept").iterdir()]:  # the power is cut

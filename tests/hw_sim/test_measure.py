@@ -44,7 +44,7 @@ def test_a_folder_is_removed_while_files_still_appear_in_it() -> None:
 @pytest.mark.realtime
 def test_measures_writes_figures_and_picture_and_gives_a_verdict(tmp_path: Path) -> None:
     """The compiled firmware is the sensor; README.md measures with the emulated one."""
-    show = write_show(tmp_path / "show")
+    show = write_show(tmp_path / "show", strings={})
     figures_file, report = tmp_path / "figures.json", tmp_path / "report"
     progress = tmp_path / "progress"
     done = measure(
@@ -59,7 +59,9 @@ def test_measures_writes_figures_and_picture_and_gives_a_verdict(tmp_path: Path)
     assert json.loads((report / "measure.json").read_text()) == figures
     assert (report / "measure.png").read_bytes().startswith(b"\x89PNG")
     told = [json.loads(line) for line in progress.read_text().splitlines()]
-    assert [one["phase"] for one in told if "phase" in one] == ["locked", "free", "power-ons", "restarts"]
+    assert [one["phase"] for one in told if "phase" in one] == [
+        *("locked", "free", "power-ons", "restarts", "sound")
+    ]
     assert told[-1]["figures"] == figures
     assert all(limit["holds"] for limit in told[-1]["limits"]) == (done.returncode == 0)
     begun = told.index(next(one for one in told if one.get("phase") == "free"))
@@ -76,6 +78,7 @@ def test_measures_writes_figures_and_picture_and_gives_a_verdict(tmp_path: Path)
     assert 0.0 < figures["transport_ms"]["p50"] <= figures["transport_ms"]["max"]
     assert figures["free_running_transport_ms"]["p50"] > 0.0
     assert figures["rss_mb"] > 20.0
+    assert figures["sound_steps"] > 0 and "hand to sound, median" in done.stdout
     assert figures["start_to_first_frame_s"] > 0.0
 
 

@@ -180,7 +180,7 @@ def test_the_firmware_may_take_as_long_as_joining_a_wifi_takes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "label"),
     [
         ({"transport_ms": {"p50": 3.5, "p99": 4.0, "p999": 4.0, "max": 4.0}}, "transport, median"),
         ({"transport_ms": {"p50": None, "p99": None, "p999": None, "max": None}}, "nothing came"),
@@ -199,11 +199,11 @@ def test_the_firmware_may_take_as_long_as_joining_a_wifi_takes() -> None:
         ({"kill_to_reading_s": {"p50": 1.6, "max": 1.6}}, "the same from its end"),
     ],
 )
-def test_each_limit_fails_by_itself(change: dict[str, Any], words: str) -> None:
+def test_each_limit_fails_by_itself(change: dict[str, Any], label: str) -> None:
     figures = {**healthy(), **change}
     failed = [line for line in table(figures, verdict(figures)) if line.startswith("FAIL")]
     assert failed
-    assert any(words in line for line in failed)
+    assert any(label in line for line in failed)
 
 
 @pytest.mark.parametrize("late_s", [0.03, 0.055, 0.09])

@@ -147,7 +147,7 @@ def test_a_short_soak_has_the_same_acts_sooner() -> None:
 
 
 def lived(tmp_path: Path, megabytes: list[float], handles: list[int]) -> Unit:
-    unit = Unit("one", ("true",), tmp_path / "words")
+    unit = Unit("one", ("true",), tmp_path / "output")
     unit.history = [
         (float(second), Vitals(mb, mb / 2, count, 3))
         for second, (mb, count) in enumerate(zip(megabytes, handles, strict=True))
@@ -188,7 +188,7 @@ def test_a_life_that_was_too_short_is_not_judged(tmp_path: Path) -> None:
 
 
 def test_a_unit_is_started_again_and_only_unasked_ends_are_deaths(tmp_path: Path) -> None:
-    unit = Unit("one", (sys.executable, "-c", "import time; time.sleep(60)"), tmp_path / "words")
+    unit = Unit("one", (sys.executable, "-c", "import time; time.sleep(60)"), tmp_path / "output")
     unit.update(0.0)
     first = unit.pid
     unit.kill()
@@ -209,19 +209,19 @@ def test_a_unit_is_started_again_and_only_unasked_ends_are_deaths(tmp_path: Path
 
 @pytest.mark.realtime
 def test_ended_early_it_gives_figures_verdict_picture_and_leaves_nobody_behind(tmp_path: Path) -> None:
-    out, words = tmp_path / "out", tmp_path / "words.txt"
+    out, output = tmp_path / "out", tmp_path / "words.txt"
     show = write_show(tmp_path / "show")
     command = [sys.executable, "-m", "hw_sim.soak", "--minutes", "1", "--out", str(out), "--show", str(show)]
-    with words.open("wb") as file:
+    with output.open("wb") as file:
         running = subprocess.Popen([*command, "--no-load"], stdout=file, stderr=subprocess.STDOUT)
     until = time.monotonic() + PATIENCE_S
-    while b"ticks" not in words.read_bytes():
-        assert time.monotonic() < until and running.poll() is None, words.read_text()
+    while b"ticks" not in output.read_bytes():
+        assert time.monotonic() < until and running.poll() is None, output.read_text()
         time.sleep(0.05)
     time.sleep(4.0)
     running.send_signal(signal.SIGTERM)
     status = running.wait(PATIENCE_S)
-    said = words.read_text()
+    said = output.read_text()
     assert status in (0, 1), said  # 1: what is too short to tell does not hold
     assert "Verdict:" in said
     figures = json.loads((out / "soak.json").read_text())

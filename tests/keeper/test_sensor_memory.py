@@ -20,8 +20,8 @@ OTHER = NeutralPose((1.0, 0.0, 0.0, 0.0), -3.0, 7)
 IMU, OFFSETS = bytes(range(16)), bytes(range(100, 122))
 
 
-def silent(words: str) -> None:
-    raise AssertionError(words)
+def silent(message: str) -> None:
+    raise AssertionError(message)
 
 
 class Box:
@@ -218,8 +218,8 @@ def test_a_damaged_file_is_set_aside_and_said_once(box: Box, text: str) -> None:
     said: list[str] = []
     memory = box.memory(said.append)
     assert memory.neutral("a", "b") is None
-    [words] = said
-    assert "damaged" in words
+    [message] = said
+    assert "damaged" in message
     assert (box.state / f"{FILE_NAME}.broken").read_text() == text
     memory.keep_neutral("a", {"b": POSE})
     box.keeper.turn(100.0)

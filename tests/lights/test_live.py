@@ -50,7 +50,7 @@ def asked(
     walk.levels(state, 0.0)
     answer = desk.take()
     assert answer is not None
-    return answer.done, answer.words
+    return answer.done, answer.message
 
 
 def test_a_reader_sees_where_each_lamp_points_and_how_bright_it_is(patch: Patch, tmp_path: Path) -> None:
@@ -93,21 +93,21 @@ def test_a_rig_of_any_size_fits(tmp_path: Path) -> None:
 
 
 def test_a_show_that_is_seen_is_not_walked(desk: OrderSender, walk: OrderedWalk) -> None:
-    done, words = asked(desk, walk, ShowState(), "walk")
-    assert not done and "Stop it first" in words and walk.values is None
+    done, message = asked(desk, walk, ShowState(), "walk")
+    assert not done and "Stop it first" in message and walk.values is None
     for state in (replace(STANDS, panic=True), replace(STANDS, blackout=True)):
         assert not asked(desk, walk, state, "walk")[0]
 
 
 def test_one_lamp_is_walked_and_go_ends_it(desk: OrderSender, walk: OrderedWalk, patch: Patch) -> None:
-    done, words = asked(desk, walk, STANDS, "walk", "par")
-    assert done and "steps" in words
-    seen = {walk.words: None}
+    done, message = asked(desk, walk, STANDS, "walk", "par")
+    assert done and "steps" in message
+    seen = {walk.description: None}
     for tick in range(round(STEP_S * 40 * 8)):
         if walk.levels(STANDS, tick / 40) is None:
             break
-        seen[walk.words] = None
-    assert [words.partition(",")[0] for words in seen if words] == [
+        seen[walk.description] = None
+    assert [message.partition(",")[0] for message in seen if message] == [
         f"par: {one}" for one in ("dimmer", "red", "green", "blue", "white", "strobe")
     ]
     assert walk.levels(STANDS, 100.0) is None, "it ends by itself"

@@ -156,7 +156,7 @@ def test_the_profiles_that_come_along_are_sound(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "message"),
     [
         ("channels: [pan, pan]", "'pan' is on channels 1 and 2"),
         ("channels: [tilt, pan fine]", "'pan fine' has no coarse channel 'pan'"),
@@ -166,13 +166,13 @@ def test_the_profiles_that_come_along_are_sound(name: str) -> None:
         ("channels: []", "too short or too long"),
     ],
 )
-def test_a_faulty_profile_is_named_with_its_line(tmp_path: Path, change: str, words: str) -> None:
+def test_a_faulty_profile_is_named_with_its_line(tmp_path: Path, change: str, message: str) -> None:
     (tmp_path / "profiles").mkdir()
     file = tmp_path / "profiles" / "bad.yaml"
     file.write_text(f"name: Bad\nmodes:\n  - name: one\n    {change}\n")
     with pytest.raises(ConfigError) as caught:
         load_profile("bad", tmp_path)
-    assert words in str(caught.value)
+    assert message in str(caught.value)
     assert f"{file}:" in str(caught.value)
     assert caught.value.line >= 4 or "attributes" in change
 

@@ -182,17 +182,17 @@ def test_ctrl_c_ends_the_walk_in_the_dark(show: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [(("--fixture", "pra"), "Did you mean 'par'?"), (("--attribute", "dimer"), "Did you mean 'dimmer'?")],
 )
 def test_unknown_names_are_refused_with_the_nearest(
-    show: Path, tmp_path: Path, arguments: tuple[str, ...], words: str, bunraku: Command
+    show: Path, tmp_path: Path, arguments: tuple[str, ...], message: str, bunraku: Command
 ) -> None:
     file = box(tmp_path, 9)
     said = " ".join(
         bunraku("lights", "test", "--show", show, "--box", file, *arguments, status=2).err.split()
     )
-    assert words in said and arguments[0] in said and "show.yaml" not in said
+    assert message in said and arguments[0] in said and "show.yaml" not in said
 
 
 def test_a_walk_beside_running_lights_is_refused(show: Path, tmp_path: Path, bunraku: Command) -> None:
@@ -204,16 +204,16 @@ def test_a_walk_beside_running_lights_is_refused(show: Path, tmp_path: Path, bun
 
 def test_a_box_without_a_wire_is_told_what_to_add(show: Path, tmp_path: Path, bunraku: Command) -> None:
     for command in (["lights", "test"], ["lights"]):
-        words = bunraku(*command, "--show", show, status=os.EX_CONFIG).err
-        assert "No wire leads to the lights. Add one under outputs: dmx:" in words
+        output = bunraku(*command, "--show", show, status=os.EX_CONFIG).err
+        assert "No wire leads to the lights. Add one under outputs: dmx:" in output
 
 
 def test_the_rig_is_printed_and_drawn(show: Path, tmp_path: Path, bunraku: Command) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "rig.png"
     said = bunraku("lights", "show", "--show", show, "--box", box(tmp_path, 9), "--out", picture).out
-    for words in ("par", "led-par", "21 to 32", "hanging", "rig.png"):
-        assert words in said
+    for text in ("par", "led-par", "21 to 32", "hanging", "rig.png"):
+        assert text in said
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

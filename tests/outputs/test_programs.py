@@ -158,7 +158,7 @@ def test_a_key_beside_the_program_counts_more(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("receiver", "words"),
+    ("receiver", "message"),
     [
         ("{dialect: vmc, scale: 100}", "'scale' belongs to the dialect ai-toolbox"),
         ("{dialect: joint, program: classifier}", "'program' belongs to the dialect ai-toolbox"),
@@ -169,11 +169,11 @@ def test_a_key_beside_the_program_counts_more(tmp_path: Path) -> None:
     ],
 )
 def test_what_does_not_go_together_is_refused_with_its_line(
-    tmp_path: Path, receiver: str, words: str
+    tmp_path: Path, receiver: str, message: str
 ) -> None:
     box = tmp_path / "box.yaml"
     box.write_text(f"outputs:\n  osc:\n    - {receiver}\n")
-    with pytest.raises(ConfigError, match=words) as refused:
+    with pytest.raises(ConfigError, match=message) as refused:
         load_box(box)
     assert f"{box}:3" in str(refused.value)
 

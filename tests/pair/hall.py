@@ -179,7 +179,7 @@ class PairedBox(Process):
         (folder / "pair.key").write_text(KEY)
         (folder / "box.yaml").write_text(yaml.safe_dump(settings))
         command = [*BUNRAKU, "play", "--show", str(show), "--box", str(folder / "box.yaml")]
-        super().__init__(folder / "words.txt", network.command(*command))
+        super().__init__(folder / "words.txt", network.command("nice", "-n", "-15", *command))
 
     @property
     def part(self) -> Any:
@@ -281,8 +281,11 @@ class Hall:
             "runtime": "runtime",
             "resume": "never",
             "pair": {
-                "role": "first" if is_first else "second", "peer": [peer], "host": "0.0.0.0",
-                "port": PAIR_PORT, "secret": "pair.key",
+                "role": "first" if is_first else "second",
+                "peer": [peer],
+                "host": "0.0.0.0",
+                "port": PAIR_PORT,
+                "secret": "pair.key",
             },
         }
         for section, values in self._more.items():

@@ -265,7 +265,7 @@ def test_times_count_from_where_the_recording_is_entered() -> None:
     skeleton = Skeleton(("hip", "head"), (-1, 0), np.array([[0, 0, 0], [0, 1.5, 0]], float))
     rows = [Row(poses, np.zeros((101, 3)), np.array([0, 50, 100]))]
     for start_s, stamps in ((0.0, ["0.0 s", "1.0 s", "2.0 s"]), (5.0, ["5.0 s", "6.0 s", "7.0 s"])):
-        assert [words for _, _, words in Stage(skeleton, rows, 50.0, start_s).times] == stamps
+        assert [text for _, _, text in Stage(skeleton, rows, 50.0, start_s).times] == stamps
 
 
 def test_a_title_in_any_script_is_drawn_without_a_warning(tmp_path: Path) -> None:

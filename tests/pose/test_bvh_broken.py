@@ -217,12 +217,12 @@ LOST = {  # text, number of poses, what is said
 
 @pytest.mark.parametrize("kind", LOST)
 def test_whole_rows_are_kept_and_the_others_are_named(tmp_path: Path, kind: str) -> None:
-    text, poses, words = LOST[kind]
+    text, poses, message = LOST[kind]
     path = tmp_path / "lost.bvh"
     path.write_text(text)
     recording = read_bvh(path)
     assert len(recording) == poses
-    for each in words:
+    for each in message:
         assert each in "; ".join(recording.notes)
 
 

@@ -58,5 +58,5 @@ def test_what_lies_too_deep_is_set_on_the_floor() -> None:
     meant = dance_of("Mixamo", seconds=2.0)
     sunk = replace(meant, roots=meant.roots - [0.0, 0.9, 0.0])
     found, guesses = in_stage_frame(sunk)
-    assert "the floor, at a height of -0.8" in guesses[0].words or "-0.9" in guesses[0].words
+    assert "the floor, at a height of -0.8" in guesses[0].message or "-0.9" in guesses[0].message
     assert abs(float((found.roots - meant.roots)[:, 1].mean())) < 0.06

@@ -96,8 +96,8 @@ def test_words_too_wide_are_shrunk_into_the_picture(show: Show) -> None:
 @pytest.mark.skipif(not fonts_of_machine(), reason="no font is installed here")
 def test_letters_of_several_scripts_are_drawn_as_themselves() -> None:
     """Arabic letters join: a word is narrower than its letters side by side."""
-    words = "Καλή Добрый дом"
-    assert letters_without_font(words) == ""
+    text = "Καλή Добрый дом"
+    assert letters_without_font(text) == ""
     assert letters_without_font("a\U0010fffd") == "\U0010fffd"
     alone = [lettered(letter, 60, (255, 255, 255)).shape[1] - 60 for letter in "دمية"]
     together = lettered("دمية", 60, (255, 255, 255)).shape[1] - 60
@@ -133,7 +133,7 @@ def test_a_broken_file_leaves_the_rest_of_the_card(gl: moderngl.Context, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("section", "words"),
+    ("section", "message"),
     [
         ({"cards": [{"name": "none"}]}, "'none' takes a card off"),
         ({"cards": [{"name": "a"}, {"name": "a"}]}, "Two cards are called 'a'"),
@@ -143,9 +143,9 @@ def test_a_broken_file_leaves_the_rest_of_the_card(gl: moderngl.Context, tmp_pat
     ],
 )
 def test_what_a_show_says_wrong_about_cards_is_refused(
-    section: dict[str, object], words: str, tmp_path: Path
+    section: dict[str, object], message: str, tmp_path: Path
 ) -> None:
-    with pytest.raises(ConfigError, match=words.replace("?", r"\?")):
+    with pytest.raises(ConfigError, match=message.replace("?", r"\?")):
         load_show(write_show(tmp_path, **section))
     cues = [{"name": "c", "card": "none", "camera": {"angle_deg": 90}}, {"name": "d", "card": "blank"}]
     assert load_show(write_show(tmp_path, cues=cues)).config.names["card"] == ("blank",)

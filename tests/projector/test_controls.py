@@ -27,10 +27,10 @@ def controls(kept: list[Alignment]) -> Controls:
 
 def strike(controls: Controls, *names: str, shift: bool = False) -> str:
     """Press keys one after the other; what the last one says."""
-    words = ""
+    message = ""
     for name in names:
-        words = press(Key(name, shift), controls, SIZE)
-    return words
+        message = press(Key(name, shift), controls, SIZE)
+    return message
 
 
 def test_arrows_move_the_chosen_corner_by_pixels(controls: Controls, kept: list[Alignment]) -> None:
@@ -65,8 +65,8 @@ def test_tab_cycles_through_the_corners_and_the_grid_is_shown(controls: Controls
 def test_a_corner_cannot_fold_the_picture(controls: Controls) -> None:
     controls.place(1, (0.55, 0.45))
     strike(controls, "C", "2")
-    words = [strike(controls, "Left", shift=True) for _ in range(20)]
-    assert "fold" in words[-1]
+    messages = [strike(controls, "Left", shift=True) for _ in range(20)]
+    assert "fold" in messages[-1]
     assert 0.45 < controls.alignment.corners[1][0] < 0.47
 
 
@@ -112,12 +112,12 @@ def test_commands_can_do_what_keys_can() -> None:
 
 
 def test_a_nudge_says_where_the_corner_is_now(controls: Controls, kept: list[Alignment]) -> None:
-    done, words = controls.carry_out(Order("nudge", (2, -0.125, 0.25)))
-    assert (done, words) == (True, "The top right corner is at (0.8750, 0.2500).")
+    done, message = controls.carry_out(Order("nudge", (2, -0.125, 0.25)))
+    assert (done, message) == (True, "The top right corner is at (0.8750, 0.2500).")
     assert controls.carry_out(Order("nudge", (2, 0.0625, 0.0)))[1].endswith("(0.9375, 0.2500).")
     assert kept[-1].corners[1] == (0.9375, 0.25)
-    done, words = controls.carry_out(Order("nudge", (2, -1, 1)))
-    assert not done and "fold" in words and words.endswith("(0.9375, 0.2500).")
+    done, message = controls.carry_out(Order("nudge", (2, -1, 1)))
+    assert not done and "fold" in message and message.endswith("(0.9375, 0.2500).")
 
 
 @pytest.mark.parametrize(
@@ -135,6 +135,6 @@ def test_a_nudge_says_where_the_corner_is_now(controls: Controls, kept: list[Ali
     ],
 )
 def test_refused_orders_change_nothing(controls: Controls, kept: list[Alignment], order: Order) -> None:
-    done, words = controls.carry_out(order)
-    assert not done and words.endswith(".") and not kept
+    done, message = controls.carry_out(order)
+    assert not done and message.endswith(".") and not kept
     assert controls.alignment == Alignment()

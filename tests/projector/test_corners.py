@@ -40,7 +40,7 @@ def test_without_corner_pin_nothing_moves() -> None:
 
 
 @pytest.mark.parametrize(
-    ("corners", "words"),
+    ("corners", "message"),
     [
         (((1, 0), (0, 0), (0, 1), (1, 1)), "from behind"),
         (((0, 0), (1, 0), (0.3, 0.3), (0, 1)), "fold"),
@@ -51,6 +51,6 @@ def test_without_corner_pin_nothing_moves() -> None:
         (((0, 0), (float("nan"), 0), (1, 1), (0, 1)), "not a number"),
     ],
 )
-def test_impossible_corners_are_refused_with_a_sentence(corners: Corners, words: str) -> None:
-    assert words in complaint(corners)
+def test_impossible_corners_are_refused_with_a_sentence(corners: Corners, message: str) -> None:
+    assert message in complaint(corners)
     assert "stays as it is" in complaint(corners)

@@ -218,9 +218,9 @@ def test_the_grid_numbers_the_corners_and_names_the_projector(show: Show) -> Non
     assert not show(flat(0), controls=controls).any()
 
 
-def is_written(words: str, white: np.ndarray, x: int, y: int) -> bool:
+def is_written(message: str, white: np.ndarray, x: int, y: int) -> bool:
     """Whether it stands there, give or take two pixels."""
-    wanted = letters((words,)) > 0
+    wanted = letters((message,)) > 0
     spots = sliding_window_view(white, wanted.shape)
     top, left = y - wanted.shape[0] // 2, x - wanted.shape[1] // 2
     near = spots[max(0, top - 2) : top + 3, max(0, left - 2) : left + 3]

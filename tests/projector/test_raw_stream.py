@@ -85,9 +85,9 @@ def test_the_projector_writes_pictures_alone_and_ends_cleanly(tmp_path: Path, ho
                 pass
         else:
             process.stdout.close()
-        words = process.stderr.read().decode()
-        assert process.wait(WITHIN_S) == 0, words
-    assert "The picture is 64x36" in words and "Traceback" not in words
+        output = process.stderr.read().decode()
+        assert process.wait(WITHIN_S) == 0, output
+    assert "The picture is 64x36" in output and "Traceback" not in output
 
 
 def test_raw_pictures_need_a_size() -> None:

@@ -203,8 +203,8 @@ def test_a_projector_serves_what_its_display_shows_and_takes_the_process_along(t
         assert not np.asarray(seen).any(), "no stage: black"
         connection.close()
         process.send_signal(signal.SIGTERM)
-        words = process.communicate(timeout=WITHIN_S)[0].decode()
-    assert process.returncode == 0 and "Traceback" not in words, words
+        output = process.communicate(timeout=WITHIN_S)[0].decode()
+    assert process.returncode == 0 and "Traceback" not in output, output
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection((HOST, port))
 

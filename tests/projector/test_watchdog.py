@@ -113,8 +113,8 @@ def test_a_display_that_hangs_ends_the_projector_with_words_and_75(tmp_path: Pat
     )
     try:
         assert process.stdout is not None and "hangs" in process.stdout.readline()
-        _, words = process.communicate(timeout=20.0)
+        _, output = process.communicate(timeout=20.0)
     finally:
         process.kill()
     assert process.returncode == GPU_LOST
-    assert "The display has taken no picture" in words and "The audience sees" in words
+    assert "The display has taken no picture" in output and "The audience sees" in output

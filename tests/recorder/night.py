@@ -76,10 +76,10 @@ class Night:
             self._carry_out(order, now)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        done, words = carry_out(order, self.parts, self.wearing, now)
+        done, message = carry_out(order, self.parts, self.wearing, now)
         asked = {"name": order.name, "values": order.values, "text": order.text}
-        self.recorder.event(ORDER, now, order=asked, done=done, words=words)
-        return done, words
+        self.recorder.event(ORDER, now, order=asked, done=done, message=message)
+        return done, message
 
     def mirror(self, folder: Path, minutes: float = 30.0) -> Mirror:
         """Keeps this night in a folder."""

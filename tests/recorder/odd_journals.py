@@ -86,6 +86,6 @@ def listed_in_bounds(path: Path) -> str:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
         return json.dumps([refused.getvalue() or "listed", peak - before]).encode()
 
-    words, peak = json.loads(run_with_timeout(PATIENCE_S, listed))
+    message, peak = json.loads(run_with_timeout(PATIENCE_S, listed))
     assert peak < PEAK, f"{peak >> 20} MB"
-    return str(words)
+    return str(message)

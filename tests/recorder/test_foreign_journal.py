@@ -277,7 +277,7 @@ def test_nothing_in_a_journal_steers_the_terminal(
 ) -> None:
     path = tmp_path / "odd.segment"
     steering = with_header(whole, header(whole) | {"show": "\x1b]0;taken\x07", "cpu": "\x1b[2J"})
-    path.write_bytes(changed_order(steering, lambda event: event.update(words="\x1b[2J\n\r")))
+    path.write_bytes(changed_order(steering, lambda event: event.update(message="\x1b[2J\n\r")))
     all_that_reads(path, tmp_path)
     assert replay_journal(path, show, 0.0, None) == 0
     said = capsys.readouterr()

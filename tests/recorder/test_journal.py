@@ -51,13 +51,13 @@ def test_every_tick_the_readings_and_the_figure_are_read_back(night: Night, tmp_
 
 def test_events_are_kept_in_their_place_and_the_longest_lose_their_end(night: Night, tmp_path: Path) -> None:
     night.dance(3)
-    night.recorder.event("said", 12.5, words="x" * 5 * LONGEST_EVENT, count=3)
+    night.recorder.event("said", 12.5, message="x" * 5 * LONGEST_EVENT, count=3)
     night.dance(2)
     night.recorder.event("odd", 13.0, what=object())
     (run,) = read_journal(night.kept(tmp_path / "journal")).runs
     ((number, event),) = run.events
     assert (event["kind"], event["now"], event["count"]) == ("said", 12.5, 3)
-    assert LONGEST_EVENT / 3 < len(event["words"]) < LONGEST_EVENT
+    assert LONGEST_EVENT / 3 < len(event["message"]) < LONGEST_EVENT
     assert run.tick_numbers.tolist() == [1, 2, 3, number + 1, number + 2]
     assert night.recorder.lost == 1
 

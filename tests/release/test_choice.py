@@ -27,7 +27,7 @@ from tests.release.venue import BROKEN, Venue, dancing
 def test_without_anything_the_show_that_comes_with_the_box_dances(venue: Venue) -> None:
     outcome = venue.look()
     assert outcome.choice.complete().first == Pair(EMBEDDED_SHOW, APPLIANCE_BOX, good=True)
-    assert (outcome.taken, outcome.words, venue.checked) == (False, (), [])
+    assert (outcome.taken, outcome.messages, venue.checked) == (False, (), [])
 
 
 def test_a_new_show_is_copied_whole_and_dances_also_without_its_stick(venue: Venue) -> None:
@@ -49,8 +49,8 @@ def test_nothing_new_is_not_checked_again(venue: Venue) -> None:
 
 
 def test_the_show_before_is_kept_once_it_has_danced(venue: Venue) -> None:
-    for words in ("spring", "summer"):
-        venue.bring(venue.stick, words)
+    for text in ("spring", "summer"):
+        venue.bring(venue.stick, text)
         choice = venue.look().choice
         choice.with_good(choice.first.id).write(venue.places.data / CHOSEN)
     venue.bring(venue.stick, "autumn")
@@ -62,8 +62,8 @@ def test_the_show_before_is_kept_once_it_has_danced(venue: Venue) -> None:
 
 
 def test_a_show_before_that_never_danced_is_better_than_none(venue: Venue) -> None:
-    for words in ("spring", "summer"):
-        venue.bring(venue.stick, words)
+    for text in ("spring", "summer"):
+        venue.bring(venue.stick, text)
         venue.look()
     pairs = read_choice(venue.places.data).pairs
     assert [(pair.show / "show.yaml").read_text() for pair in pairs] == ["summer", "spring"]
@@ -83,7 +83,7 @@ def test_a_broken_show_is_refused_with_its_line_on_the_stick_and_the_last_good_o
     checked = len(venue.checked)
     again = venue.look()
     assert again.choice.refused == outcome.choice.refused
-    assert (len(venue.checked), again.words) == (checked, ())
+    assert (len(venue.checked), again.messages) == (checked, ())
 
 
 def test_a_mended_show_is_taken_and_the_refusal_is_gone(venue: Venue) -> None:

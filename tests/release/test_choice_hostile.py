@@ -29,9 +29,9 @@ def _power_on(venue: Venue) -> str:
 def test_what_gave_way_to_newer_shows_does_not_come_back_from_the_boot_partition(venue: Venue) -> None:
     venue.bring(venue.boot, "autumn, last year")
     _power_on(venue)
-    for words in ("spring", "summer"):
-        venue.bring(venue.stick, words)
-        assert _power_on(venue) == words
+    for text in ("spring", "summer"):
+        venue.bring(venue.stick, text)
+        assert _power_on(venue) == text
     assert [_power_on(venue) for _ in range(3)] == ["summer"] * 3
     (venue.stick / "show").rename(venue.stick / "gone")
     assert _power_on(venue) == "summer"
@@ -104,8 +104,8 @@ def test_a_name_that_is_no_text_stops_nobody(venue: Venue, content: str) -> None
     said = adopt(
         venue.places, [look("stick", venue.stick)], lambda show, box: [f"{show / NO_TEXT}: what is this?"]
     )
-    for words in (*said.words, *said.choice.refused):
-        words.encode()
+    for message in (*said.messages, *said.choice.refused):
+        message.encode()
     venue.bring(venue.stick, "mended")
     assert dancing(venue.look()) == "mended"
 
@@ -121,7 +121,7 @@ def test_a_folder_without_end_is_listed_in_a_moment(venue: Venue) -> None:
         (venue.stick / "show" / f"{number}" / "file").touch()
     arrival = look("stick", venue.stick)
     assert arrival.listing == [["show/?", 0, 0]], "5000 folders are looked at before the first file"
-    assert "cannot be read" in " ".join(venue.look().words)
+    assert "cannot be read" in " ".join(venue.look().messages)
 
 
 def test_a_file_that_goes_on_for_ever_is_left_early(venue: Venue) -> None:
@@ -144,7 +144,7 @@ def test_memory_is_never_filled_by_a_show(venue: Venue) -> None:
     try:
         venue.bring(venue.stick, "spring")
         assert not venue.look().taken
-        assert "no room" in " ".join(venue.look().words)
+        assert "no room" in " ".join(venue.look().messages)
     finally:
         subprocess.run(["umount", str(run)], check=True)
 

@@ -56,13 +56,13 @@ def test_root_goes_on_as_the_user_of_the_box_and_others_are_told_to_be_root(run:
     assert "closed to this user. Put sudo before the command" in closed
 
 
-def _said(run: Path, words: str) -> str:
+def _said(run: Path, message: str) -> str:
     program = (
         "import os, pathlib\n"
         "from appliance.release.installed_box import box_here, pair_here\n"
         "from appliance.release import choice\n"
         "from appliance.show import config_error\n"
-        f"choice.RUN = pathlib.Path({str(run)!r})\n{words}"
+        f"choice.RUN = pathlib.Path({str(run)!r})\n{message}"
     )
     done = subprocess.run((sys.executable, "-c", program), capture_output=True, text=True)
     return done.stdout + done.stderr

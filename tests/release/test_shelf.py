@@ -77,7 +77,7 @@ def test_a_read_only_disk_the_show_dances_from_memory(venue: Venue, small_data: 
     outcome = venue.look()
     assert dancing(outcome) == "spring"
     assert outcome.choice.first.box.is_relative_to(venue.places.run)
-    assert "nothing can be kept there" in " ".join(outcome.words)
+    assert "nothing can be kept there" in " ".join(outcome.messages)
 
 
 def test_without_a_data_partition_the_show_dances_from_memory(venue: Venue) -> None:

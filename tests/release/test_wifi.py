@@ -75,7 +75,7 @@ def test_norway_is_a_country(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "words", "cure"),
+    ("text", "line", "message", "cure"),
     [
         ("country: DE\nname: hall\n", 1, "'password' is missing", ""),
         ("country: DE\nname: hall\npassword: short\n", 3, "this one has 5", "Copy it from the router"),
@@ -89,11 +89,11 @@ def test_norway_is_a_country(tmp_path: Path) -> None:
     ],
 )
 def test_a_fault_is_named_with_its_line_and_its_cure(
-    tmp_path: Path, text: str, line: int, words: str, cure: str
+    tmp_path: Path, text: str, line: int, message: str, cure: str
 ) -> None:
     with pytest.raises(ConfigError) as caught:
         read_wifi(written(tmp_path, text))
     assert caught.value.problems[-1].line == line, str(caught.value)
-    assert words in str(caught.value)
+    assert message in str(caught.value)
     assert cure in str(caught.value)
     assert "342391" not in str(caught.value), "a password is not shown on the wall"

@@ -21,11 +21,11 @@ class Venue:
         for one in (self.stick, self.boot, *self.places):
             one.mkdir()
 
-    def bring(self, where: Path, words: str, box: str | None = None) -> None:
+    def bring(self, where: Path, text: str, box: str | None = None) -> None:
         """A show with these words in it, or nothing; a box file with those, or nothing."""
-        if words:
+        if text:
             (where / "show" / "profiles").mkdir(parents=True, exist_ok=True)
-            (where / "show" / "show.yaml").write_text(words)
+            (where / "show" / "show.yaml").write_text(text)
             (where / "show" / "puppet.onnx").write_bytes(os.urandom(300_000))
             (where / "show" / "profiles" / "head.yaml").write_text("a head")
         if box is not None:

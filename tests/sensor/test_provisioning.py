@@ -33,7 +33,7 @@ def provisioned(
     said: list[str] = []
     with WearableConsole(fake.port, patience_s=5.0) as console:
         done = provision(
-            console, path, settings, lambda what, words: said.append(f"{what} {words}"), takes_over, worn
+            console, path, settings, lambda what, message: said.append(f"{what} {message}"), takes_over, worn
         )
     return done, said
 
@@ -50,11 +50,11 @@ def refused(
         provisioned(fake, path, settings, takes_over, worn)
     assert (path.read_bytes() if path.exists() else None) == before
     assert [one.name for one in path.parent.iterdir()] == ([path.name] if before is not None else [])
-    words = str(caught.value)
+    message = str(caught.value)
     for key in (fake.draft.key, fake.saved.key):
-        assert not key or key.hex() not in words
-    assert settings.password not in words or not settings.password
-    return words
+        assert not key or key.hex() not in message
+    assert settings.password not in message or not settings.password
+    return message
 
 
 def test_both_sides_have_the_same_key_and_the_wearable_all_settings(path: Path) -> None:
@@ -114,14 +114,14 @@ def test_after_new_firmware_it_takes_its_name_again(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("own", "words"), [("spare-1", "is 'spare-1' already"), ("", "provisioned elsewhere")]
+    ("own", "message"), [("spare-1", "is 'spare-1' already"), ("", "provisioned elsewhere")]
 )
-def test_a_wearable_does_not_take_anothers_name_by_mistake(path: Path, own: str, words: str) -> None:
+def test_a_wearable_does_not_take_anothers_name_by_mistake(path: Path, own: str, message: str) -> None:
     keys = create_keys(path, ["left-wrist", "spare-1"])
     device = f"{keys[own].device_id:08x}" if own else "00000001"
     with FakeWearable(Memory("left-wrist", device)) as fake:
         told = refused(fake, path)
-        assert words in told
+        assert message in told
         assert f"bunraku sensors replace left-wrist {own or '--port'}" in told
         assert fake.saved.key == b""
         done, _ = provisioned(fake, path, takes_over=True)
@@ -161,9 +161,9 @@ def test_a_cable_pulled_before_the_save_has_changed_nothing(path: Path, step: st
     create_keys(path, ["head"])
     fake = FakeWearable(**{when: step})  # type: ignore[arg-type]
     with fake:
-        words = refused(fake, path)
-    assert "came loose" in words
-    assert "Nothing was changed" in words
+        message = refused(fake, path)
+    assert "came loose" in message
+    assert "Nothing was changed" in message
     assert fake.saved == Memory()
     fake.pulls_at = fake.pulls_after = ""
     with fake:  # plugged in again
@@ -182,10 +182,10 @@ def test_a_cable_pulled_at_the_save_is_said_and_mended_by_another_run(
             provisioned(fake, path)
     setattr(fake, when, "save")
     with fake:
-        words = refused(fake, path)
-    assert "may or may not have its new key" in words
-    assert "was not changed, so the box does not let it in" in words
-    assert "run this again" in words
+        message = refused(fake, path)
+    assert "may or may not have its new key" in message
+    assert "was not changed, so the box does not let it in" in message
+    assert "run this again" in message
     setattr(fake, when, "")
     with fake:
         done, _ = provisioned(fake, path)
@@ -212,18 +212,18 @@ def test_a_wearable_that_loses_its_key_while_saving_is_not_believed(path: Path) 
 
 def test_what_the_wearable_refuses_is_passed_on(path: Path) -> None:
     with FakeWearable(refuses={"set axes": "error: axes are a turn; nothing was changed"}) as fake:
-        words = refused(fake, path)
-    assert "axes are a turn" in words
-    assert "Nothing was changed" in words
+        message = refused(fake, path)
+    assert "axes are a turn" in message
+    assert "Nothing was changed" in message
     with FakeWearable(refuses={"save": "error: the flash did not take the settings; try again"}) as fake:
         assert "not stored" in refused(fake, path)
 
 
 def test_another_wire_is_refused_with_both_and_what_to_flash(path: Path) -> None:
     with FakeWearable(wire_hash=0x12345678) as fake:
-        words = refused(fake, path)
-    assert "firmware 1.0.0 speaks wire 12345678" in words
-    assert "Flash firmware/wearable of this version" in words
+        message = refused(fake, path)
+    assert "firmware 1.0.0 speaks wire 12345678" in message
+    assert "Flash firmware/wearable of this version" in message
     assert not any(line.startswith("set") for line in fake.heard)
 
 

@@ -67,11 +67,11 @@ def test_what_is_no_yaml_is_refused_with_its_line(tmp_path: Path) -> None:
 def test_neither_numbers_nor_the_box_are_loaded(tmp_path: Path, command: str) -> None:
     """At each power-on of a box without sound and lights, beside the first frame."""
     box = box_file(tmp_path, "state: here\n")
-    words = (
+    text = (
         "import sys\nfrom appliance.start import main\ntry:\n    main(sys.argv[1:])\nfinally:\n"
         "    print(*sys.modules)\n"
     )
-    line = (sys.executable, "-c", words, command, "--box", str(box))
+    line = (sys.executable, "-c", text, command, "--box", str(box))
     ran = subprocess.run(line, capture_output=True, text=True, check=False)
     assert ran.returncode == NotAskedForError.exit_status, ran.stderr
     assert not {"numpy", "appliance.show.box", f"appliance.{command}.run"} & set(ran.stdout.split())
@@ -79,8 +79,8 @@ def test_neither_numbers_nor_the_box_are_loaded(tmp_path: Path, command: str) ->
 
 def test_a_box_file_is_read_without_numbers_and_without_shows() -> None:
     """So read by each process of a box, also by those that calculate nothing."""
-    words = "import sys, appliance.show.box; print(*sys.modules)"
-    ran = subprocess.run((sys.executable, "-c", words), capture_output=True, text=True, check=True)
+    text = "import sys, appliance.show.box; print(*sys.modules)"
+    ran = subprocess.run((sys.executable, "-c", text), capture_output=True, text=True, check=True)
     needless = {
         "numpy",
         *(f"appliance.show.{name}" for name in ("show", "cues", "dance", "lights", "puppets")),

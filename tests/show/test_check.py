@@ -141,18 +141,18 @@ def test_a_phrase_shorter_than_a_window_is_refused(bundle: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("motion", "line", "words"),
+    ("motion", "line", "message"),
     [
         ("motion:\n  start_s: 1.1\n", 3, "The excerpt has 5 poses"),
         ("motion:\n  start_s: 30\n", 3, "The excerpt has 0 poses"),
         ("motion:\n  end_s: 9\n", 3, "behind the phrase's end (1.20 s)"),
     ],
 )
-def test_an_excerpt_outside_the_phrase_is_refused(bundle: Path, motion: str, line: int, words: str) -> None:
+def test_an_excerpt_outside_the_phrase_is_refused(bundle: Path, motion: str, line: int, message: str) -> None:
     (bundle / "show.yaml").write_text(f"name: x\n{motion}")
     finding = only(bundle)
     assert (finding.level, finding.file.name, finding.line) == ("error", "show.yaml", line)
-    assert words in finding.message
+    assert message in finding.message
 
 
 def test_a_phrase_of_another_skeleton_is_refused(bundle: Path) -> None:

@@ -42,7 +42,7 @@ def test_what_is_nested_deeper_than_anybody_writes_is_refused_at_once(text: str,
     with pytest.raises(DamagedMemoryError):
         read_memory(text.encode())
     told = change(box_file(tmp_path, ""), None, Change(text, [(["control", "port"], 9003)]))
-    assert "nested too deeply" in told["problems"][0]["words"]
+    assert "nested too deeply" in told["problems"][0]["message"]
     assert time.process_time() - began < 10.0, "it took 23 s for one of them"
 
 
@@ -63,7 +63,7 @@ def test_a_value_that_no_file_holds_is_refused() -> None:
 
 def test_a_text_of_any_length_is_bounded(tmp_path: Path) -> None:
     told = change(box_file(tmp_path, ""), None, Change("#" * (MAX_BYTES + 1), []))
-    assert "at most 256 kB" in told["problems"][0]["words"]
+    assert "at most 256 kB" in told["problems"][0]["message"]
 
 
 @pytest.mark.parametrize("line", ["key{}: 1", "stat{}: 1", "a: {}"], ids=["unknown", "nearly", "twice"])
@@ -83,13 +83,13 @@ def test_twenty_thousand_mistakes_are_few_lines_and_say_how_many_more(tmp_path: 
 def test_names_of_a_file_stay_in_their_quotes(tmp_path: Path, key: str) -> None:
     with pytest.raises(ConfigError) as refused:
         load_box(box_file(tmp_path, yaml.safe_dump({key: 1, "control": {key: 2}})))
-    words = str(refused.value)
-    assert len(words.splitlines()) == 2 and "Unknown key '" in words
-    assert all(line.isprintable() and len(line) < 500 for line in words.splitlines())
+    message = str(refused.value)
+    assert len(message.splitlines()) == 2 and "Unknown key '" in message
+    assert all(line.isprintable() and len(line) < 500 for line in message.splitlines())
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("sensors: {keys: /etc/shadow}", "belongs to the system"),
         ("sensors: {keys: /dev/zero}", "belongs to the system"),
@@ -108,9 +108,9 @@ def test_names_of_a_file_stay_in_their_quotes(tmp_path: Path, key: str) -> None:
         ("outputs: {dmx: [{universe: 1, wire: usb-pro, device: /dev/null}]}", "no serial device"),
     ],
 )
-def test_no_place_of_the_system_is_taken(tmp_path: Path, text: str, words: str) -> None:
+def test_no_place_of_the_system_is_taken(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "link").symlink_to("/etc/shadow")
-    with pytest.raises(ConfigError, match=words) as refused:
+    with pytest.raises(ConfigError, match=message) as refused:
         load_box(box_file(tmp_path, text))
     assert refused.value.line == 1
 
@@ -127,7 +127,7 @@ def test_places_of_a_box_are_taken(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("console: null", "takes this page away"),
         ("control: null", "PANIC and BLACKOUT"),
@@ -142,14 +142,14 @@ def test_places_of_a_box_are_taken(tmp_path: Path) -> None:
     ],
 )
 def test_a_change_that_shuts_out_or_lets_all_in_is_asked_for_first(
-    tmp_path: Path, text: str, words: str
+    tmp_path: Path, text: str, message: str
 ) -> None:
     before = "console: {host: '::', viewers: [10.0.0.0/8]}\n"
     path = box_file(tmp_path, before)
     asked = change(path, None, Change(text, []))
-    assert asked["problems"] == [] and words in " ".join(asked["asks"])
+    assert asked["problems"] == [] and message in " ".join(asked["asks"])
     assert path.read_text() == before, "nothing is written before it is answered"
-    assert "is written" in change(path, None, Change(text, [], sure=True))["words"]
+    assert "is written" in change(path, None, Change(text, [], sure=True))["message"]
     assert path.read_text() == text
     assert "asks" not in change(path, None, Change(text + "\n", [])), "what is so already is not asked again"
 

@@ -27,13 +27,13 @@ def said(directory: Path) -> list[str]:
     def check() -> bytes:
         return json.dumps([f"{found.level} {found}" for found in verify_bundle(directory)]).encode()
 
-    words: list[str] = json.loads(run_with_timeout(PATIENCE_S, check))
-    return words
+    messages: list[str] = json.loads(run_with_timeout(PATIENCE_S, check))
+    return messages
 
 
 def about(directory: Path, name: str) -> str:
     """All that the check says about one file, which may not pass in silence."""
-    found = [words for words in said(directory) if name in words]
+    found = [message for message in said(directory) if name in message]
     assert found, name
     return "\n".join(found)
 
@@ -42,8 +42,8 @@ def about(directory: Path, name: str) -> str:
 def test_a_fifo_is_refused_and_holds_nothing_up(bundle: Path, name: str) -> None:
     (bundle / name).unlink()
     os.mkfifo(bundle / name)
-    words = about(bundle, name)
-    assert "no regular file" in words or "missing or unreadable" in words
+    message = about(bundle, name)
+    assert "no regular file" in message or "missing or unreadable" in message
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -60,9 +60,9 @@ def test_the_contents_of_a_private_file_are_not_disclosed(bundle: Path, tmp_path
     private.write_text(SECRET)
     (bundle / name).unlink()
     (bundle / name).symlink_to(private)
-    words = about(bundle, name)
+    message = about(bundle, name)
     assert "hunter2" not in "\n".join(said(bundle))
-    assert "leads out of the folder: put the file itself there" in words or name == CHECKSUMS
+    assert "leads out of the folder: put the file itself there" in message or name == CHECKSUMS
     if name == "show.yaml":
         with pytest.raises(ConfigError) as refused:
             load_show(bundle)
@@ -75,8 +75,8 @@ def test_a_profile_is_the_show_s_own_file(bundle: Path, tmp_path: Path) -> None:
     (bundle / "profiles" / "own.yaml").symlink_to(tmp_path / "private")
     lights = "lights: {fixtures: [{name: wash, profile: own, address: 1}]}\n"
     (bundle / "show.yaml").write_text(SHOW_YAML + lights)
-    words = about(bundle, "own.yaml")
-    assert "leads out of the folder" in words and "hunter2" not in words
+    message = about(bundle, "own.yaml")
+    assert "leads out of the folder" in message and "hunter2" not in message
 
 
 def test_links_within_the_bundle_are_followed(bundle: Path) -> None:
@@ -120,8 +120,8 @@ def test_a_number_that_is_none_is_refused_with_its_line(bundle: Path, number: st
     (bundle / "show.yaml").write_text(
         SHOW_YAML.replace("coding_iterations: 10", f"coding_iterations: {number}")
     )
-    words = about(bundle, "show.yaml:3")
-    assert len(words) < 1000
+    message = about(bundle, "show.yaml:3")
+    assert len(message) < 1000
 
 
 @pytest.mark.parametrize(

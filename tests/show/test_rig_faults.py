@@ -55,9 +55,9 @@ control:
 """
 
 
-def line_of(text: str, words: str) -> int:
+def line_of(text: str, message: str) -> int:
     """Number of the first line with these words."""
-    return next(number for number, line in enumerate(text.splitlines(), 1) if words in line)
+    return next(number for number, line in enumerate(text.splitlines(), 1) if message in line)
 
 
 def test_the_files_are_sound_without_the_faults(bundle: Path) -> None:

@@ -208,7 +208,7 @@ def test_missing_folders_and_files_are_reported(bundle: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "line", "words"),
+    ("content", "line", "message"),
     [
         (b"", 1, "'name' is missing"),
         (b"- a\n- b\n", 1, "does not consist of keys"),
@@ -220,11 +220,11 @@ def test_missing_folders_and_files_are_reported(bundle: Path) -> None:
         (b"? [a, b]\n: c\nname: x\n", 1, "A key is a single word"),
     ],
 )
-def test_what_is_hardly_a_file_is_refused(bundle: Path, content: bytes, line: int, words: str) -> None:
+def test_what_is_hardly_a_file_is_refused(bundle: Path, content: bytes, line: int, message: str) -> None:
     (bundle / "show.yaml").write_bytes(content)
     error = refusal(bundle)
     assert error.line == line
-    assert words in str(error)
+    assert message in str(error)
 
 
 def test_a_hand_on_a_joint_that_the_network_does_not_move_is_refused(show_yaml: ShowYaml) -> None:

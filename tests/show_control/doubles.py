@@ -260,12 +260,12 @@ class Asker:
 
 
 @contextlib.contextmanager
-def control_process(folder: Path, words: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+def control_process(folder: Path, output: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
     """Show control as the process that a box runs, and its port."""
     bound = open_port(HOST, 0)
     os.set_inheritable(bound.fileno(), True)
     settings = Settings(str(folder), bound.fileno())
-    with words.open("wb") as out:
+    with output.open("wb") as out:
         process = subprocess.Popen(
             [sys.executable, "-m", "appliance.show_control", settings.packed()],
             pass_fds=[bound.fileno()],

@@ -79,9 +79,9 @@ def test_cards_and_the_camera_come_and_go_with_fades(folder: Path, stage: StageD
 def test_what_is_misspelt_changes_nothing_and_the_nearest_is_named(
     folder: Path, stage: StageDouble, asker: Asker, message: tuple[str], cure: str
 ) -> None:
-    address, about, done, words = asker.ask(*message)
+    address, about, done, text = asker.ask(*message)
     assert (address, about, done) == ("/reply", message[0], 0)
-    assert cure in words
+    assert cure in text
     now = show_state(folder)
     assert not now.settings and now.generation == 0 and not now.panic
     assert stage.orders == []
@@ -116,11 +116,11 @@ def test_what_persists_of_the_dance_is_declared_and_answered_when_the_stage_foll
 
 
 def test_how_alive_and_which_dance_is_declared(folder: Path, stage: StageDouble, asker: Asker) -> None:
-    words = "The liveliness goes to 50 %."
-    assert asker.ask("/liveliness", 0.5, 3) == ["/reply", "/liveliness", 1, words]
+    text = "The liveliness goes to 50 %."
+    assert asker.ask("/liveliness", 0.5, 3) == ["/reply", "/liveliness", 1, text]
     assert declared(folder, LIVELINESS) == (0.5, 3.0)
-    words = "The answer goes over to the seed 2147483647."
-    assert asker.ask("/seed", 2**31 - 1) == ["/reply", "/seed", 1, words]
+    text = "The answer goes over to the seed 2147483647."
+    assert asker.ask("/seed", 2**31 - 1) == ["/reply", "/seed", 1, text]
     assert declared(folder, SEED) == (2**31 - 1, 0.0)
     stage.tell(liveliness=0.75, seed=5)
     assert (asker.status().liveliness, asker.status().seed) == (0.75, 5)

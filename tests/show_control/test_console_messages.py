@@ -16,7 +16,7 @@ def test_nothing_is_said_where_nothing_changes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("show_state", "words"),
+    ("show_state", "message"),
     [
         (ShowState(panic=True), "Panic is in force: black"),
         (ShowState().to(GOING, 0.0), "The show is stopped: dark. /go"),
@@ -25,9 +25,9 @@ def test_nothing_is_said_where_nothing_changes() -> None:
         (ShowState(panic=True, blackout=True).to(GOING, 0.0), "Panic"),
     ],
 )
-def test_why_it_is_dark_is_said_once_and_that_it_is_back(show_state: ShowState, words: str) -> None:
+def test_why_it_is_dark_is_said_once_and_that_it_is_back(show_state: ShowState, message: str) -> None:
     news = ConsoleMessages(ShowState())
-    assert news.look(show_state, 0.0).startswith(words) and held_back(show_state).startswith(words)
+    assert news.look(show_state, 0.0).startswith(message) and held_back(show_state).startswith(message)
     assert news.look(show_state, 1.0) == ""
     assert news.look(ShowState(), 2.0) == "Picture and lights are back."
     assert held_back(ShowState()) == ""
@@ -41,6 +41,8 @@ def test_a_cue_is_said_with_what_it_changes() -> None:
 
 def test_a_button_that_somebody_plays_with_is_no_flood() -> None:
     news = ConsoleMessages(ShowState())
-    said = [words for step in range(500) if (words := news.look(ShowState(panic=step % 2 == 0), step * 0.01))]
+    said = [
+        message for step in range(500) if (message := news.look(ShowState(panic=step % 2 == 0), step * 0.01))
+    ]
     assert len(said) <= 10
     assert news.look(ShowState(panic=True), 10.0) == "" or news.look(ShowState(), 20.0) != ""

@@ -69,7 +69,7 @@ def test_what_is_said_after_a_cue_wins_over_it(folder: Path, stage: StageDouble,
 
 def test_cues_follow_each_other(folder: Path, stage: StageDouble, asker: Asker) -> None:
     assert [asker.ask("/cue")[3] for _ in range(2)] == ["Cue 1.", "Cue storm."]
-    _, _, done, words = asker.ask("/cue")
+    _, _, done, message = asker.ask("/cue")
     assert not done
-    assert "storm was the last cue" in words
+    assert "storm was the last cue" in message
     assert show_state(folder).cue == "storm"

@@ -174,7 +174,7 @@ def test_slimevrs_bundle_is_as_large_as_its_own() -> None:
 
 
 @pytest.mark.parametrize(
-    ("received", "words"),
+    ("received", "message"),
     [
         (xsens(true_turns(0)[1])[:-1], "no whole datagram of Xsens MVN"),
         (b"MXTP02", "no whole datagram of Xsens MVN"),
@@ -185,12 +185,12 @@ def test_slimevrs_bundle_is_as_large_as_its_own() -> None:
     ],
 )
 def test_a_damaged_datagram_is_refused_in_words(
-    reader: LivePoseReader, control: ControlInThread, asker: Asker, received: bytes, words: str
+    reader: LivePoseReader, control: ControlInThread, asker: Asker, received: bytes, message: str
 ) -> None:
     asker.ask("/ping")
     asker.socket.send(received)
     reply = asker.hear()
-    assert reply is not None and reply[2] == 0 and words in reply[3]
+    assert reply is not None and reply[2] == 0 and message in reply[3]
     assert reader.read() is None
     told = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
     assert told and told[0][4] == 1

@@ -79,8 +79,8 @@ def own_kb(pid: int) -> int:
 
 
 def test_the_process_answers_after_all_that_and_has_not_grown(folder: Path, tmp_path: Path) -> None:
-    words = tmp_path / "words.txt"
-    with control_process(folder, words) as (process, port):
+    output = tmp_path / "words.txt"
+    with control_process(folder, output) as (process, port):
         flood, asker = Asker(port), Asker(port)
         assert asker.ask("/ping") == ["/pong"]
         before = 0
@@ -100,7 +100,7 @@ def test_the_process_answers_after_all_that_and_has_not_grown(folder: Path, tmp_
         assert process.wait(20) == 0
         flood.close()
         asker.close()
-    *news, said = words.read_text().splitlines()
+    *news, said = output.read_text().splitlines()
     assert said.startswith("Commands: ") and said.isprintable()
     known = ("Panic is", "The show is stopped", "Blackout is", "Master is", "Picture and lights")
     assert all(line.startswith(known) for line in news), news  # nothing of what came in was said

@@ -57,7 +57,7 @@ def test_poses_of_another_program_reach_the_stage(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (POSE[:-1], f"{len(POSE) - 1} came"),
         ([*POSE, 1.0], f"{len(POSE) + 1} came"),
@@ -67,10 +67,10 @@ def test_poses_of_another_program_reach_the_stage(
     ],
 )
 def test_what_is_no_pose_of_this_figure_is_refused_in_words(
-    stage: StageDouble, asker: Asker, reader: LivePoseReader, arguments: list[float], words: str
+    stage: StageDouble, asker: Asker, reader: LivePoseReader, arguments: list[float], message: str
 ) -> None:
     reply = asker.ask(ROTATIONS, *arguments)
-    assert reply[1:3] == [ROTATIONS, 0] and words in reply[3]
+    assert reply[1:3] == [ROTATIONS, 0] and message in reply[3]
     assert reader.read() is None
 
 

@@ -42,7 +42,7 @@ def process(folder: Path, clock: Clock) -> Iterator[ControlProcess]:
     settings = Settings(str(folder), open_port(HOST, 0).detach())
     with (
         closing(FrameWriter(folder, SHOW)),
-        closing(ControlProcess(settings, lambda words: None, clock)) as process,
+        closing(ControlProcess(settings, lambda message: None, clock)) as process,
     ):
         yield process
 
@@ -85,7 +85,7 @@ def test_a_bundle_of_a_whole_figure_and_its_face_reaches_the_stage(
 
 
 @pytest.mark.parametrize(
-    ("received", "words"),
+    ("received", "text"),
     [
         (doubles(ROOT, "root", 1e39, 0.0, 0.0, *REST), "farther than 1000 m"),
         (doubles(BONE, "Hips", 0.0, -1e308, 0.0, *REST), "farther than 1000 m"),
@@ -95,15 +95,15 @@ def test_a_bundle_of_a_whole_figure_and_its_face_reaches_the_stage(
     ],
 )
 def test_numbers_that_no_figure_has_are_refused_told_and_end_nothing(
-    folder: Path, stage: StageDouble, control: ControlInThread, asker: Asker, received: bytes, words: str
+    folder: Path, stage: StageDouble, control: ControlInThread, asker: Asker, received: bytes, text: str
 ) -> None:
     """Doubles above 3.4e38 once ended show control."""
     asker.ask("/ping")
     asker.socket.send(received)
     heard = asker.hear()
-    assert heard is not None and heard[2] == 0 and words in heard[3]
+    assert heard is not None and heard[2] == 0 and text in heard[3]
     told = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
-    assert told and told[0][4] == 1 and words in told[0][5]
+    assert told and told[0][4] == 1 and text in told[0][5]
     with closing(LivePoseReader(folder)) as reader:
         assert reader.read() is None
     assert asker.ask("/panic")[2] == 1
@@ -126,7 +126,7 @@ def test_an_error_of_this_program_ends_no_process_and_is_told_at_a_limited_rate(
             heard = asker.hear()
             assert heard is not None and heard[2] == 0 and "an error of this program" in heard[3]
             assert asker.hear() == ["/pong"]  # the rest of the bundle is carried out
-    assert [words for words in said if "ZeroDivisionError: of a test" in words] == said and len(said) == 1
+    assert [text for text in said if "ZeroDivisionError: of a test" in text] == said and len(said) == 1
     failed = of(process, "command-failed", clock.now)
     assert failed is not None and (failed.times, failed.active, failed.about) == (3, True, "/master")
 
@@ -172,7 +172,7 @@ def test_panic_waits_for_a_few_figures_of_a_stream_and_not_for_all(
     settings = Settings(str(folder), open_port(HOST, 0).detach())
     with (
         closing(FrameWriter(folder, SHOW)),
-        closing(ControlProcess(settings, lambda words: None, clock)) as process,
+        closing(ControlProcess(settings, lambda message: None, clock)) as process,
         closing(Asker(process.port.number)) as program,
     ):
         process.turn()

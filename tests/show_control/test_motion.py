@@ -36,8 +36,8 @@ def declared(address: str, *arguments: Any, **more: Any) -> tuple[ShowState, str
 def test_each_parameter_is_declared_within_its_bounds(source: str) -> None:
     for name, about in PARAMETERS[source].items():
         address = f"/motion/{source}/{name}"
-        state, words = declared(address, about.most, 3.0)
-        assert state[MADE_NUMBERS[source][name]].value == about.most and name in words
+        state, message = declared(address, about.most, 3.0)
+        assert state[MADE_NUMBERS[source][name]].value == about.most and name in message
         for wrong in ((about.most + 1,), (about.least - 1,), (), (about.least, 100.0), ("far",)):
             with pytest.raises(ValueError, match=address):
                 declared(address, *wrong)
@@ -45,8 +45,8 @@ def test_each_parameter_is_declared_within_its_bounds(source: str) -> None:
 
 def test_points_of_the_map_come_in_pairs_between_0_and_1() -> None:
     for count in (0, 1, MOST_POINTS):
-        state, words = declared("/motion/path", *[0.25, 0.75] * count)
-        assert state[PATH_POINTS].value == (0.25, 0.75) * count and words
+        state, message = declared("/motion/path", *[0.25, 0.75] * count)
+        assert state[PATH_POINTS].value == (0.25, 0.75) * count and message
     with pytest.raises(ValueError, match="has no y"):
         declared("/motion/path", 0.5, 0.5, 0.5)
     for wrong in ((0.5, 1.5), [0.5] * (2 * MOST_POINTS + 1)):

@@ -28,8 +28,8 @@ class Heard:
     def __init__(self) -> None:
         self.all: list[tuple[bool, str]] = []
 
-    def __call__(self, done: bool, words: str) -> None:
-        self.all.append((done, words))
+    def __call__(self, done: bool, message: str) -> None:
+        self.all.append((done, message))
 
 
 def test_a_flood_reaches_the_stage_at_four_a_tick_and_the_oldest_gives_way(
@@ -49,7 +49,7 @@ def test_a_flood_reaches_the_stage_at_four_a_tick_and_the_oldest_gives_way(
     assert taken[:AT_ONCE] == [0.0, 1.0, 2.0, 3.0]
     assert taken[AT_ONCE:] == [float(number) for number in range(500 - WAITING, 500)]
     assert len(heard.all) == 500 - WAITING - AT_ONCE
-    assert all(not done and "Too many commands" in words for done, words in heard.all)
+    assert all(not done and "Too many commands" in message for done, message in heard.all)
 
 
 def test_a_stage_that_does_not_answer_is_told_after_half_a_second_and_once(
@@ -61,9 +61,9 @@ def test_a_stage_that_does_not_answer_is_told_after_half_a_second_and_once(
     assert heard.all == []
     assert dispatch.due(NOW) == pytest.approx(NOW + PATIENCE_S + ANSWER_S)
     dispatch.exchange(NOW + PATIENCE_S + ANSWER_S + 0.01)
-    [(done, words)] = heard.all
+    [(done, message)] = heard.all
     assert not done
-    assert "The stage does not answer, and nothing is changed" in words
+    assert "The stage does not answer, and nothing is changed" in message
     assert dispatch.due(NOW) == math.inf
     clock.now += PATIENCE_S + 0.02
     assert inbox.take() is None  # as it was told
@@ -110,8 +110,8 @@ def test_what_was_told_as_not_done_is_corrected_when_it_was_done_after_all(
     assert order is not None
     for now in (order.until + ANSWER_S + 0.01, order.until + late_s - 0.01):
         dispatch.exchange(now)
-    [(told, words)] = heard.all
-    assert not told and "does not answer" in words
+    [(told, message)] = heard.all
+    assert not told and "does not answer" in message
     for _ in range(2):
         inbox.answer(order, done, "Cue storm.")
         dispatch.exchange(order.until + late_s)
@@ -173,7 +173,7 @@ def test_without_anybody_there_it_is_told_at_once(sender: OrderSender) -> None:
     for place in ("stage", "projector", "lights"):
         dispatch.dispatch_order(place, Order("x"), NOW, heard)
     assert [done for done, _ in heard.all] == [False] * 3
-    for (_, words), cure in zip(
+    for (_, message), cure in zip(
         heard.all, ("bunraku play", "bunraku project", "bunraku lights"), strict=True
     ):
-        assert cure in words
+        assert cure in message

@@ -14,9 +14,9 @@ def test_panic_is_in_force_when_the_reply_comes_and_go_lifts_it(
     folder: Path, stage: StageDouble, asker: Asker
 ) -> None:
     for command, lifting in ((["/panic"], ["/go"]), (["/panic", 1.0], ["/go", 1.0])):
-        address, about, done, words = asker.ask(*command)
+        address, about, done, message = asker.ask(*command)
         assert (address, about, done) == ("/reply", "/panic", 1)
-        assert "/go lifts it" in words
+        assert "/go lifts it" in message
         assert show_state(folder).panic
         assert show_state(folder).level(time.monotonic()) == 0.0
         assert asker.ask(*lifting)[2] == 1
@@ -32,9 +32,9 @@ def test_a_button_let_go_changes_nothing_and_is_not_refused(
     assert "runs on" in asker.ask("/stop", 0.0)[3]
     assert show_state(folder)[GOING] == fade and fade.seconds == 60.0
     asker.ask("/panic", 1.0)
-    address, about, done, words = asker.ask("/panic", 0.0)
+    address, about, done, message = asker.ask("/panic", 0.0)
     assert (address, about, done) == ("/reply", "/panic", 0)
-    assert "let go" in words and "/go lifts a panic" in words
+    assert "let go" in message and "/go lifts a panic" in message
     assert "let go" in asker.ask("/go", 0.0)[3]
     assert show_state(folder).panic and not show_state(folder).going
     assert control.process.handler.refused == 0

@@ -107,7 +107,7 @@ def test_bones_that_a_layout_lacks_stay_with_the_phrase_and_are_named(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         ([0.0] * 99, "not seen: left shoulder, right shoulder"),
         ([float("nan")] * 99, "not seen: left shoulder, right shoulder"),
@@ -121,11 +121,11 @@ def test_bones_that_a_layout_lacks_stay_with_the_phrase_and_are_named(
     ],
 )
 def test_points_that_are_no_figure_are_refused_in_words(
-    reader: LivePoseReader, control: ControlInThread, asker: Asker, arguments: list[object], words: str
+    reader: LivePoseReader, control: ControlInThread, asker: Asker, arguments: list[object], message: str
 ) -> None:
     asker.ask("/ping")
     reply = asker.ask(POSITIONS, *arguments)
-    assert reply[2] == 0 and words in reply[3]
+    assert reply[2] == 0 and message in reply[3]
     told = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
     assert told and told[0][4] == 1
     assert reader.read() is None

@@ -70,9 +70,9 @@ def test_strangers_are_said_at_most_once_a_minute_with_their_address() -> None:
     assert port.news(NOW) == ""
     for _ in range(3):
         port.take()
-    words = port.news(NOW)
-    assert "10.0.0.3 sends commands and is not listed (3 dropped so far)" in words
-    assert "`senders` under control" in words
+    message = port.news(NOW)
+    assert "10.0.0.3 sends commands and is not listed (3 dropped so far)" in message
+    assert "`senders` under control" in message
     port.take()
     assert port.news(NOW + 59.0) == ""
     assert "10.0.0.4" in port.news(NOW + 60.0)
@@ -128,7 +128,7 @@ def test_over_a_network_the_listed_are_heard_and_strangers_change_nothing(
             "10.77.0.2",
             True,
         )
-        strangers = ["10.77.0.2" in words for words in control.said if "Panic" not in words]
+        strangers = ["10.77.0.2" in message for message in control.said if "Panic" not in message]
         assert strangers == ([] if may else [True])
         if not may:
             assert asker.hear(0.1) is None  # not even told

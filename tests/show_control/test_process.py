@@ -55,6 +55,6 @@ def test_a_second_one_in_the_same_folder_says_whose_place_it_is(folder: Path, tm
 def test_without_its_folder_it_says_what_is_missing(tmp_path: Path) -> None:
     with control_process(tmp_path / "nowhere", tmp_path / "words.txt") as (process, _):
         assert process.wait(PATIENCE_S) == 1
-    words = (tmp_path / "words.txt").read_text()
-    assert "show control has no place there (No such file or directory)" in words
-    assert "Traceback" not in words
+    output = (tmp_path / "words.txt").read_text()
+    assert "show control has no place there (No such file or directory)" in output
+    assert "Traceback" not in output

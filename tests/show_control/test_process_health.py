@@ -80,7 +80,7 @@ def test_a_second_projector_says_nothing(folder: Path) -> None:
 
 
 def mirror(mirrored: Mirrored) -> Mirror:
-    return Mirror(mirrored, lambda words: None)
+    return Mirror(mirrored, lambda message: None)
 
 
 def test_the_keeper_tells_that_the_journal_has_stopped(folder: Path) -> None:
@@ -118,7 +118,10 @@ def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
         "show-refused": ("preflight", 2, True),
         "show-put-aside": ("preflight", 1, True),
     }
-    assert [one.words for _, one in processes.fallbacks(1.0)] == ["Broken one. Broken two.", "Did not dance."]
+    assert [one.message for _, one in processes.fallbacks(1.0)] == [
+        "Broken one. Broken two.",
+        "Did not dance.",
+    ]
     Choice(refused=("/media/a stick/show.yaml:3: no such key.", "It is not danced.")).write(folder / CHOSEN)
     assert [one.about for _, one in processes.fallbacks(1.0)] == ["show.yaml:3"]
     (folder / CHOSEN).write_bytes(b"{")
@@ -155,10 +158,10 @@ def test_a_stage_is_not_absent_for_who_was_held_up_between_its_clock_and_its_loo
 
 
 def test_the_desk_answers_and_the_status_counts(folder: Path) -> None:
-    words = "A tick was late."
+    message = "A tick was late."
     control = ControlInThread(folder)
     with StageDouble(folder) as stage:
-        stage.tell(fallbacks=[["tick-late", 3, True, words], ["receiver-gone", 1, False, "Gone."]])
+        stage.tell(fallbacks=[["tick-late", 3, True, message], ["receiver-gone", 1, False, "Gone."]])
         asker = Asker(control.port)
 
         def told() -> list[list[object]]:
@@ -167,7 +170,7 @@ def test_the_desk_answers_and_the_status_counts(folder: Path) -> None:
             return [answer for answer in answers if answer[2] == "stage"]  # a busy machine has others, too
 
         until(lambda: len(told()) == 2)
-        assert told()[0] == ["/fallbacks/fallback", "tick-late", "stage", 3, 1, words, ""]
+        assert told()[0] == ["/fallbacks/fallback", "tick-late", "stage", 3, 1, message, ""]
         until(lambda: asker.status().fallbacks == 1)
         asker.close()
     control.close()

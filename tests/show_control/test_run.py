@@ -29,7 +29,7 @@ def stage(folder: Path) -> Iterator[FrameWriter]:
 @pytest.fixture
 def process(folder: Path, clock: Clock, stage: FrameWriter) -> Iterator[ControlProcess]:
     settings = Settings(str(folder), open_port(HOST, 0).detach())
-    with closing(ControlProcess(settings, lambda words: None, clock)) as process:
+    with closing(ControlProcess(settings, lambda message: None, clock)) as process:
         yield process
 
 
@@ -57,9 +57,9 @@ def called(inbox: OrderInbox) -> Order:
     return order
 
 
-def report(stage: FrameWriter, generation: int, words: str = "") -> None:
+def report(stage: FrameWriter, generation: int, message: str = "") -> None:
     """The stage says which show state its dance follows."""
-    stage.write_health({"state": "dancing", "applied": [generation, words]})
+    stage.write_health({"state": "dancing", "applied": [generation, message]})
 
 
 def test_a_command_is_carried_out_however_long_it_was_held_up_before(

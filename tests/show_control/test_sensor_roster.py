@@ -66,10 +66,10 @@ def test_a_reload_of_a_bad_file_changes_nothing_and_is_told(
     stage: StageDouble, asker: Asker, key_file: Path, text: str | None, complaint: str
 ) -> None:
     key_file.write_text(text) if text is not None else key_file.unlink()
-    _, about, done, words = asker.ask("/sensors/reload")
+    _, about, done, message = asker.ask("/sensors/reload")
     assert (about, done) == ("/sensors/reload", 0)
-    assert complaint in words
-    assert "goes on with the keys that it has" in words
+    assert complaint in message
+    assert "goes on with the keys that it has" in message
     assert stage.orders == []
 
 

@@ -69,9 +69,9 @@ def test_what_is_declared_while_the_stage_is_away_is_in_force_and_the_reply_says
     if not lives:
         stage.__exit__(None, None, None)
         until(lambda: asker.ask_all("/status")[0][1] == "absent")
-    words = "does not answer. The dance follows" if lives else "The dance begins with this"
+    message = "does not answer. The dance follows" if lives else "The dance begins with this"
     reply = asker.ask("/cue", "storm")
-    assert reply[:3] == ["/reply", "/cue", 0] and words in reply[3]
+    assert reply[:3] == ["/reply", "/cue", 0] and message in reply[3]
     assert show_state(folder).cue == "storm" and declared(folder, PHRASE) == ("quiet", 4.0)
 
 

@@ -60,7 +60,7 @@ def test_the_real_library_asks_for_block_after_block(null_card: None, channels: 
     assert card.trouble == ""
     assert enough.wait(PATIENCE_S)
     card.close()
-    assert set(asked) == {256}
+    assert set(asked) == {128}
 
 
 def test_a_card_that_is_away_and_back(

@@ -61,6 +61,7 @@ def test_without_a_stage_the_strings_rest(tmp_path: Path) -> None:
     sound = Sound(SoundConfig(), stage, state, said.append, fallbacks)  # type: ignore[arg-type]
     for tick in range(20):
         sound.look(10.0 + 0.02 * tick)
+        sound.dance(stage, 10.0 + 0.02 * tick)  # type: ignore[arg-type]
     assert sound.instrument is not None and sound.instrument.level == 1.0
     assert np.abs(sound.instrument.render(4096)).max() > 0.0
     stage.lives = False
@@ -84,6 +85,7 @@ def test_the_cards_thread_sees_to_panic_by_itself(tmp_path: Path, urgent: dict[s
     sound = Sound(SoundConfig(), stage, state, print, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
     for tick in range(20):
         sound.look(10.0 + 0.02 * tick)
+        sound.dance(stage, 10.0 + 0.02 * tick)  # type: ignore[arg-type]
         assert sound.render(960, ShowState()).shape == (960, 2)
     assert sound.render(256, ShowState()).any()
     fading, silent = (sound.render(256, ShowState(**urgent)) for _ in range(2))  # type: ignore[arg-type]
@@ -135,3 +137,15 @@ def test_a_block_is_whole_strokes_of_the_bow(tmp_path: Path) -> None:
     assert (
         render_file(swaying_phrase(0.2), StringsConfig(), SoundConfig(block=100), tmp_path / "out.wav") > 1.0
     )
+
+
+def test_frames_of_another_skeleton_are_not_played(tmp_path: Path) -> None:
+    """The card's own reader may see a new stage before `look` has built its strings."""
+    stage = StageDouble(write_show(tmp_path / "show", strings={}))
+    state = SimpleNamespace(read=ShowState)
+    sound = Sound(SoundConfig(), stage, state, print, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
+    sound.dance(stage, 10.0)  # type: ignore[arg-type]  # no strings yet
+    sound.look(10.0)
+    other = SimpleNamespace(tick=1, frame_time=0.0, positions=np.zeros((3, 3), np.float32))
+    sound.dance(SimpleNamespace(newest=lambda now: other, facts=stage.facts), 10.0)  # type: ignore[arg-type]
+    assert sound.instrument is not None and not sound.render(256, ShowState()).any()

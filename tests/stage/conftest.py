@@ -67,9 +67,9 @@ def command(show: Show, iterations: Iterations, declared: Declared, reconciler: 
 
     def command(address: str, *values: float, text: str = "") -> str:
         declared.now, _ = declare(declared.now, Command(address, values, text), facts, NOW)
-        words = follow(reconciler)
+        message = follow(reconciler)
         assert not reconciler.pending(NOW)
-        return words
+        return message
 
     return command
 

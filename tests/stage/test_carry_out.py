@@ -35,8 +35,8 @@ def test_playback_jumps_and_plays_excerpts(parts: StageParts) -> None:
     assert obey(Order("jump", (1.5,)), parts) == (True, "")
     parts.led.motion.advance()
     assert parts.led.motion.jumped
-    done, words = obey(Order("excerpt", (2.0, 2.04)), parts)
-    assert not done and "from 2 s to 2.04 s" in words
+    done, message = obey(Order("excerpt", (2.0, 2.04)), parts)
+    assert not done and "from 2 s to 2.04 s" in message
 
 
 def test_a_joint_is_held_and_released_by_osc(parts: StageParts) -> None:
@@ -54,14 +54,14 @@ def test_a_joint_is_held_and_released_by_osc(parts: StageParts) -> None:
 
 
 def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(parts: StageParts) -> None:
-    for order, words in [
+    for order, message in [
         (Order("hold", (1.0, 0.0, 0.0, 1.0), "Chest"), "No hand of this show holds 'Chest'"),
         (Order("release", (), "99"), "No hand of this show holds '99'"),
         (Order("hold", (0.0, 0.0, 0.0, 1.0), "lShldr"), "no rotation"),
         (Order("dance"), "knows no order 'dance'"),
     ]:
         done, said = obey(order, parts)
-        assert not done and words in said
+        assert not done and message in said
 
 
 class HeardLink(SensorLink):
@@ -102,7 +102,7 @@ def worn(tmp_path: Path) -> Iterator[StageParts]:
 
 
 @pytest.mark.parametrize(
-    ("order", "done", "words"),
+    ("order", "done", "message"),
     [
         (Order("strobe", text="left-wrist"), True, "left-wrist flashes for 10 s"),
         (Order("strobe", text="spare-1"), True, "spare-1 flashes"),
@@ -122,14 +122,14 @@ def worn(tmp_path: Path) -> Iterator[StageParts]:
     ],
 )
 def test_commands_about_sensors_are_done_or_refused_in_words(
-    worn: StageParts, order: Order, done: bool, words: str
+    worn: StageParts, order: Order, done: bool, message: str
 ) -> None:
     assert isinstance(worn.link, HeardLink)
     wearing = SensorFit(worn, SensorMemory(None, print), print)
     wearing.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, 99.6, 99.6, 90, 255))
     outcome = obey_for_sensors(order, worn, wearing, 100.0)
     assert outcome[0] == done
-    assert words in outcome[1]
+    assert message in outcome[1]
     assert worn.link.strobed == ([order.text] if order.name == "strobe" and done else [])
     assert {name: (one.device_id, one.key) for name, one in worn.link.admitted.items()} == order.keys
 
@@ -141,9 +141,9 @@ def test_whoever_asks_a_sensor_that_is_linked_and_not_heard_now_is_told_that_not
 ) -> None:
     wearing = SensorFit(worn, SensorMemory(None, print), print)
     wearing.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, 99.4, 99.4, 90, 255))
-    done, words = obey_for_sensors(Order(name, text=sensor), worn, wearing, 100.0)
+    done, message = obey_for_sensors(Order(name, text=sensor), worn, wearing, 100.0)
     assert not done
-    assert words.startswith("Not heard at this moment: left-wrist") and "Nothing is changed." in words
+    assert message.startswith("Not heard at this moment: left-wrist") and "Nothing is changed." in message
 
 
 def test_a_show_without_sensors_has_no_neutral_pose(parts: StageParts) -> None:

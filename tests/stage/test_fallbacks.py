@@ -56,7 +56,7 @@ def stage(danced: StageParts) -> Watch:
 
 def of(stage: Watch, row: Fallback, now: float) -> Fallen:
     found = [one for one in stage.fallbacks.happened(now) if one.name == row.name]
-    return found[0] if found else Fallen(row.name, 0, False, row.words)
+    return found[0] if found else Fallen(row.name, 0, False, row.message)
 
 
 def hear(danced: StageParts, at: float) -> None:
@@ -97,7 +97,7 @@ def test_cable_away(stage: Watch, danced: StageParts) -> None:
     stage.check(1.0, Health())
     told = of(stage, rows.CABLE_AWAY, 1.0)
     assert told[1:3] == (1, True)
-    assert "ttyACM0" in told.words
+    assert "ttyACM0" in told.message
     danced.link.intakes[0].trouble = None  # type: ignore[attr-defined]
     stage.check(2.0, Health())
     assert of(stage, rows.CABLE_AWAY, 2.0)[1:3] == (1, False)
@@ -114,7 +114,7 @@ def test_address_absent(stage: Watch, danced: StageParts) -> None:
 def test_sensor_not_let_in(stage: Watch) -> None:
     told = of(stage, rows.NOT_LET_IN, 1.0)
     assert told[1:3] == (1, True)
-    assert "key file" in told.words
+    assert "key file" in told.message
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_iterations_lowered(danced: StageParts, stage: Watch) -> None:
     assert of(stage, rows.ITERATIONS_LOWERED, 0.0).times == 0
     told = of(Watch(danced, DOES_NOT_FIT), rows.ITERATIONS_LOWERED, 0.0)
     assert told[1:3] == (1, True)
-    assert "30 coding iterations do not fit" in told.words
+    assert "30 coding iterations do not fit" in told.message
 
 
 def test_receiver_gone(stage: Watch, danced: StageParts) -> None:
@@ -168,7 +168,7 @@ def test_what_a_fallback_is_about_is_told_by_name(stage: Watch, danced: StagePar
         (rows.CABLE_AWAY, danced.link.intakes[0].name),
     ):
         told = of(stage, row, 3.0)
-        assert told.active and told.about == name and name in told.words, row.name
+        assert told.active and told.about == name and name in told.message, row.name
     hear(danced, 3.1)  # it is back, and the name of what was silent stays
     stage.count_silences(3.12)
     stage.check(4.0, Health())
@@ -177,10 +177,10 @@ def test_what_a_fallback_is_about_is_told_by_name(stage: Watch, danced: StagePar
 
 
 def test_a_system_that_stamps_no_datagrams_is_told_once(stage: Watch, danced: StageParts) -> None:
-    assert not any("stamp" in words for words in stage.check(1.0, Health()))
+    assert not any("stamp" in message for message in stage.check(1.0, Health()))
     danced.link.intakes[0].has_stamps = False  # type: ignore[attr-defined]
-    assert [words for words in stage.check(2.0, Health()) if "does not stamp" in words]
-    assert not any("stamp" in words for words in stage.check(3.0, Health()))
+    assert [message for message in stage.check(2.0, Health()) if "does not stamp" in message]
+    assert not any("stamp" in message for message in stage.check(3.0, Health()))
 
 
 def test_a_sensor_that_has_a_key_by_now_is_let_in(stage: Watch, danced: StageParts) -> None:
@@ -305,4 +305,4 @@ def test_the_table_for_desks_has_each_fallback() -> None:
 def test_names_are_for_scripts_and_words_are_sentences(name: str) -> None:
     row = EVERY[name]
     assert re.fullmatch(r"[a-z]+(-[a-z]+)+", row.name)
-    assert row.words[0].isupper() and row.words.endswith(".")
+    assert row.message[0].isupper() and row.message.endswith(".")

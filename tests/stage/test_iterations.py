@@ -29,10 +29,10 @@ def test_without_a_fade_they_change_at_once_within_what_fits(
     asked: tuple[int, int], danced: tuple[int, int]
 ) -> None:
     iterations = Iterations(3, 2, most=8)
-    words = iterations.ask(*asked)
+    message = iterations.ask(*asked)
     assert (iterations.coding, iterations.interaction) == danced
-    assert (f"with {danced[0]} and {danced[1]}: " in words) == (asked != danced)
-    assert ("at most 8 fit" in words) == (asked[0] > 8)
+    assert (f"with {danced[0]} and {danced[1]}: " in message) == (asked != danced)
+    assert ("at most 8 fit" in message) == (asked[0] > 8)
 
 
 def test_a_fade_goes_in_steps_and_takes_its_time() -> None:

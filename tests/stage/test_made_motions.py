@@ -55,8 +55,8 @@ class Dance:
         seen = set()
         for _ in range(round(seconds / TICK_S)):
             for order in self.reconciler.pending(self.now):
-                done, words = obey(order, self.parts)
-                assert done, words
+                done, message = obey(order, self.parts)
+                assert done, message
             self.watch.count_silences(self.now)
             for puppet in self.parts.puppets:
                 puppet.motion.advance()

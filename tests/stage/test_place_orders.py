@@ -54,7 +54,7 @@ def test_a_hand_that_is_let_hold_by_place_holds_its_joint_where_it_is(parts: Sta
 
 
 def test_what_a_hand_does_not_give_is_refused_in_words(parts: StageParts) -> None:
-    for order, words in [
+    for order, message in [
         (Order("hold", (1.0, 0.0, 0.0, 1.0), "lShldr"), "takes a position: send /mocap/setjointpos."),
         (
             Order("place", (0.0, 1.0, 0.0), "Chest"),
@@ -64,7 +64,7 @@ def test_what_a_hand_does_not_give_is_refused_in_words(parts: StageParts) -> Non
         (Order("place", (0.0, 1e4, 0.0), "lShldr"), "no place"),
     ]:
         done, said = obey(order, parts)
-        assert not done and words in said
+        assert not done and message in said
     assert hand_of(parts).told is None
 
 

@@ -182,7 +182,7 @@ def test_the_shared_frame_has_room_for_them(night: Night, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("puppets", "words"),
+    ("puppets", "message"),
     [
         ([{"name": "a", "phrase": "slow"}], "it dances what the show says"),
         ([{"name": "a"}, {"name": "b", "phrase": "solw"}], "'b' starts from 'solw', which the show"),
@@ -193,8 +193,10 @@ def test_the_shared_frame_has_room_for_them(night: Night, tmp_path: Path) -> Non
         ([{"name": "a"}, {"name": "b", "hands": [SENSOR, SENSOR]}], "Two hands hold the joint 'lShldr'"),
     ],
 )
-def test_what_no_show_can_put_on_the_stage(tmp_path: Path, puppets: list[dict[str, Any]], words: str) -> None:
-    with pytest.raises(ConfigError, match=words):
+def test_what_no_show_can_put_on_the_stage(
+    tmp_path: Path, puppets: list[dict[str, Any]], message: str
+) -> None:
+    with pytest.raises(ConfigError, match=message):
         load_show(write_puppets(tmp_path / "show", puppets))
 
 

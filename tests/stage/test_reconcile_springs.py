@@ -82,5 +82,5 @@ def test_strings_drive_no_joint_in_panic_blackout_and_after_a_stop(
 def test_springs_of_which_there_are_none_are_refused(command: Commanded, parts: StageParts) -> None:
     with pytest.raises(ValueError, match="No hand of this show is springs"):
         command("/springs/wind", 1.0, 0.0, 0.0)
-    done, words = obey(Order("kick", (1.0, 0.0, 0.0)), parts)
-    assert not done and "No hand of this show is springs" in words
+    done, message = obey(Order("kick", (1.0, 0.0, 0.0)), parts)
+    assert not done and "No hand of this show is springs" in message

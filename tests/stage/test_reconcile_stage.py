@@ -27,7 +27,7 @@ def test_the_stage_begins_with_the_show_state_of_its_folder(show: Show, box: Box
         with closing(stage):
             stage.dance(0.1, lambda: False)
             assert (stage.reconciler.cue, stage.parts.led.motion.phrase) == (cue, phrase)
-        assert any("goes on in the cue 'storm'" in words for words in said) == (cue == "storm")
+        assert any("goes on in the cue 'storm'" in message for message in said) == (cue == "storm")
 
 
 def test_the_dance_follows_within_a_tick_reports_it_and_notes_it_before(show: Show, box: BoxConfig) -> None:

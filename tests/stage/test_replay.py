@@ -143,12 +143,14 @@ def test_the_whole_state_is_as_it_was_at_every_keyframe(run: Run, show: Path) ->
 def same(one: object, other: object, path: str = "") -> list[str]:
     """Where two states differ."""
     if isinstance(one, dict) and isinstance(other, dict):
-        return [words for key in one | other for words in same(one.get(key), other.get(key), f"{path}.{key}")]
+        return [
+            message for key in one | other for message in same(one.get(key), other.get(key), f"{path}.{key}")
+        ]
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         return [] if one.tobytes() == other.tobytes() else [path]
     if isinstance(one, list | tuple) and isinstance(other, list | tuple) and len(one) == len(other):
         pairs = enumerate(zip(one, other, strict=True))
-        return [words for place, (a, b) in pairs for words in same(a, b, f"{path}[{place}]")]
+        return [message for place, (a, b) in pairs for message in same(a, b, f"{path}[{place}]")]
     return [] if one == other else [f"{path}: {one} and {other}"]
 
 
@@ -236,8 +238,8 @@ def test_an_order_that_nobody_heard_and_a_stop_dance_again_as_they_did(show: Pat
     night = Night(show, tmp_path / "runtime")
     night.dance(130, reading(STILL))
     night.dance(40)
-    done, words = night.order("heading")
-    assert not done and "at this moment" in words
+    done, message = night.order("heading")
+    assert not done and "at this moment" in message
     night.slot.tick += 60  # the machine was held up
     night.slot.deadline += 60 * TICK_S
     night.dance(400, reading(TURNED))

@@ -49,8 +49,8 @@ def test_the_very_next_pose_comes_next_at_its_place_on_the_stage(
     before.rate = before.parts.led.motion.rate = rate
     for _ in range(200 + ticks):
         before.parts.led.motion.advance()
-    words = goes_on(before, runtime, after)
-    assert "After a restart of the stage" in words and "the phrase 'walk'" in words
+    message = goes_on(before, runtime, after)
+    assert "After a restart of the stage" in message and "the phrase 'walk'" in message
     for _ in range(60):
         poses, roots = window_of(before.parts.led.motion)
         poses_after, roots_after = window_of(after.parts.led.motion)

@@ -66,9 +66,9 @@ def test_a_place_that_this_show_does_not_have_is_no_place(
     dance = dance_of()
     put(runtime, place)
     resuming = Resumption("A test", runtime, None, "always")
-    words = resuming.go_on(dance, NOW)
+    message = resuming.go_on(dance, NOW)
     resuming.close()
-    assert "begins at the beginning" in words and reason in words
+    assert "begins at the beginning" in message and reason in message
     assert not resuming.went_on
     assert (dance.parts.led.motion.phrase, dance.parts.led.motion.position_s) == ("main", 0.0)
     for _ in range(20):
@@ -125,12 +125,12 @@ def test_memory_is_asked_first_then_the_disk(
         file.close()
     dance = dance_of()
     resuming = Resumption("A test", runtime, tmp_path / "state", wanted)  # type: ignore[arg-type]
-    words = resuming.go_on(dance, NOW)
+    message = resuming.go_on(dance, NOW)
     resuming.close()
     assert (resuming.power_cuts, resuming.restarts) == (power_cuts, restarts)
     assert resuming.went_on == (at_s is not None)
     assert dance.parts.led.motion.position_s == pytest.approx(at_s or 0.0, abs=1e-3)
-    assert ("After a power cut" in words) == bool(power_cuts)
+    assert ("After a power cut" in message) == bool(power_cuts)
 
 
 def test_counts_go_on_until_the_show_is_ended(dance_of: Callable[[], Reconciler], runtime: Path) -> None:
@@ -158,12 +158,12 @@ def test_a_place_from_which_no_frame_ever_leaves_is_given_up(
     for _ in range(TRIES + 1):
         dance = dance_of()
         resuming = Resumption("A test", runtime, None, "always")
-        words = resuming.go_on(dance, NOW)
+        message = resuming.go_on(dance, NOW)
         resuming.write_start(dance)  # and no note: it died in its first tick
         resuming.close()
         begun.append(dance.parts.led.motion.position_s)
     assert begun == pytest.approx([2.0] * TRIES + [0.0], abs=1e-3)
-    assert f"{TRIES} starts" in words and "begins at the beginning" in words
+    assert f"{TRIES} starts" in message and "begins at the beginning" in message
     with closing(CheckpointReader(runtime)) as reader:
         place = reader.read()
     assert place is not None and place.tries == 1

@@ -64,8 +64,8 @@ class Inbox:
         self._time.work(self.held_up_s)
         return self.waiting.pop(0)
 
-    def answer(self, order: Order, done: bool, words: str) -> None:
-        self.answers.append((order.name, done, words))
+    def answer(self, order: Order, done: bool, message: str) -> None:
+        self.answers.append((order.name, done, message))
 
 
 class Evening:
@@ -138,7 +138,7 @@ def test_after_a_stop_no_sensor_is_said_to_be_silent_and_no_hand_lets_go(
     evening.stops = {100: stop_s, 160: stop_s}
     evening.dance(5.0 + 2 * stop_s)
     assert evening.silences == 0
-    assert not [words for words in evening.said if "silent" in words]
+    assert not [message for message in evening.said if "silent" in message]
     assert min(evening.weights[50:]) > 0.9
     assert evening.stage.health.skipped >= 2 * int(stop_s / TICK_S) - 2
 
@@ -152,7 +152,7 @@ def test_a_sensor_that_falls_silent_is_told_of_on_a_slow_machine_too(evening: Ev
     evening.cable.talks = False
     evening.stage.dance(4.0, lambda: False)
     assert evening.silences >= 1
-    assert [words for words in evening.said if words.startswith("Sensor left-wrist silent for")]
+    assert [message for message in evening.said if message.startswith("Sensor left-wrist silent for")]
 
 
 def test_a_tick_that_was_held_up_leaves_orders_to_the_next_one(evening: Evening) -> None:
@@ -205,9 +205,9 @@ def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(
     began = evening.time.now
     evening.stage._take_orders(began, evening.time.monotonic)
     assert noted == pytest.approx([began + 0.3, began + 0.6])
-    (_, asked, _), (_, reset, words) = evening.inbox.answers
+    (_, asked, _), (_, reset, message) = evening.inbox.answers
     assert (asked, reset) == (True, False)  # the reading is of before both stops, and by now too old
-    assert "heard at this moment" in words
+    assert "heard at this moment" in message
     waits_until = evening.stage.wearing._wearers["left-wrist"].waits_until
     assert waits_until == pytest.approx(began + 0.3 + 3.0)
 
@@ -224,6 +224,6 @@ def test_a_show_that_one_busy_start_lowered_dances_its_own_iterations_ten_second
     assert stage.iterations.asked == (1, 1)
     evening.dance(3.0)
     assert stage.iterations.asked == asked
-    assert [words for words in evening.said if "coding iterations fit by now" in words]
+    assert [message for message in evening.said if "coding iterations fit by now" in message]
     now = evening.time.now
     assert not [one for one in stage.watch.fallbacks.happened(now) if one.active and "lowered" in one.name]

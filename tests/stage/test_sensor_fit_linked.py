@@ -127,7 +127,7 @@ def test_switched_on_stood_still_danced(begin: Begin, maker: str) -> None:
     evening = begin(maker)
     evening.run(DANCES_S)
     assert evening.lights[-2:] == ["slow", "on"] and evening.lights.count("slow") == 1
-    assert sum("neutral pose taken" in words for words in evening.said) == 1
+    assert sum("neutral pose taken" in message for message in evening.said) == 1
     evening.errors.clear()
     evening.run(10.0)
     assert max(evening.errors) < NEAR_DEGREES
@@ -139,7 +139,7 @@ def test_after_a_double_tap_half_a_second_of_stillness_is_enough(begin: Begin) -
     while not evening.show.sent:
         evening.run(TICK_S)
     evening.run(0.8)
-    assert sum("neutral pose taken" in words for words in evening.said) == 1
+    assert sum("neutral pose taken" in message for message in evening.said) == 1
     evening.run(3.0)
     assert max(evening.errors[-50:]) < NEAR_DEGREES
 
@@ -164,12 +164,12 @@ def test_an_imu_that_starts_anew_in_mid_dance_goes_on_where_it_was(begin: Begin)
     evening.run(DANCES_S + 1.6)
     evening.device.wearable.inject("brown-out")
     evening.run(3.0)
-    assert any("IMU restarted" in words for words in evening.said)
+    assert any("IMU restarted" in message for message in evening.said)
     evening.errors.clear()
     evening.run(5.0)
     # What the arm turned while the IMU was away cannot be known: less than a second of this dance.
     assert max(evening.errors) < 45.0
-    assert sum("neutral pose taken" in words for words in evening.said) == 1
+    assert sum("neutral pose taken" in message for message in evening.said) == 1
 
 
 def test_a_double_tap_takes_out_what_was_left_over(begin: Begin) -> None:
@@ -185,7 +185,7 @@ def test_a_double_tap_takes_out_what_was_left_over(begin: Begin) -> None:
     evening.device.wearable.double_tap()
     evening.run(6.0)  # until its lamp has flashed as all is well again
     assert "slow" in evening.lights[before:] and evening.device.light == "on"
-    assert sum("neutral pose taken" in words for words in evening.said) == 2
+    assert sum("neutral pose taken" in message for message in evening.said) == 2
     assert evening.errors[-1] < 1.0
 
 
@@ -194,5 +194,5 @@ def test_switched_off_and_on_within_a_minute_the_joint_goes_on(begin: Begin) -> 
     evening.run(12.5)
     evening.run(10.0)
     assert evening.device.reboots == 1
-    assert any("is on again" in words for words in evening.said)
-    assert sum("neutral pose taken" in words for words in evening.said) == 1
+    assert any("is on again" in message for message in evening.said)
+    assert sum("neutral pose taken" in message for message in evening.said) == 1

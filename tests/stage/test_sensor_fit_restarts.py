@@ -128,7 +128,7 @@ def test_without_a_pose_nothing_is_carried_over(evening: Evening) -> None:
     stage.dance(1.0)
     stage.silence(2.0)
     stage.dance(1.0, boot=NEXT_BOOT)
-    assert stage.wants and all("stands still for a breath now" in words for words in stage.said)
+    assert stage.wants and all("stands still for a breath now" in message for message in stage.said)
     stage.stand(1.6, about_up(5.0), boot=NEXT_BOOT)
     assert stage.taken() == 1
 

@@ -111,7 +111,7 @@ def test_a_sensor_that_moves_to_a_cable_and_back(cast: StageParts) -> None:
 def test_a_low_battery_is_told_of_once_until_it_was_charged(cast: StageParts) -> None:
     watch = Watch(cast, FITS)
     told = [watch.check(1.0, Health(), [sensor(battery=level)]) for level in (16, 14, 15, 13, 255, 12, 80, 9)]
-    assert [len(words) for words in told] == [1, 1, 0, 0, 0, 0, 0, 1]  # the first one: linked
+    assert [len(message) for message in told] == [1, 1, 0, 0, 0, 0, 0, 1]  # the first one: linked
     assert told[1] == ["Sensor left-wrist: 14 % of its battery left. The dance goes on. Charge it soon."]
 
 
@@ -128,21 +128,21 @@ def test_a_receiver_that_goes_and_comes_back(cast: StageParts, receiver: OscRece
     assert watch.check(1.0, Health()) == []
     counters.dropped += 3
     counters.last_error = "no program listens on that port"
-    [words] = watch.check(2.0, Health())
-    assert f"127.0.0.1:{receiver.port}" in words
-    assert "no program listens on that port" in words
+    [message] = watch.check(2.0, Health())
+    assert f"127.0.0.1:{receiver.port}" in message
+    assert "no program listens on that port" in message
     counters.dropped += 3
     assert watch.check(3.0, Health()) == []
-    [words] = watch.check(4.0, Health())
-    assert "gets the dance again" in words
+    [message] = watch.check(4.0, Health())
+    assert "gets the dance again" in message
 
 
 def test_a_network_that_fails_and_recovers(cast: StageParts) -> None:
     watch = Watch(cast, FITS)
     cast.led.puppet.is_broken = True
-    [words] = watch.check(1.0, Health())
-    assert "holds the last good pose" in words
+    [message] = watch.check(1.0, Health())
+    assert "holds the last good pose" in message
     assert watch.check(2.0, Health()) == []
     cast.led.puppet.is_broken = False
-    [words] = watch.check(3.0, Health())
-    assert "gives poses again" in words
+    [message] = watch.check(3.0, Health())
+    assert "gives poses again" in message

@@ -163,8 +163,8 @@ def trained(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> tuple
 
     def train(folder: Path) -> None:
         result = bunraku("train", "--recordings", recordings, "--out", folder / "evening", *options)
-        words = {"exit_code": result.exit_code, "output": result.output, "stderr": result.stderr}
-        (folder / "said.json").write_text(json.dumps(words))
+        printed = {"exit_code": result.exit_code, "output": result.output, "stderr": result.stderr}
+        (folder / "said.json").write_text(json.dumps(printed))
 
     folder = made_once(tmp_path_factory, "trained", train)
     return folder / "evening", Said(**json.loads((folder / "said.json").read_text()))

@@ -70,10 +70,10 @@ def test_other_files_are_refused(text: str, tmp_path: Path) -> None:
 def test_votes_of_two_pages_or_of_one_voter_twice_are_refused(tmp_path: Path) -> None:
     one = write_votes(tmp_path / "a.json", ["left"], [True])
     other = write_votes(tmp_path / "b.json", ["left"], [True], "ben", "another")
-    for files, words in (([one, other], "another page"), ([one, one], "counted already")):
+    for files, message in (([one, other], "another page"), ([one, one], "counted already")):
         asked = [each for file in files for each in ("--votes", file)]
         result = bunraku("compare-blind", *asked)
-        assert result.exit_code == 2 and words in " ".join(result.stderr.split())
+        assert result.exit_code == 2 and message in " ".join(result.stderr.split())
 
 
 def test_sides_are_by_chance_and_as_often_left_as_right(recordings: Path, tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def test_training_ends_with_a_show_that_the_box_accepts(trained: Trained) -> Non
 
 
 def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
-    words = said(trained[1])
+    output = said(trained[1])
     for expected in (
         "3 recordings of 3 takes",
         "17 of 20 joints move",
@@ -51,7 +51,7 @@ def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
         "computes what was trained",
         "The bundle contains a recording",
     ):
-        assert expected in words, expected
+        assert expected in output, expected
 
 
 def test_training_ends_with_whether_the_dancer_answers(trained: Trained) -> None:
@@ -59,9 +59,11 @@ def test_training_ends_with_whether_the_dancer_answers(trained: Trained) -> None
     answer = json.loads((show / "report.json").read_text())["puppetry"]
     assert answer["lShldr"]["10_9"]["answer"] >= 0 and answer["free"]["30"]["plausibility"] > 0
     assert "with hands of sway_0" in answer["measured_on"]
-    words = said(result)
-    assert "Does the hand move the body?" in words and "with a hand on lShldr at 10/9" in words
-    assert answer["verdict"] in words and words.index(answer["verdict"]) < words.index("is a show. Dance it")
+    output = said(result)
+    assert "Does the hand move the body?" in output and "with a hand on lShldr at 10/9" in output
+    assert answer["verdict"] in output and output.index(answer["verdict"]) < output.index(
+        "is a show. Dance it"
+    )
     assert "answer.png" in (show / "SHA256SUMS").read_text()
 
 
@@ -157,7 +159,7 @@ def test_where_the_gate_refuses_fp32_ships_and_the_report_says_so(
     assert "fp32 ships" in said(result)
     report = json.loads((tmp_path / "show" / "report.json").read_text())
     assert report["network"]["ships"] == "fp32" and report["quantization"]["passed"] is False
-    assert "fp32 ships" in report["quantization"]["words"]
+    assert "fp32 ships" in report["quantization"]["message"]
     figures = bunraku("evaluate", tmp_path / "show", tmp_path / "show" / "phrase.bvh", "--json")
     assert json.loads(figures.stdout)["network"]["precision"] == "fp32"
 
@@ -175,9 +177,9 @@ def test_a_stop_in_the_middle_says_how_to_go_on(tmp_path: Path, recordings: Path
         if "Ctrl-C stops" in line:
             process.send_signal(signal.SIGTERM)
             break
-    words = process.stderr.read()
+    output = process.stderr.read()
     assert process.wait() == 130
-    assert "nothing is lost" in words and f"bunraku train --resume --out {out}" in words
+    assert "nothing is lost" in output and f"bunraku train --resume --out {out}" in output
     assert (out / "checkpoint.pt").exists() and not (out / "puppet.onnx").exists()
 
     again = bunraku("train", "--recordings", recordings, "--out", out, "--steps", 20)

@@ -127,7 +127,7 @@ def played(folder: Path, show: Path, bunraku: Command) -> tuple[JournalRecording
         journal = ("--journal", folder / "journal")
         bunraku("play", "--alone", "--show", show, "--box", box, "--seconds", "1", *journal)
         messages = avatar.poll(1.0)
-    heard = {str(words[0]): words[1:] for _, address, words in messages if address.endswith("/Bone/Pos")}
+    heard = {str(text[0]): text[1:] for _, address, text in messages if address.endswith("/Bone/Pos")}
     return read_journal(folder / "journal"), heard
 
 

@@ -128,7 +128,7 @@ def claim(letter: str, holds: bool, rightly: tuple[str, ...] = ()) -> Claim:
 
 
 @pytest.mark.parametrize(
-    ("passes", "rightly", "words"),
+    ("passes", "rightly", "message"),
     [
         (("copy", "paste"), ("copy", "paste"), "copy and paste pass, rightly: nothing is to change"),
         (("copy", "mean"), ("copy",), "says nothing of what was learned: mean passes too"),
@@ -137,10 +137,10 @@ def claim(letter: str, holds: bool, rightly: tuple[str, ...] = ()) -> Claim:
     ],
 )
 def test_a_verdict_says_which_null_network_passes_too(
-    passes: tuple[str, ...], rightly: tuple[str, ...], words: str
+    passes: tuple[str, ...], rightly: tuple[str, ...], message: str
 ) -> None:
     nulls = {kind.name: [claim("x", False), claim("d", kind.name in passes)] for kind in KINDS}
-    assert worth(claim("d", True, rightly), nulls) == words
+    assert worth(claim("d", True, rightly), nulls) == message
 
 
 def test_a_dancer_that_pauses_on_poses_and_jumps_is_intermittent(takes: list[Take]) -> None:

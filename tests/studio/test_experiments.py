@@ -91,7 +91,7 @@ def test_a_skeleton_without_limbs_is_said(skeleton: Skeleton) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("a: {take: nothing}\n", "'a' does not say where it is"),
         ("a: {take: nothing, start: soon}\n", "'a' does not say where it is"),
@@ -102,13 +102,13 @@ def test_a_skeleton_without_limbs_is_said(skeleton: Skeleton) -> None:
     ],
 )
 def test_a_wrong_excerpts_file_is_told_with_its_line(
-    takes: list[Take], tmp_path: Path, text: str, words: str
+    takes: list[Take], tmp_path: Path, text: str, message: str
 ) -> None:
     file = tmp_path / "excerpts.yaml"
     file.write_text(text)
     with pytest.raises(ConfigError) as refused:
         named(file, takes, JOINTS)
-    assert words in str(refused.value)
+    assert message in str(refused.value)
 
 
 def test_named_excerpts_are_taken(takes: list[Take], tmp_path: Path) -> None:

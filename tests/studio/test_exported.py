@@ -93,10 +93,10 @@ def test_a_training_goes_on_from_a_show(
     assert after["settings"]["alive_from"] == 0 < before["settings"]["alive_from"]
     errors = [told["history"][-1]["held_out_degrees"] for told in (before, after)]
     assert errors[1] < 1.1 * errors[0], "it began anew"
-    for words, options in (
+    for message, options in (
         ("--width comes with", ("new", "--width", 16)),
         ("Omit one of them", ("new", "--model", "pose")),
         ("Give one", ("next", "--resume")),
     ):
         refused = bunraku(*train, "--out", tmp_path / options[0], *options[1:])
-        assert refused.exit_code == 2 and words in refused.stderr
+        assert refused.exit_code == 2 and message in refused.stderr

@@ -129,7 +129,7 @@ def test_the_command_makes_a_phrase_that_a_show_can_play(
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "message"),
     [
         (("--from", "nobody"), "There is no take 'nobody'. There are"),
         (("--from", "sway_1@soon"), "'soon' is no second of sway_1: write sway_1@12.5"),
@@ -138,11 +138,11 @@ def test_the_command_makes_a_phrase_that_a_show_can_play(
     ],
 )
 def test_what_cannot_be_is_said(
-    trained: tuple[Path, object], tmp_path: Path, options: tuple[str, ...], words: str
+    trained: tuple[Path, object], tmp_path: Path, options: tuple[str, ...], message: str
 ) -> None:
     done = bunraku("granular", trained[0] / "checkpoint.pt", "--out", tmp_path / "p.bvh", *options)
     assert done.exit_code == 2
-    assert words in done.output
+    assert message in done.output
     assert not (tmp_path / "p.bvh").exists()
 
 

@@ -34,8 +34,8 @@ def test_a_file_of_the_cmu_s_units_with_z_up_is_described(tmp_path: Path) -> Non
     (found,) = facts(file)
     assert 1.6 < found["height_m"] < 2.0 and found["zero_pose"] == "a T-pose"
     changed = " ".join(found["changed"])
-    for words in ("millimetres", "--metres-per-unit", "Z up to Y up", "--up y", "faces x", "--facing z"):
-        assert words in changed
+    for text in ("millimetres", "--metres-per-unit", "Z up to Y up", "--up y", "faces x", "--facing z"):
+        assert text in changed
     taken = {joint["name"]: joint["taken_for"] for joint in found["joints"]}
     assert taken["LHumerus"] == "left upper arm" and taken["Thorax"] == "chest"
     text = bunraku("inspect", file).stdout

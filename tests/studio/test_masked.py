@@ -30,9 +30,13 @@ def test_errors_that_touch_are_one_stretch_the_longest_first(tmp_path: Path) -> 
 
 
 def test_the_findings_say_how_much_is_masked_where_and_how_to_overrule_it(tmp_path: Path) -> None:
-    words = " ".join(findings(load_dataset(upside_down(tmp_path / "dancer"))))
-    assert "frames (8." in words and "in 2 recordings: sway_0 (10" in words and ": head), sway_1 (" in words
-    assert "pictures/masked.png" in words and "--keep 'sway_0'" in words
+    message = " ".join(findings(load_dataset(upside_down(tmp_path / "dancer"))))
+    assert (
+        "frames (8." in message
+        and "in 2 recordings: sway_0 (10" in message
+        and ": head), sway_1 (" in message
+    )
+    assert "pictures/masked.png" in message and "--keep 'sway_0'" in message
 
 
 def test_the_picture_marks_the_joint(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_a_variational_model_is_drawn_to_the_prior_by_the_weight_of_its_divergen
 
 
 @pytest.mark.parametrize(
-    ("model", "network", "window", "words"),
+    ("model", "network", "window", "message"),
     [
         ("pose", "lstm", 0, "has the networks mlp, dense64, not lstm"),
         ("pose", None, 8, "takes one pose"),
@@ -75,9 +75,9 @@ def test_a_variational_model_is_drawn_to_the_prior_by_the_weight_of_its_divergen
     ],
 )
 def test_what_does_not_fit_a_model_is_refused(
-    model: str, network: str | None, window: int, words: str
+    model: str, network: str | None, window: int, message: str
 ) -> None:
-    with pytest.raises(StudioError, match=words):
+    with pytest.raises(StudioError, match=message):
         settings_for(model, network, window=window)
 
 

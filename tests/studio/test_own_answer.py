@@ -31,7 +31,7 @@ def dataset(training: list[Take], held_out: list[Take]) -> Dataset:
 
 
 @pytest.mark.parametrize(
-    ("training", "held_out", "phrase", "hand", "reference", "words"),
+    ("training", "held_out", "phrase", "hand", "reference", "description"),
     [
         ((9.0, 9.0), (9.0, 9.0), "apart_0", "apart_1", ["take_0", "take_1"], "never saw"),
         ((9.0, 9.0), (20.0,), "apart_0, part 1 of 2", "apart_0, part 2 of 2", ["take_0", "take_1"], "halves"),
@@ -46,7 +46,7 @@ def test_phrase_hand_and_reference_never_overlap(
     phrase: str,
     hand: str,
     reference: list[str],
-    words: str,
+    description: str,
 ) -> None:
     takes = own_takes(
         dataset(
@@ -56,7 +56,7 @@ def test_phrase_hand_and_reference_never_overlap(
     )
     assert (takes.pairs[0].phrase_name, takes.pairs[0].hand_name) == (phrase, hand)
     assert [one.name for one in takes.reference] == reference
-    assert words in takes.words
+    assert description in takes.description
 
 
 def test_one_short_take_is_too_little() -> None:

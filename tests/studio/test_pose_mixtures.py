@@ -172,7 +172,7 @@ def test_without_a_prompt_it_goes_on_from_a_recorded_moment(improviser: Path, tm
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (["improvise", "--out", "{out}"], "Give the dancer's checkpoint.pt, or an improviser"),
         (["improvise", "--model", "{puppet}", "--out", "{out}"], "is no improviser. Train one with"),
@@ -193,7 +193,7 @@ def test_what_does_not_fit_is_refused_with_its_cure(
     recordings: Path,
     tmp_path: Path,
     arguments: list[str],
-    words: str,
+    message: str,
 ) -> None:
     places = {
         "mixtures": improviser / "checkpoint.pt",
@@ -202,4 +202,4 @@ def test_what_does_not_fit_is_refused_with_its_cure(
         "out": tmp_path / "out",
     }
     result = bunraku(*(one.format(**places) for one in arguments))
-    assert result.exit_code == 2 and words in " ".join(result.stderr.split()), result.output
+    assert result.exit_code == 2 and message in " ".join(result.stderr.split()), result.output

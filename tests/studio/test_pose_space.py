@@ -90,7 +90,7 @@ def test_lines_are_read_from_csv_and_svg(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "words"),
+    ("name", "text", "message"),
     [
         ("a.csv", "0,0\nhere,there\n", ":2: 'here,there' is no point"),
         ("a.csv", "1,1\n1,1\n", "no line with a length"),
@@ -99,9 +99,9 @@ def test_lines_are_read_from_csv_and_svg(tmp_path: Path) -> None:
         ("a.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>', "holds no line"),
     ],
 )
-def test_what_is_no_line_is_named(tmp_path: Path, name: str, text: str, words: str) -> None:
+def test_what_is_no_line_is_named(tmp_path: Path, name: str, text: str, message: str) -> None:
     (tmp_path / name).write_text(text)
-    with pytest.raises(StudioError, match=words):
+    with pytest.raises(StudioError, match=message):
         read_line(tmp_path / name)
 
 
@@ -229,7 +229,7 @@ def test_two_numbers_hold_a_body_of_58_joints_and_are_its_whole_map(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "words"),
+    ("arguments", "code", "message"),
     [
         (["{rec}/sway_0.bvh"], 2, "--wobble"),
         (["{rec}/sway_0.bvh", "--wobble", "0.5", "50"], 2, "10 Hz"),
@@ -237,11 +237,11 @@ def test_two_numbers_hold_a_body_of_58_joints_and_are_its_whole_map(tmp_path: Pa
     ],
 )
 def test_what_makes_no_path_is_named(
-    arguments: list[str], code: int, words: str, model: Path, recordings: Path, tmp_path: Path
+    arguments: list[str], code: int, message: str, model: Path, recordings: Path, tmp_path: Path
 ) -> None:
     given = [each.format(rec=recordings) for each in arguments]
     result = bunraku("path", *given, "--model", model, "--out", tmp_path / "x.bvh")
-    assert result.exit_code == code and words in " ".join(result.stderr.split()), result.output
+    assert result.exit_code == code and message in " ".join(result.stderr.split()), result.output
 
 
 def test_a_puppet_is_no_pose_model(puppet_checkpoint: Path, recordings: Path, tmp_path: Path) -> None:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import io
+import sys
+import time
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
+from appliance.studio import heartbeat
+from appliance.studio.clear_errors import clear_errors
 from appliance.studio.progress import EVERY_S, doing, shown, told
 from tests.studio.conftest import bunraku
 
@@ -53,6 +57,29 @@ def test_parts_with_words_of_their_own_say_them_now_and_then() -> None:
     assert said(into).splitlines()[3:] == ["of nobody knows how many"]
 
 
+def test_a_command_that_is_silent_for_long_says_what_it_is_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(heartbeat, "QUIET_S", 0.02)
+    with clear_errors("map"):
+        print("drawing the map ...", file=sys.stderr)
+        await_text(stream, "drawing the map ... 0 s", 2)
+        Console(stderr=True).print("planting the feet: 40 %", highlight=False)
+        await_text(stream, "planting the feet: 40 % ... 0 s", 1)
+    assert sys.stderr is stream
+    said_then = stream.getvalue()
+    monkeypatch.setattr(heartbeat, "QUIET_S", 60.0)
+    with clear_errors("map"):
+        time.sleep(0.05)
+    assert stream.getvalue() == said_then, "a quick command adds nothing"
+
+
+def await_text(stream: io.StringIO, text: str, times: int) -> None:
+    """Returns when the stream has the text so often; the test's own limit ends the waiting."""
+    while stream.getvalue().count(text) < times:
+        time.sleep(0.005)
+
+
 def test_on_a_terminal_there_is_a_bar() -> None:
     into = console(terminal=True)
     assert list(shown(range(3), "coding", into)) == [0, 1, 2]
@@ -60,7 +87,7 @@ def test_on_a_terminal_there_is_a_bar() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         ("vary X.bvh --model M --mix Y.bvh --count 3 --sigma 2", "--sigma, --count do nothing with --mix"),
         ("vary X.bvh --model M --mix Y.bvh --seed 1", "--seed does nothing with --mix"),
@@ -88,15 +115,15 @@ def test_on_a_terminal_there_is_a_bar() -> None:
         ),
     ],
 )
-def test_an_option_that_would_do_nothing_is_refused(arguments: str, words: str) -> None:
+def test_an_option_that_would_do_nothing_is_refused(arguments: str, message: str) -> None:
     result = bunraku(*arguments.split())
     told = " ".join(result.output.replace("│", " ").split())
-    assert result.exit_code == 2 and words in told, told
+    assert result.exit_code == 2 and message in told, told
 
 
 def test_a_resumed_training_refuses_what_it_cannot_follow(puppet_checkpoint: Path, recordings: Path) -> None:
     folder = puppet_checkpoint.parent
-    for options, words in (
+    for options, message in (
         (("--width", 999), "--width (it has"),
         (("--seed", 7), "--seed (it has 1)"),
         (("--model", "pose"), "--model (it has puppet)"),
@@ -104,4 +131,4 @@ def test_a_resumed_training_refuses_what_it_cannot_follow(puppet_checkpoint: Pat
     ):
         result = bunraku("train", "--resume", "--out", folder, "--recordings", recordings, *options)
         told = " ".join(result.output.split())
-        assert result.exit_code == 2 and "cannot follow" in told and words in told, told
+        assert result.exit_code == 2 and "cannot follow" in told and message in told, told

@@ -13,7 +13,7 @@ from appliance.studio.studio_error import StudioError
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("seconds,w,x,y,z\n0,1,0,0\n", "line 2: a row has seconds and a quaternion"),
         ("0,1,0,0,0\n0.02,0,0,0,0\n", "line 2"),
@@ -22,10 +22,10 @@ from appliance.studio.studio_error import StudioError
         ("", "has no trace"),
     ],
 )
-def test_a_wrong_trace_is_told_with_its_line(tmp_path: Path, text: str, words: str) -> None:
+def test_a_wrong_trace_is_told_with_its_line(tmp_path: Path, text: str, message: str) -> None:
     file = tmp_path / "trace.csv"
     file.write_text(text)
-    with pytest.raises(StudioError, match=words):
+    with pytest.raises(StudioError, match=message):
         read_trace(file)
 
 

@@ -38,8 +38,10 @@ def test_a_shows_networks_dance_where_torch_is_not_installed(tmp_path: Path) -> 
         ["improvise", "--seconds", "2", "--out", tmp_path / "more.bvh"],
     )
     for command in commands:
-        words = [str(each) for each in (*command, "--show", "default")]
-        done = subprocess.run([sys.executable, "-c", WITHOUT_TORCH, *words], capture_output=True, text=True)
+        arguments = [str(each) for each in (*command, "--show", "default")]
+        done = subprocess.run(
+            [sys.executable, "-c", WITHOUT_TORCH, *arguments], capture_output=True, text=True
+        )
         assert done.returncode == 0, done.stderr
     made = ("varied/phrase.bvh", "varied/variation_1.bvh", "wobble.bvh", "more.bvh")
     phrase, varied, wobble, more = (read_bvh(tmp_path / name) for name in made)
@@ -77,7 +79,7 @@ def test_a_variation_goes_far_from_its_phrase_and_trembles_no_more() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (["vary"], "Give --show"),
         (["vary", "--show", "default", "--model", "x.pt"], "Give --show"),
@@ -90,9 +92,9 @@ def test_a_variation_goes_far_from_its_phrase_and_trembles_no_more() -> None:
         (["map", "--show", "nowhere"], "There is no such show folder"),
     ],
 )
-def test_a_show_that_cannot_do_it_is_told(arguments: list[str], words: str, tmp_path: Path) -> None:
+def test_a_show_that_cannot_do_it_is_told(arguments: list[str], message: str, tmp_path: Path) -> None:
     result = bunraku(*arguments, "--out", tmp_path / "out.bvh")
-    assert result.exit_code == 2 and words in " ".join(result.stderr.split()), result.output
+    assert result.exit_code == 2 and message in " ".join(result.stderr.split()), result.output
 
 
 def test_the_map_is_the_one_that_the_show_has_on_stage(tmp_path: Path) -> None:

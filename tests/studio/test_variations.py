@@ -118,8 +118,8 @@ def test_at_0_the_file_is_the_phrase_and_at_a_quarter_its_timing_is_another(
     model: Path, recordings: Path, tmp_path: Path
 ) -> None:
     def shares(*options: object) -> dict[str, dict[str, float]]:
-        words = ["--model", model / "checkpoint.pt", "--count", 1, "--out", tmp_path, *options]
-        result = bunraku("vary", recordings / "sway_0.bvh", *words)
+        arguments = ["--model", model / "checkpoint.pt", "--count", 1, "--out", tmp_path, *options]
+        result = bunraku("vary", recordings / "sway_0.bvh", *arguments)
         assert result.exit_code == 0, result.output
         found: dict[str, dict[str, float]] = json.loads((tmp_path / "variations.json").read_text())["figures"]
         assert found["0_sigma"]["degrees"] < 0.05
@@ -176,7 +176,7 @@ def test_vary_writes_each_variation_its_figures_and_a_strip(
     figures = json.loads((tmp_path / "variations.json").read_text())["figures"]
     assert list(figures) == ["phrase", "0_sigma", "variation_1", "variation_2"]
     assert figures["variation_1"]["degrees"] > 0 and figures["phrase"]["nearest"] < 0.5
-    assert (tmp_path / "variations.png").exists() and "arms alone" in result.output
+    assert (tmp_path / "variations.png").exists() and "arms only" in result.output
     assert "2 of 2: planting the feet of variation_2 ..." in result.output
 
 
@@ -195,7 +195,7 @@ def test_samples_of_the_prior_need_no_phrase_and_two_phrases_mix(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (["{rec}/sway_0.bvh", "--model", "{puppet}"], "is no sequence model"),
         (["{rec}/sway_0.bvh", "--model", "{pose}"], "is no sequence model"),
@@ -210,7 +210,7 @@ def test_samples_of_the_prior_need_no_phrase_and_two_phrases_mix(
 )
 def test_what_cannot_be_varied_is_named(
     arguments: list[str],
-    words: str,
+    message: str,
     model: Path,
     recordings: Path,
     puppet_checkpoint: Path,
@@ -219,7 +219,7 @@ def test_what_cannot_be_varied_is_named(
 ) -> None:
     places = {"rec": recordings, "model": model, "puppet": puppet_checkpoint, "pose": pose_checkpoint}
     result = bunraku("vary", *(each.format(**places) for each in arguments), "--out", tmp_path)
-    assert result.exit_code == 2 and words in " ".join(result.stderr.split()), result.output
+    assert result.exit_code == 2 and message in " ".join(result.stderr.split()), result.output
 
 
 def test_a_phrase_or_free_is_asked_for(model: Path, tmp_path: Path) -> None:

@@ -60,11 +60,11 @@ class Box(Process):
 
         def has_all() -> bool:
             arrived = [arguments for _, address, arguments in self.receiver.poll(0.05) if "frame" in address]
-            assert arrived or found or self.process.poll() is None, self.words
+            assert arrived or found or self.process.poll() is None, self.output
             found.extend(arrived)
             return len(found) >= count
 
-        wait_until(has_all, lambda: self.words, pause=lambda: None)
+        wait_until(has_all, lambda: self.output, pause=lambda: None)
         return found
 
     def last_frames(self) -> list[list[Any]]:
@@ -74,7 +74,7 @@ class Box(Process):
     def frame_that(self, is_wanted: Callable[[list[Any]], bool]) -> list[Any]:
         """The next frame message that is as wanted."""
         return wait_until(
-            lambda: next(filter(is_wanted, self.frames(1)), None), lambda: self.words, pause=lambda: None
+            lambda: next(filter(is_wanted, self.frames(1)), None), lambda: self.output, pause=lambda: None
         )
 
     def pause(self) -> None:
@@ -90,7 +90,7 @@ class Box(Process):
             listed: dict[str, Any] = json.loads(done.stdout)
             return listed if listed["box"] else {}
 
-        return {sensor["name"]: sensor for sensor in wait_until(answer, lambda: self.words)["sensors"]}
+        return {sensor["name"]: sensor for sensor in wait_until(answer, lambda: self.output)["sensors"]}
 
     def kill_and_restart(self) -> None:
         """As systemd does it: killed in the middle of a tick, then the same command again."""
@@ -105,7 +105,7 @@ class Box(Process):
             status = super().end(number)
         wait_until(
             lambda: not any(has_argument(pid, "appliance.show_control") for pid in companions),
-            lambda: f"show control outlives its box:\n{self.words}",
+            lambda: f"show control outlives its box:\n{self.output}",
         )
         return status
 

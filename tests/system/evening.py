@@ -31,7 +31,7 @@ class Act(NamedTuple):
 
     at: float
     sensor: int | None
-    words: str
+    label: str
     happen: Callable[[Lockstep], None]
 
 

@@ -74,21 +74,21 @@ def _lit(lamp: list[tuple[float, bool]]) -> list[tuple[float, float]]:
 def _draw_act(axes: Any, act: Act) -> None:
     if act.sensor is None:
         axes.axvline(act.at, color=VERMILION, linewidth=1.2)
-        if act.words != "end":
-            side = "right" if act.words.endswith("off") else "left"
-            axes.text(act.at + (0.4 if side == "left" else -0.4), -0.75, act.words, color=VERMILION, ha=side)
+        if act.label != "end":
+            side = "right" if act.label.endswith("off") else "left"
+            axes.text(act.at + (0.4 if side == "left" else -0.4), -0.75, act.label, color=VERMILION, ha=side)
         return
-    mark = "|" if act.words == "power on" else "v"
+    mark = "|" if act.label == "power on" else "v"
     axes.plot([act.at], [act.sensor - 0.42], mark, color=VERMILION, markersize=6, clip_on=False)
-    if act.words != "power on":
-        axes.text(act.at + 0.5, act.sensor - 0.43, act.words, color=IVORY, fontsize=8, va="center")
+    if act.label != "power on":
+        axes.text(act.at + 0.5, act.sensor - 0.43, act.label, color=IVORY, fontsize=8, va="center")
 
 
 def _legend(axes: Any) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    entries: list[Any] = [Patch(color=colour, label=words) for words, colour in STATES.values()]
+    entries: list[Any] = [Patch(color=colour, label=text) for text, colour in STATES.values()]
     entries.append(Line2D([], [], color=IVORY, linewidth=0.9, label="accepted readings (top: 50 a second)"))
     entries.append(Line2D([], [], color=LAMP, linewidth=4, label="lamp"))
     entries.append(Line2D([], [], color=VERMILION, marker="v", linestyle="", label="fault"))

@@ -41,9 +41,9 @@ class Namespace:
     def __exit__(self, *_: object) -> None:
         _ip("netns", "delete", self.name)
 
-    def command(self, *words: str) -> list[str]:
+    def command(self, *arguments: str) -> list[str]:
         """A command line that runs inside."""
-        return ["ip", "netns", "exec", self.name, *words]
+        return ["ip", "netns", "exec", self.name, *arguments]
 
     @contextlib.contextmanager
     def entered(self) -> Iterator[None]:
@@ -83,8 +83,8 @@ def _name(what: str) -> str:
     return f"bk{os.getpid() % 100000}{what[:6]}{next(_numbers)}"
 
 
-def _ip(*words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(["ip", *words], capture_output=True, text=True, check=check)
+def _ip(*arguments: str, check: bool = True) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["ip", *arguments], capture_output=True, text=True, check=check)
 
 
 def _set_namespace(descriptor: int) -> None:

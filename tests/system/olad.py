@@ -59,11 +59,13 @@ class Olad:
             self._configure()
         with self._inside():
             self.port, rpc = free_ports(2, socket.SOCK_STREAM)
-        words = ["olad", "-c", str(self._folder), "-p", str(self.port), "-r", str(rpc), "-l", "3"]
-        words += ["--no-register-with-dns-sd", *(("-i", "lo") if self._network else ())]
+        arguments = ["olad", "-c", str(self._folder), "-p", str(self.port), "-r", str(rpc), "-l", "3"]
+        arguments += ["--no-register-with-dns-sd", *(("-i", "lo") if self._network else ())]
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                self._network.command(*self._as_user(words)) if self._network else self._as_user(words),
+                self._network.command(*self._as_user(arguments))
+                if self._network
+                else self._as_user(arguments),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -160,11 +162,11 @@ class Olad:
                 os.chown(path, owner.pw_uid, owner.pw_gid)
 
     @staticmethod
-    def _as_user(words: list[str]) -> list[str]:
+    def _as_user(arguments: list[str]) -> list[str]:
         if os.geteuid() != 0:
-            return words
+            return arguments
         owner = pwd.getpwnam(USER)
-        return ["setpriv", f"--reuid={owner.pw_uid}", f"--regid={owner.pw_gid}", "--clear-groups", *words]
+        return ["setpriv", f"--reuid={owner.pw_uid}", f"--regid={owner.pw_gid}", "--clear-groups", *arguments]
 
 
 def art_net_node(**settings: str | int) -> dict[str, Settings]:

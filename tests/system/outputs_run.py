@@ -87,8 +87,8 @@ class Measurement:
         """Wait until all of it runs: frames at every receiver, lamps lit, projector and sensor at work."""
         is_ready: dict[str, bool] = {}
 
-        def words() -> str:
-            outputs = [f"{name}: {self._venue.words(name)}" for name in ("stage", "sensor", "projector")]
+        def output() -> str:
+            outputs = [f"{name}: {self._venue.output(name)}" for name in ("stage", "sensor", "projector")]
             return "\n".join([str(is_ready), *outputs])
 
         def all_ready() -> bool:
@@ -97,14 +97,14 @@ class Measurement:
                 frames=all(heard.ticks for heard in self._heard.values()) and bool(self._frames),
                 processes={"control", "lights"} <= self._venue.pids().keys(),
                 lamps=all(self._follows(self._level(universe), universe) for universe in LAMPS),
-                sensor="neutral pose taken" in self._venue.words("stage"),
-                picture=self._is_picture_there(self._venue.words("projector")),
+                sensor="neutral pose taken" in self._venue.output("stage"),
+                picture=self._is_picture_there(self._venue.output("projector")),
             )
             ended = [name for name, process in self._venue.processes.items() if process.poll() is not None]
-            assert not ended, f"{ended} ended: {words()}"
+            assert not ended, f"{ended} ended: {output()}"
             return all(is_ready.values())
 
-        wait_until(all_ready, words)
+        wait_until(all_ready, output)
 
     @staticmethod
     def _is_picture_there(said: str) -> bool:
@@ -165,8 +165,8 @@ class Measurement:
             },
             "memory_mb": {name: _ends(values) for name, values in self.memory_mb.items()},
             "handles": {name: _ends(values) for name, values in self.handles.items()},
-            "projector": self._venue.words("projector").strip().splitlines()[-1],
-            "stage": [line for line in self._venue.words("stage").splitlines() if line.startswith("Danced")],
+            "projector": self._venue.output("projector").strip().splitlines()[-1],
+            "stage": [line for line in self._venue.output("stage").splitlines() if line.startswith("Danced")],
             "statuses": statuses,
             "stalls_over_20_ms": stalls.count,
             "worst_stall_ms": round(1e3 * stalls.worst_s, 1),
@@ -286,7 +286,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         figures = measure(60.0 * options.minutes, Path(name))
     wrong = faults(figures)
-    print("\n".join([*table(figures), *([f"FAIL  {words}" for words in wrong] or ["ok"])]))
+    print("\n".join([*table(figures), *([f"FAIL  {message}" for message in wrong] or ["ok"])]))
     if options.report is not None:
         options.report.mkdir(parents=True, exist_ok=True)
         report = json.dumps({**figures, "faults": wrong}, indent=2)

@@ -81,35 +81,35 @@ def start(command: Sequence[str | Path], output: IO[bytes] | int) -> subprocess.
 class Process:
     """A command with its output in a file, or on a terminal. A context, which kills it."""
 
-    def __init__(self, words_file: Path, command: Sequence[str | Path], terminal: int | None = None) -> None:
-        self.words_file, self.command, self._terminal = words_file, list(map(str, command)), terminal
+    def __init__(self, output_file: Path, command: Sequence[str | Path], terminal: int | None = None) -> None:
+        self.output_file, self.command, self._terminal = output_file, list(map(str, command)), terminal
         self.start()
 
     def start(self) -> None:
-        with self.words_file.open("ab") as output:
+        with self.output_file.open("ab") as output:
             self.process = start(self.command, output if self._terminal is None else self._terminal)
 
     @property
-    def words(self) -> str:
+    def output(self) -> str:
         """All output so far."""
-        return self.words_file.read_text()
+        return self.output_file.read_text()
 
     def pause(self) -> None:
         """What to do between two looks at the output."""
         time.sleep(POLL_S)
 
-    def await_words(self, words: str, count: int = 1) -> None:
+    def await_output(self, message: str, count: int = 1) -> None:
         """Wait until the output has these words `count` times."""
 
-        def has_words() -> bool:
-            return self.words.count(words) >= count
+        def has_it() -> bool:
+            return self.output.count(message) >= count
 
         wait_until(
-            lambda: has_words() or self.process.poll() is not None,
-            lambda: f"'{words}' never came:\n{self.words}",
+            lambda: has_it() or self.process.poll() is not None,
+            lambda: f"'{message}' never came:\n{self.output}",
             self.pause,
         )
-        assert has_words(), self.words
+        assert has_it(), self.output
 
     def end(self, number: int = signal.SIGTERM) -> int:
         """Send a signal and return the exit status."""

@@ -21,7 +21,7 @@ from tests.system.processes import BUNRAKU, run, run_bunraku
 def test_every_finding_but_ok_has_a_cure(tmp_path: Path) -> None:
     """Also on a machine that reveals nothing; no check raises."""
     for finding in findings(HostView(tmp_path)):
-        assert finding.words.endswith("."), finding
+        assert finding.message.endswith("."), finding
         assert bool(finding.cure) == (finding.verdict != "ok"), finding
 
 
@@ -35,7 +35,7 @@ def test_no_check_stumbles_over_nonsense(check: Check, tmp_path: Path) -> None:
     ):
         lay(tmp_path, path, "\0 nonsense : 7\nmore: of it\n")
     stage = RunningStage(STAGE_PID, {})
-    assert all(finding.words for finding in check(HostView(tmp_path, stage=stage)))
+    assert all(finding.message for finding in check(HostView(tmp_path, stage=stage)))
 
 
 GOVERNOR = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"
@@ -45,7 +45,7 @@ WATCHDOG = "/sys/class/watchdog/watchdog0"
 
 
 @pytest.mark.parametrize(
-    ("check", "files", "verdict", "words"),
+    ("check", "files", "verdict", "message"),
     [
         (processor.governor, {GOVERNOR: "performance"}, "ok", ""),
         (processor.governor, {GOVERNOR: "ondemand"}, "better", "ondemand"),
@@ -77,13 +77,13 @@ WATCHDOG = "/sys/class/watchdog/watchdog0"
     ],
 )
 def test_the_verdict_on_files_of_the_kernel(
-    check: Check, files: dict[str, str], verdict: str, words: str, tmp_path: Path
+    check: Check, files: dict[str, str], verdict: str, message: str, tmp_path: Path
 ) -> None:
     for path, content in files.items():
         lay(tmp_path, path, f"{content}\n")
     found = only(check(HostView(tmp_path)))
     assert found.verdict == verdict
-    assert words in found.words
+    assert message in found.message
 
 
 @pytest.mark.realtime
@@ -92,11 +92,11 @@ def test_beside_a_dancing_box_it_finds_the_box_and_costs_it_no_frame(tmp_path: P
         first = box.frames(70)[-1]  # after a second the stage has published its health
         done = run([*BUNRAKU, "doctor", "--box", box.box_file, "--json"])
         found = {one["what"]: one for one in json.loads(done.stdout)}
-        rate = re.match(r"(\d+\.\d) Hz; \d+ of \d+ ticks", found["stage"]["words"])
+        rate = re.match(r"(\d+\.\d) Hz; \d+ of \d+ ticks", found["stage"]["message"])
         assert rate and float(rate[1]) > 25.0, found["stage"]  # this machine may have been busy
-        assert found["port for sensors"]["words"].endswith("the box listens.")
+        assert found["port for sensors"]["message"].endswith("the box listens.")
         assert found["port for commands"]["verdict"] == "ok"
-        assert "appliance" not in found["other programs"]["words"]
+        assert "appliance" not in found["other programs"]["message"]
         assert box.frames(1)[0][0] > first[0]
         assert box.process.poll() is None
     assert done.returncode == any(one["verdict"] == "wrong" for one in found.values())
@@ -107,13 +107,13 @@ def test_a_show_without_its_sensor_and_its_receiver_is_wrong(tmp_path: Path) -> 
     (nobody,) = free_ports(1)
     settings = {"outputs": {"osc": [{"port": nobody}], "dmx": [{"universe": 1, "wire": "udmx"}]}}
     with playing(write_show(tmp_path / "show"), tmp_path, settings=settings) as box:
-        box.await_words(f"Receiver 127.0.0.1:{nobody}")
+        box.await_output(f"Receiver 127.0.0.1:{nobody}")
         done = run([*BUNRAKU, "doctor", "--box", box.box_file, "--json"])
         found = {one["what"]: one for one in json.loads(done.stdout)}
     assert done.returncode == 1
     assert found["sensor left-wrist"]["verdict"] == "wrong"
     (receiver,) = [one for what, one in found.items() if what.startswith(f"receiver 127.0.0.1:{nobody}")]
-    assert receiver["verdict"] == "wrong" and "no program listens on that port" in receiver["words"]
+    assert receiver["verdict"] == "wrong" and "no program listens on that port" in receiver["message"]
     assert found["lights"]["verdict"] == "ok", "this show has no lamps"
 
 

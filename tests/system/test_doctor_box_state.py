@@ -20,14 +20,14 @@ def test_a_refused_show_is_reported(tmp_path: Path) -> None:
     lay_choice(tmp_path, Choice(refused=("show.yaml:3: no such key.", "It is not danced.")))
     found = list(storage.choice(HostView(tmp_path)))
     assert [one.verdict for one in found] == ["ok", "better"]
-    assert "show.yaml:3: no such key.\nIt is not danced." in found[1].words
+    assert "show.yaml:3: no such key.\nIt is not danced." in found[1].message
 
 
 def test_a_show_put_aside_is_reported(tmp_path: Path) -> None:
     lay_choice(tmp_path, Choice(aside=(Aside("new+", "The show did not dance."),)))
     found = list(storage.choice(HostView(tmp_path)))
     assert [one.verdict for one in found] == ["ok", "better"]
-    assert found[1].words == "The show did not dance."
+    assert found[1].message == "The show did not dance."
 
 
 def test_a_box_that_is_on_and_does_not_dance_is_wrong(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_a_release_put_aside_is_reported(tmp_path: Path) -> None:
     lay(tmp_path, "/data/bunraku-releases/0.2.0.aside", "its stage did not dance\n")
     found = only(storage.releases(HostView(tmp_path)))
     assert found.verdict == "better"
-    assert "0.2.0 is put aside: its stage did not dance. The release" in found.words
+    assert "0.2.0 is put aside: its stage did not dance. The release" in found.message
     assert "bunraku release use 0.2.0" in found.cure
 
 
@@ -60,6 +60,6 @@ def test_fallbacks_in_force_are_reported_with_their_words() -> None:
         ("lights", Fallen("wire-gone", 1, False, "It is back.")),
     )
     found = list(box_state.stage(HostView(stage=RunningStage(1, {}, told))))
-    assert [(one.what, one.verdict, one.words, one.cure) for one in found[1:]] == [
+    assert [(one.what, one.verdict, one.message, one.cure) for one in found[1:]] == [
         ("stage: sensor-silent", "wrong", "Sensor left-wrist is silent.", "Charge it.")
     ]

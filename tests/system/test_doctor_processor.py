@@ -27,7 +27,7 @@ def test_the_priority_of_the_running_stage_is_read(tmp_path: Path, policy: str, 
     found = only(processor.realtime_rights(HostView(tmp_path, stage=RunningStage(STAGE_PID, {}))))
     assert found.verdict == verdict
     if verdict == "ok":
-        assert "70" in found.words
+        assert "70" in found.message
 
 
 def test_the_kernel_s_figures_are_found_for_this_process() -> None:
@@ -48,8 +48,8 @@ def test_other_users_of_the_cores_are_named() -> None:
     assert only(processor.others(quiet(shares=(("cron", 12, 0.01),)))).verdict == "ok"
     found = only(processor.others(quiet(shares=(("updatedb", 77, 0.9), ("cron", 12, 0.01)))))
     assert found.verdict == "better"
-    assert "updatedb (process 77, 90 % of a core)" in found.words
-    assert "cron" not in found.words
+    assert "updatedb (process 77, 90 % of a core)" in found.message
+    assert "cron" not in found.message
     crowd = tuple(("stress", pid, 0.9) for pid in range(4))
     assert only(processor.others(quiet(shares=crowd))).verdict == "wrong"
 
@@ -62,10 +62,10 @@ def test_interrupts_and_a_host_that_takes_time_away() -> None:
 
 def test_the_wake_ups_are_told_as_figures_and_with_the_class_in_which_they_ran() -> None:
     late_ms = tuple(0.1 + 0.01 * number for number in range(100))
-    words = only(processor.wakeup_latency(quiet(late_ms))).words
-    assert "half came within 0.60 ms, 99 % within 1.09 ms, the latest 1.1 ms" in words
-    assert "with real-time priority" in words
-    assert "without the real-time" in only(processor.wakeup_latency(quiet(late_ms, real_time=False))).words
+    message = only(processor.wakeup_latency(quiet(late_ms))).message
+    assert "half came within 0.60 ms, 99 % within 1.09 ms, the latest 1.1 ms" in message
+    assert "with real-time priority" in message
+    assert "without the real-time" in only(processor.wakeup_latency(quiet(late_ms, real_time=False))).message
 
 
 def test_a_sample_sees_a_busy_process_and_wakes_each_time() -> None:
@@ -93,7 +93,7 @@ def test_raspberry_pi_os_is_asked_by_its_own_program(tmp_path: Path, monkeypatch
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     found = only(processor.power(HostView()))
-    assert found.verdict == "wrong" and "voltage is too low now" in found.words
+    assert found.verdict == "wrong" and "voltage is too low now" in found.message
     program.write_text("#!/bin/sh\necho throttled=0x50000\n")
     found = only(processor.power(HostView()))
-    assert found.verdict == "better" and "since the box was switched on" in found.words
+    assert found.verdict == "better" and "since the box was switched on" in found.message

@@ -28,8 +28,8 @@ def roster(**neutral: str) -> list[RosterLine]:
 def test_each_sensor_of_the_show_has_a_line_and_a_spare_none() -> None:
     found = list(show_parts.sensors(dancing(sensors=roster(left_wrist="taken", head="kept"))))
     assert verdicts(found) == [("sensor left-wrist", "better"), ("sensor head", "wrong")]
-    assert "50 readings a second; 1.2 % are lost; its battery is at 12 %" in found[0].words
-    assert "lost, last heard 3 min ago: its joint moves freely" in found[1].words
+    assert "50 readings a second; 1.2 % are lost; its battery is at 12 %" in found[0].message
+    assert "lost, last heard 3 min ago: its joint moves freely" in found[1].message
     assert "bunraku sensors replace head SPARE" in found[1].cure
 
 
@@ -52,7 +52,7 @@ def test_each_receiver_has_a_line_and_a_dead_one_is_wrong() -> None:
     found = list(show_parts.receivers(dancing(receivers=[gone, here, usual])))
     assert [one.verdict for one in found] == ["wrong", "ok", "ok"]
     assert found[0].what == "receiver 10.0.0.9:9000 (joint)"
-    assert "that machine does not answer" in found[0].words
+    assert "that machine does not answer" in found[0].message
 
 
 def test_each_wire_has_a_line_and_no_light_at_all_is_wrong() -> None:
@@ -64,7 +64,7 @@ def test_each_wire_has_a_line_and_no_light_at_all_is_wrong() -> None:
     lights = Member("lights", 1, False, (), parts)
     found = list(show_parts.wires(HostView(box=wired, stage=RunningStage(1, {}, (), (lights,)))))
     assert verdicts(found) == [(away, "wrong"), (here, "ok")]
-    assert found[0].words == "no network leads there. Its lights do not follow."
+    assert found[0].message == "no network leads there. Its lights do not follow."
     for members in ((), (lights._replace(late=True),)):
         found = list(show_parts.wires(HostView(box=wired, stage=RunningStage(1, {}, (), members))))
         assert verdicts(found) == [("lights", "wrong")]

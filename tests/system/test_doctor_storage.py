@@ -54,7 +54,7 @@ def test_data_that_lies_in_memory_is_wrong_whatever_holds_it(
     found = list(storage.data_folders(HostView(tmp_path, box)))
     assert {one.verdict for one in found} == {"ok" if is_kept else "wrong"}
     assert len(found) == 3, "the keys' folder, the state and what the box keeps besides"
-    assert is_kept or all("in memory" in one.words and "keys" in one.words for one in found)
+    assert is_kept or all("in memory" in one.message and "keys" in one.message for one in found)
     assert not list((tmp_path / "data").rglob(".doctor-*"))
 
 
@@ -82,14 +82,14 @@ def test_a_disk_that_forgets_what_is_written_is_wrong(
 
     monkeypatch.setattr(os, "posix_fadvise", forget)
     found = only(storage.data_folders(HostView(box=state)))
-    assert found.verdict == "wrong" and "came back changed" in found.words
+    assert found.verdict == "wrong" and "came back changed" in found.message
 
 
 def test_a_data_folder_without_a_journal_of_its_own_can_be_damaged_by_a_power_cut(tmp_path: Path) -> None:
     (tmp_path / "data/bunraku").mkdir(parents=True)
     lay(tmp_path, "/proc/mounts", "/dev/sda1 / ext4 rw 0 0\n/dev/sdb1 /data vfat rw 0 0\n")
     found = only(storage.data_folders(HostView(tmp_path)))
-    assert found.verdict == "better" and "It is on vfat" in found.words
+    assert found.verdict == "better" and "It is on vfat" in found.message
     lay(tmp_path, "/proc/mounts", "/dev/sda1 / ext4 rw 0 0\n/dev/sdb1 /data ext4 rw 0 0\n")
     assert only(storage.data_folders(HostView(tmp_path))).verdict == "ok"
 
@@ -117,5 +117,5 @@ def test_memory_and_swap(tmp_path: Path) -> None:
     lay(tmp_path, "/proc/swaps", "Filename Type\n/dev/zram0 partition 1\n/var/swap file 1\n")
     memory, swap = storage.memory(HostView(tmp_path))
     assert (memory.verdict, swap.verdict) == ("wrong", "better")
-    assert "/var/swap" in swap.words
-    assert "zram" not in swap.words
+    assert "/var/swap" in swap.message
+    assert "zram" not in swap.message

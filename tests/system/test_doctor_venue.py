@@ -31,7 +31,7 @@ def test_radios(tmp_path: Path) -> None:
 def test_an_access_point_that_is_not_on_the_air_is_wrong(tmp_path: Path) -> None:
     lay(tmp_path, "/data/network/sensors.nmconnection", "[connection]\ninterface-name=wlan7\n")
     found = only(venue.radios(HostView(tmp_path)))
-    assert found.verdict == "wrong" and "wlan7 is not plugged in" in found.words
+    assert found.verdict == "wrong" and "wlan7 is not plugged in" in found.message
     lay(tmp_path, "/sys/class/net/wlan7/phy80211/name", "phy7\n")
     assert list(venue.radios(HostView(tmp_path))) == []
     lay(tmp_path, "/sys/class/rfkill/rfkill0/type", "wlan\n")
@@ -84,7 +84,7 @@ def test_adapters_that_are_left_out_are_named(monkeypatch: pytest.MonkeyPatch) -
     box = BoxConfig.model_validate({"outputs": {"dmx": wires}}, context={})
     found = only(venue.adapters(HostView(box=box)))
     assert found.verdict == "better"
-    assert "It takes /dev/ttyUSB0" in found.words and "/dev/ttyUSB1 (serial: D1)" in found.words
+    assert "It takes /dev/ttyUSB0" in found.message and "/dev/ttyUSB1 (serial: D1)" in found.message
 
 
 def test_displays(tmp_path: Path) -> None:
@@ -94,8 +94,8 @@ def test_displays(tmp_path: Path) -> None:
     lay(tmp_path, "/dev/dri/renderD128")
     found = only(venue.display(HostView(tmp_path)))
     assert found.verdict == "ok"
-    assert "HDMI-A-1" in found.words
-    assert "HDMI-A-2" not in found.words
+    assert "HDMI-A-1" in found.message
+    assert "HDMI-A-2" not in found.message
 
 
 def test_a_port_that_another_process_holds_is_wrong_and_it_is_named(tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_a_port_that_another_process_holds_is_wrong_and_it_is_named(tmp_path: Pa
         box = BoxConfig.model_validate({"sensors": {"udp": {"port": port}}, "control": None})
         found = next(iter(venue.ports(HostView(box=box))))
         name = Path(f"/proc/{os.getpid()}/comm").read_text().strip()
-        assert (found.verdict, f"{name} (process {os.getpid()})" in found.words) == ("wrong", True)
+        assert (found.verdict, f"{name} (process {os.getpid()})" in found.message) == ("wrong", True)
     assert next(iter(venue.ports(HostView(box=box)))).verdict == "ok"
 
 
@@ -128,9 +128,9 @@ def test_what_the_access_point_really_does_is_said(radio: HostView, tmp_path: Pa
     told.write_text("Interface lo\n\tssid stage net\n\ttype AP\n\tchannel 6 (2437 MHz), width: 20 MHz\n")
     found = only(venue.access_point(radio))
     assert found.verdict == "ok"
-    assert "lo is on the air as 'stage net', channel 6 (2437 MHz), country DE; 2 joined." in found.words
+    assert "lo is on the air as 'stage net', channel 6 (2437 MHz), country DE; 2 joined." in found.message
     (tmp_path / "ip -brief address show dev lo").write_text("lo DOWN\n")
-    assert "no address" in only(venue.access_point(radio)).words
+    assert "no address" in only(venue.access_point(radio)).message
     told.write_text("Interface lo\n\ttype managed\n")
     found = only(venue.access_point(radio))
-    assert found.verdict == "wrong" and "not on the air (it is 'managed')" in found.words
+    assert found.verdict == "wrong" and "not on the air (it is 'managed')" in found.message

@@ -99,12 +99,12 @@ def test_each_comes_back_soon_after_what_went_wrong(evening: Evening) -> None:
         "access point is back": 5.0,
     }
     for act in evening.acts:
-        if act.words in longest_s:
+        if act.label in longest_s:
             for number in range(len(NAMES)) if act.sensor is None else [act.sensor]:
-                if act.words == "power on" and 55.0 <= act.at < 75.0:
+                if act.label == "power on" and 55.0 <= act.at < 75.0:
                     continue  # there is no access point to join
                 accepted = np.array(_accepted(evening, evening.sensors[number]))
-                within_s = longest_s[act.words]
+                within_s = longest_s[act.label]
                 after = (accepted > act.at + within_s) & (accepted < act.at + within_s + 1.0)
                 assert after.sum() >= 45, (act, NAMES[number])
 

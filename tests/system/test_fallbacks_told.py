@@ -53,7 +53,7 @@ def test_a_wire_that_is_away_and_back(show: Path, tmp_path: Path) -> None:
     with lit(show, tmp_path, widget.path) as box, LightsProcess(tmp_path) as lights:
         away = await_fallback(box.runtime, DMX_AWAY.name, lambda one: one.active)
         assert away.times == 1
-        assert "it is not plugged in" in away.words
+        assert "it is not plugged in" in away.message
         with widget:
             await_fallback(box.runtime, DMX_AWAY.name, lambda one: not one.active)
             assert lights.end() == 0
@@ -62,11 +62,11 @@ def test_a_wire_that_is_away_and_back(show: Path, tmp_path: Path) -> None:
 
 def test_a_stage_that_is_lost_and_back(show: Path, tmp_path: Path) -> None:
     with lit(show, tmp_path, tmp_path / "none") as box, LightsProcess(tmp_path) as lights:
-        lights.await_words("The stage dances, and the lights with it.")
+        lights.await_output("The stage dances, and the lights with it.")
         box.kill_and_restart()
         box.end(signal.SIGKILL)
         lost = await_fallback(box.runtime, LIGHTS_SAFE.name, lambda one: one.active)
-        assert "fade to their safe look" in lost.words
+        assert "fade to their safe look" in lost.message
         box.kill_and_restart()
         await_fallback(box.runtime, LIGHTS_SAFE.name, lambda one: not one.active)
 

@@ -17,8 +17,8 @@ def test_wearables_send_as_often_as_the_box_file_asks(show: Path, tmp_path: Path
         playing(show, tmp_path, settings={"sensors": {"rate_hz": 100}}) as box,
         box.wearables() as wearables,
     ):
-        box.await_words("neutral pose taken")
+        box.await_output("neutral pose taken")
         wearables.dance()
-        wait_until(lambda: box.listed_sensors()["left-wrist"]["rate_hz"] > 80, lambda: box.words)
+        wait_until(lambda: box.listed_sensors()["left-wrist"]["rate_hz"] > 80, lambda: box.output)
         assert box.listed_sensors()["left-wrist"]["loss"] < 0.5
         assert box.end() == 0

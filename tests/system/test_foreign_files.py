@@ -173,10 +173,10 @@ def test_slow_frames_that_last_for_days_are_refused(tmp_path: Path) -> None:
 
 def forged(facts: object, arrays: bytes) -> bytes:
     """A prepared phrase that a bundle may bring."""
-    words = json.dumps(facts).encode() if not isinstance(facts, bytes) else facts
-    words = words.ljust(-(-(28 + len(words)) // 64) * 64 - 28)
-    body = words + arrays
-    return struct.pack("<17sII3x", b"bunraku phrase 1\n", len(words), zlib.crc32(body)) + body
+    encoded = json.dumps(facts).encode() if not isinstance(facts, bytes) else facts
+    encoded = encoded.ljust(-(-(28 + len(encoded)) // 64) * 64 - 28)
+    body = encoded + arrays
+    return struct.pack("<17sII3x", b"bunraku phrase 1\n", len(encoded), zlib.crc32(body)) + body
 
 
 @pytest.mark.parametrize(

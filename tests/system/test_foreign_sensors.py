@@ -93,19 +93,19 @@ def test_programs_hold_joints_as_wearables_do(tmp_path: Path) -> None:
             for made, port in zip((gyrosc, slimevr, mocopi), ports, strict=True):
                 programs.enter_context(sending(made, port, angle))
             for one in foreign:
-                box.await_words(f"Sensor {one['name']}: neutral pose taken. Dance.")
+                box.await_output(f"Sensor {one['name']}: neutral pose taken. Dance.")
             angle[0] = TURN
             for joint in (SHOULDER, ELBOW, THIGH):
-                wait_until(lambda joint=joint: turns(joint, TURN), lambda: box.words)
+                wait_until(lambda joint=joint: turns(joint, TURN), lambda: box.output)
             listed = box.listed_sensors()
             assert {name: one["way"] for name, one in listed.items()} == {
                 "phone-app": "gyrosc",
                 "tracker": "slimevr",
                 "suit": "mocopi",
             }
-        wait_until(lambda: turns(SHOULDER, 0.0), lambda: box.words)  # silent: the joint is given back
+        wait_until(lambda: turns(SHOULDER, 0.0), lambda: box.output)  # silent: the joint is given back
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
             one.sendto(datagram(("/gyrosc/quat", 2.0, 0.0, 0.0, 0.0)), (HOST, ports[0]))
-        box.await_words("Datagrams for phone-app at port")
+        box.await_output("Datagrams for phone-app at port")
         assert box.end() == 0
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output

@@ -43,7 +43,7 @@ def await_made(box: Box, reader: FrameReader, puppet: int = 0, **wanted: Any) ->
         recipe: dict[str, Any] = json.loads(puppets[puppet]["made"] or "{}") if puppets else {}
         return recipe if recipe and all(recipe.get(name) == value for name, value in wanted.items()) else None
 
-    return wait_until(danced, lambda: f"{wanted}\n{box.words}")
+    return wait_until(danced, lambda: f"{wanted}\n{box.output}")
 
 
 def test_varied_kept_killed_and_danced_again(show: Path, tmp_path: Path) -> None:
@@ -64,12 +64,14 @@ def test_varied_kept_killed_and_danced_again(show: Path, tmp_path: Path) -> None
         await_made(box, reader, sigma=2.0)
         assert desk.order("/motion/again")[2] == 1
         wild = await_made(box, reader, sigma=2.0)
-        wait_until(lambda: await_made(box, reader, sigma=2.0)["seed"] >= 1001, lambda: f"{wild}\n{box.words}")
+        wait_until(
+            lambda: await_made(box, reader, sigma=2.0)["seed"] >= 1001, lambda: f"{wild}\n{box.output}"
+        )
 
         (generator,) = children_running(box.process.pid, "generate")
         os.kill(generator, signal.SIGKILL)
         box.frames(50)  # the dance goes on
-        box.await_words("The generator was killed")
+        box.await_output("The generator was killed")
         last = await_made(box, reader, sigma=2.0)
         await_made(box, reader, sigma=2.0, seed=last["seed"] + 1)  # it is back, and goes on where it was
         assert any("generator-died" in answer for answer in desk.ask_all("/fallbacks"))
@@ -97,7 +99,7 @@ def test_varied_kept_killed_and_danced_again(show: Path, tmp_path: Path) -> None
         assert await_made(box, reader, 1, source="vary")["seed"] >= other["seed"]
         wait_until(lambda: (tmp_path / "state/kept/anna.material").exists(), "nothing was kept on the disk")
         assert box.end() == 0
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output
     done = run_bunraku("replay", tmp_path / "run.journal")
     assert done.returncode == 0 and "were not:" not in done.stdout, done.stdout + done.stderr
 
@@ -120,5 +122,5 @@ def test_varied_kept_killed_and_danced_again(show: Path, tmp_path: Path) -> None
         cut_power(box, place)
         box.start()
         await_made(box, reader, source="improvise", temperature=0.25)
-        assert "After a power cut the show goes on" in box.words
+        assert "After a power cut the show goes on" in box.output
         assert box.end() == 0

@@ -121,7 +121,7 @@ def test_a_keeper_that_hangs_or_dies_costs_no_tick_of_the_journal(show: Path, tm
         frames = box.frames(100)
         assert frames[-1][0] >= keeper_stopped + 100
         os.kill(keeper, signal.SIGKILL)
-        box.await_words("The keeper was killed")
+        box.await_output("The keeper was killed")
         wait_until(lambda: len(segment_paths(journal)) >= 2, "the next keeper began no segment of its own")
         assert box.end() == 0
     (run,) = read_journal(journal).runs
@@ -133,4 +133,4 @@ def test_a_file_in_place_of_the_journal_is_refused(show: Path, tmp_path: Path) -
     (tmp_path / "old.journal").write_bytes(b"bunraku journal 1\n")
     with playing(show, tmp_path, "--journal", str(tmp_path / "old.journal")) as box:
         assert box.process.wait(PATIENCE_S) == 2
-    assert "is a file, and a journal is a folder" in box.words
+    assert "is a file, and a journal is a folder" in box.output

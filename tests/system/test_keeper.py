@@ -59,7 +59,7 @@ class Keeper(Process):
     def dance(self, ticks: int, kept: int) -> None:
         """Dance more ticks, and wait until the disk has `kept` in all."""
         self.night.dance(ticks)
-        wait_until(lambda: self.kept_ticks() == kept, lambda: self.words)
+        wait_until(lambda: self.kept_ticks() == kept, lambda: self.output)
 
     def follow_place(self, ended: bool = False) -> None:
         """Move the checkpoint on, and wait until the disk has it."""
@@ -67,7 +67,7 @@ class Keeper(Process):
         place = Checkpoint("A show", (Standing("main", self.position_s, (0.0, 30.0)),))
         self.place.write(replace(place, ended=ended))
         wait_until(
-            lambda: self.kept_place() == self.position_s, lambda: f"the disk stays behind: {self.words}"
+            lambda: self.kept_place() == self.position_s, lambda: f"the disk stays behind: {self.output}"
         )
 
     def kept_place(self) -> float | None:
@@ -105,15 +105,15 @@ def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Pat
         for _ in range(3):
             keeper.follow_place()
         wait_until(lambda: keeper.fallbacks() == {JOURNAL_STOPPED.name}, "the fallback is not reported")
-        assert "The journal: the disk has not answered for 5 s" in keeper.words
+        assert "The journal: the disk has not answered for 5 s" in keeper.output
         keeper.follow_place()
         assert keeper.end() == 0
-        assert "The journal: the disk does not answer" in keeper.words
+        assert "The journal: the disk does not answer" in keeper.output
         keeper.start()  # the process that still hangs holds nothing that this one needs
         keeper.follow_place()
         keeper.follow_place(ended=True)
-    wait_until(lambda: keeper.kept_ticks() == 100, lambda: keeper.words)
-    wait_until(lambda: not keeper.fallbacks(), lambda: keeper.words)
+    wait_until(lambda: keeper.kept_ticks() == 100, lambda: keeper.output)
+    wait_until(lambda: not keeper.fallbacks(), lambda: keeper.output)
     assert keeper.end() == 0
     (run,) = read_journal(keeper.journal).runs
     numbers = run.tick_numbers.tolist()
@@ -128,7 +128,7 @@ def test_the_rest_that_a_keeper_left_does_not_wait_for_a_disk_that_hangs(disk: P
     with disks.frozen(disk):
         keep_rest(load_box(keeper.box_file), keeper.runtime, keeper.journal, 1.0, said.append)
         assert keeper.kept_place() == 7.5
-    assert any("The journal: the disk does not answer" in words for words in said)
+    assert any("The journal: the disk does not answer" in message for message in said)
 
 
 def test_a_file_that_does_not_answer_holds_up_its_own_mirror_alone(tmp_path: Path) -> None:
@@ -152,10 +152,10 @@ def test_a_journal_of_another_release_costs_neither_place_nor_keeper(keeper: Kee
         other.rings[0].write(b"\xff\xfe")
         other.publish()
         keeper.follow_place()
-        wait_until(lambda: JOURNAL_STOPPED.name in keeper.fallbacks(), lambda: keeper.words)
+        wait_until(lambda: JOURNAL_STOPPED.name in keeper.fallbacks(), lambda: keeper.output)
         keeper.follow_place()
     assert keeper.process.poll() is None
-    assert "Traceback" not in keeper.words
+    assert "Traceback" not in keeper.output
 
 
 def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper) -> None:
@@ -165,8 +165,8 @@ def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper
         os.kill(process, signal.SIGKILL)
     keeper.follow_place()
     keeper.dance(20, kept=40)
-    assert "has died" in keeper.words
-    wait_until(lambda: "carried to the disk again" in keeper.words, lambda: keeper.words)
+    assert "has died" in keeper.output
+    wait_until(lambda: "carried to the disk again" in keeper.output, lambda: keeper.output)
     assert keeper.end() == 0
 
 

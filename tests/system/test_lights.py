@@ -62,8 +62,8 @@ def test_lights_move_with_the_dance_obey_show_control_and_end_dark(tmp_path: Pat
         assert is_dark(lamp.levels[1])
         assert any(lamp.levels[1][PAN:DIMMER])
         assert lamp.levels[2] == bytes(512)
-        assert "Lights: 3 fixtures by Art-Net" in box.words
-        assert "Traceback" not in box.words
+        assert "Lights: 3 fixtures by Art-Net" in box.output
+        assert "Traceback" not in box.output
 
 
 def test_a_killed_stage_leaves_the_safe_look_and_the_dance_returns_with_the_next(tmp_path: Path) -> None:
@@ -73,10 +73,10 @@ def test_a_killed_stage_leaves_the_safe_look_and_the_dance_returns_with_the_next
         box.end(signal.SIGKILL)
         lamp.await_safe()
         assert time.monotonic() - killed > 1.0  # it waits for a second and fades for another
-        lights.await_words("No frame from the stage")
+        lights.await_output("No frame from the stage")
         box.kill_and_restart()
         lamp.await_dance()
-        lights.await_words("The stage dances, and the lights with it.")
+        lights.await_output("The stage dances, and the lights with it.")
         assert lights.end() == 0
         lamp.receive()
         assert lamp.levels[1][PAR] == round(255 * SAFE)  # the safe look leaves this one on
@@ -136,7 +136,7 @@ def test_killed_lights_are_started_again_by_the_box(tmp_path: Path) -> None:
         running = children_running(box.process.pid, "lights")
         assert len(running) == 1
         os.kill(running[0], signal.SIGKILL)
-        box.await_words("Lights: 3 fixtures", count=2)
+        box.await_output("Lights: 3 fixtures", count=2)
         lamp.receive()
         lamp.levels.clear()
         lamp.await_dance()
@@ -158,9 +158,9 @@ def test_a_missing_widget_does_not_affect_other_wires(tmp_path: Path) -> None:
         settings["outputs"]["dmx"].append(missing)
         with playing(show, tmp_path, settings=settings) as box:
             lamp.await_dance()
-            box.await_words("ttyUSB9")
+            box.await_output("ttyUSB9")
             assert box.end() == 0
-            assert "Traceback" not in box.words
+            assert "Traceback" not in box.output
 
 
 def await_widget(widget: UsbProWidget, is_wanted: Callable[[bytes], bool]) -> None:
@@ -173,7 +173,7 @@ def test_by_usb_the_same_levels_arrive(tmp_path: Path) -> None:
         wires = [{"universe": 1, "wire": "usb-pro", "device": str(widget.path)}]
         with playing(show, tmp_path, settings={"outputs": {"dmx": wires}}) as box:
             await_widget(widget, lambda levels: levels[DIMMER] == 255 and levels[PAR] == 255)
-            box.await_words("Universe 2 has no wire, so these stay dark: second.")
+            box.await_output("Universe 2 has no wire, so these stay dark: second.")
             assert box.end() == 0
             await_widget(widget, is_dark)
 
@@ -200,7 +200,7 @@ def test_blackout_outlasts_the_lights_and_the_box(tmp_path: Path) -> None:
         lamp.arrivals.clear()
         [lights] = children_running(box.process.pid, "lights")
         os.kill(lights, signal.SIGTERM)
-        box.await_words("Lights: 3 fixtures", count=2)
+        box.await_output("Lights: 3 fixtures", count=2)
         box.frames(50)
         assert box.end() == 0
         lamp.receive()

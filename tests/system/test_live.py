@@ -78,7 +78,7 @@ def await_elbow(box: Box, reader: FrameReader, radians: float) -> None:
         turned = float(quaternion.angle_between(frame.puppets[0].pose[ELBOW], quaternion.IDENTITY))
         return abs(turned - radians) < 0.01
 
-    wait_until(has_it, lambda: box.words)
+    wait_until(has_it, lambda: box.output)
 
 
 def has_begun(reader: FrameReader, seen: int) -> bool:
@@ -98,18 +98,18 @@ def test_a_live_dancer_comes_falls_silent_comes_back_and_goes(show: Path, tmp_pa
         with streaming(box.control, 0.8):
             await_elbow(box, reader, 0.8)
         await_elbow(box, reader, 0.0)  # silent: the phrase plays on
-        box.await_words("No live dancer is heard: the phrase plays on")
+        box.await_output("No live dancer is heard: the phrase plays on")
         with streaming(box.control, 0.4):
             await_elbow(box, reader, 0.4)
-            box.await_words("The live dancer takes the phrase's place")
+            box.await_output("The live dancer takes the phrase's place")
             seen = reader.generation
             box.kill_and_restart()
-            wait_until(lambda: has_begun(reader, seen), lambda: box.words)
+            wait_until(lambda: has_begun(reader, seen), lambda: box.output)
             await_elbow(box, reader, 0.4)  # the stage starts again with its guest
             assert desk.order("/phrase", "main", 0.2)[2] == 1
             await_elbow(box, reader, 0.0)
         assert box.end() == 0
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output
 
 
 def test_a_camera_programs_points_move_the_figure(show: Path, tmp_path: Path) -> None:
@@ -120,12 +120,12 @@ def test_a_camera_programs_points_move_the_figure(show: Path, tmp_path: Path) ->
     ):
         box.frames(1)
         with sending(box.control, "/mocap/0/joint/pos_world", points_of(0.8)):
-            wait_until(lambda: "COCO's 17 points" in desk.status().live, lambda: box.words)
+            wait_until(lambda: "COCO's 17 points" in desk.status().live, lambda: box.output)
             assert desk.order("/phrase", "live", 0.2)[2] == 1
             await_elbow(box, reader, 0.8)
         await_elbow(box, reader, 0.0)  # silent: the phrase plays on
         assert box.end() == 0
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output
 
 
 def lost_at(port: int) -> int:

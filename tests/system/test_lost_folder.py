@@ -85,7 +85,7 @@ def test_a_folder_that_is_deleted_comes_back_and_commands_with_it(tmp_path: Path
         wait_until(lambda: page.does("/panic"))
         shutil.rmtree(box.runtime, ignore_errors=True)  # meanwhile it may be there again
         wait_until(lambda: (box.runtime / "frame").exists() and (box.runtime / "control.health").exists())
-        wait_until(lambda: "was deleted" in box.words)
+        wait_until(lambda: "was deleted" in box.output)
         wait_until(lambda: any(one["name"] == "folder-lost" for one in page.status()["fallbacks"]))
         (control,) = children_running(box.process.pid, "appliance.show_control")
         os.kill(control, signal.SIGKILL)

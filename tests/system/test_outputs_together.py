@@ -58,5 +58,5 @@ def test_what_goes_wrong_is_found(figures: dict[str, Any]) -> None:
         "statuses": {**figures["statuses"], "stage": -9},
     }
     said = "\n".join(faults(worse))
-    for words in ("vmc: 4 of 900", "lamp 1: followed in 8 of 9", "stage ended", "2 datagrams", "50 to 90"):
-        assert words in said
+    for message in ("vmc: 4 of 900", "lamp 1: followed in 8 of 9", "stage ended", "2 datagrams", "50 to 90"):
+        assert message in said

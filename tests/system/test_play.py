@@ -49,7 +49,7 @@ def test_frames_leave_on_a_grid_of_20_ms_and_carry_the_readings(show: Path, tmp_
     with playing(show, tmp_path, settings=JOURNAL) as box, box.wearables():
         box.frame_that(lambda frame: frame[2] > 20)
         frames = box.frames(100)
-        box.await_words("Hz  tick")
+        box.await_output("Hz  tick")
         assert box.end() == 0
     numbers = [frame[0] for frame in frames]
     assert numbers == sorted(set(numbers))
@@ -57,7 +57,7 @@ def test_frames_leave_on_a_grid_of_20_ms_and_carry_the_readings(show: Path, tmp_
     periods = np.diff(ticks["frame_time"]) / np.diff(ticks["tick"])
     assert np.abs(periods - 0.02).max() <= 0.0002 + 1e-9  # the grid holds on a busy machine too
     assert max(frame[2] for frame in frames) > 20
-    assert "left-wrist holds lShldr" in box.words
+    assert "left-wrist holds lShldr" in box.output
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -68,14 +68,14 @@ def test_a_signal_in_the_middle_ends_the_dance_cleanly(show: Path, tmp_path: Pat
         assert box.end(number) == 0
         assert is_free(box.sensors)
         assert is_free(box.control)
-        assert "Danced" in box.words
-        assert "Traceback" not in box.words
+        assert "Danced" in box.output
+        assert "Traceback" not in box.output
 
 
 def test_ends_by_itself_after_its_seconds(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path, "--seconds", "0.5") as box:
         assert box.process.wait(PATIENCE_S) == 0
-    assert "Danced" in box.words
+    assert "Danced" in box.output
 
 
 @pytest.mark.parametrize("taken", ["sensors", "control"])
@@ -92,9 +92,9 @@ def test_a_port_that_is_taken_is_named_with_what_to_do(show: Path, tmp_path: Pat
         }
         with playing(show, second, settings=settings) as refused:
             assert refused.process.wait(PATIENCE_S) == 2
-            assert f"UDP port {ports[taken]}" in refused.words
-            assert "second bunraku" in refused.words
-            assert "Traceback" not in refused.words
+            assert f"UDP port {ports[taken]}" in refused.output
+            assert "second bunraku" in refused.output
+            assert "Traceback" not in refused.output
         first.frames(5)
 
 
@@ -102,7 +102,7 @@ def test_a_missing_receiver_does_not_disturb_the_other(show: Path, tmp_path: Pat
     [unused] = free_ports(1)
     with playing(show, tmp_path, more_receivers=[{"host": HOST, "port": unused}]) as box:
         frames = box.frames(120)
-        box.await_words(f"{HOST}:{unused} (ai-toolbox) does not get the dance")
+        box.await_output(f"{HOST}:{unused} (ai-toolbox) does not get the dance")
         assert box.end() == 0
     assert len({frame[0] for frame in frames}) == len(frames)
 
@@ -111,8 +111,8 @@ def test_without_real_time_rights_it_dances_and_says_what_that_costs(show: Path,
     with playing(show, tmp_path, command=WITHOUT_RIGHTS) as box:
         box.frames(20)
         assert box.end() == 0
-    assert "No real-time priority" in box.words
-    assert "Memory is not locked" in box.words
+    assert "No real-time priority" in box.output
+    assert "Memory is not locked" in box.output
 
 
 def test_the_whole_box_runs_where_torch_and_the_simulation_cannot_be_imported(
@@ -120,7 +120,7 @@ def test_the_whole_box_runs_where_torch_and_the_simulation_cannot_be_imported(
 ) -> None:
     with playing(show, tmp_path, command=WITHOUT_TORCH) as box:
         box.frames(20)
-        assert box.end() == 0, box.words
+        assert box.end() == 0, box.output
 
 
 def test_a_flood_of_bad_datagrams_moves_nothing(
@@ -137,12 +137,12 @@ def test_a_flood_of_bad_datagrams_moves_nothing(
         box.frame_that(lambda frame: frame[2] > before)  # readings arrive again
         box.frames(50)
         assert box.end() == 0
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output
     ticks = read_journal(tmp_path / "run.journal").ticks
     assert not (ticks["flags"] & NOT_FINITE).any()
     assert np.isfinite(ticks["pose"]).all()
     assert float(np.median(ticks["sections_ms"].sum(axis=1))) < 20.0
-    assert "refused" in box.words  # counted, and reported at the end
+    assert "refused" in box.output  # counted, and reported at the end
 
 
 def test_a_network_that_gives_no_numbers_holds_the_last_good_pose(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_a_network_that_gives_no_numbers_holds_the_last_good_pose(tmp_path: Path
     with playing(fragile, tmp_path, settings=JOURNAL) as box:
         box.frames(30)
         SimpleUDPClient(HOST, box.control).send_message("/iterations", [7, 6])
-        box.await_words("holds the last good pose")
+        box.await_output("holds the last good pose")
         box.frames(30)
         assert box.end() == 0
     ticks = read_journal(tmp_path / "run.journal").ticks
@@ -158,7 +158,7 @@ def test_a_network_that_gives_no_numbers_holds_the_last_good_pose(tmp_path: Path
     failed = (ticks["flags"] & NOT_FINITE) != 0
     assert failed[in_time & fails].all() and not failed[~fails].any() and fails.sum() > 20
     assert np.isfinite(ticks["pose"]).all()
-    assert "network not finite" in box.words
+    assert "network not finite" in box.output
 
 
 def test_commands_change_the_running_show(show: Path, tmp_path: Path) -> None:
@@ -173,7 +173,9 @@ def test_commands_change_the_running_show(show: Path, tmp_path: Path) -> None:
             box.frames(20)
 
         wait_until(
-            lambda: "No hand of this show holds 'Chest' by OSC" in box.words, lambda: box.words, send_commands
+            lambda: "No hand of this show holds 'Chest' by OSC" in box.output,
+            lambda: box.output,
+            send_commands,
         )
         box.receiver.poll()
         box.frames(80)
@@ -220,7 +222,7 @@ def test_emulated_sensors_come_and_go_with_the_run(
         box.frames(100)
         assert box.end() == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert str(picture) in box.words
+    assert str(picture) in box.output
     assert not emulators_at(box)
 
 

@@ -44,8 +44,8 @@ def fail_to_start(machine: Machine) -> None:
 
 
 def only_aside(machine: Machine) -> str:
-    [(_, words)] = machine.choice.aside
-    return words
+    [(_, message)] = machine.choice.aside
+    return message
 
 
 def dance_for_long(machine: Machine) -> None:
@@ -69,19 +69,19 @@ def power_on(machine: Machine) -> None:
 
 @pytest.mark.parametrize("arrival", ["the same stick", "a broken show"])
 def test_a_show_put_aside_stays_so_whatever_is_plugged_in_late(put_aside: Machine, arrival: str) -> None:
-    words = only_aside(put_aside)
+    message = only_aside(put_aside)
     if arrival == "a broken show":
         (put_aside.bring("Summer") / "puppet.onnx").unlink()
     late(put_aside, MID_SHOW)
     refused = " ".join(put_aside.choice.refused)
     assert ("puppet.onnx" in refused) == (arrival == "a broken show")
-    assert only_aside(put_aside) == words
-    assert words not in refused
+    assert only_aside(put_aside) == message
+    assert message not in refused
     dance_for_long(put_aside)
     (put_aside.stick / "show").rename(put_aside.stick / "gone")
     power_on(put_aside)
     assert put_aside.dances == "Winter"
-    assert only_aside(put_aside) == words
+    assert only_aside(put_aside) == message
 
 
 def test_behind_a_new_show_that_dances_at_once_stands_the_one_that_danced_before(put_aside: Machine) -> None:

@@ -48,7 +48,7 @@ class Evening:
         """Which pair a stage takes that dies after `danced_s` (None: before its first frame)."""
 
         def begin() -> bytes:
-            pair = pair_to_dance(self.run / CHOSEN, time.monotonic(), lambda words: None)
+            pair = pair_to_dance(self.run / CHOSEN, time.monotonic(), lambda message: None)
             if danced_s is not None:
                 self._leave_frames(danced_s)
             return pair.id.encode()
@@ -90,9 +90,9 @@ def evening(tmp_path: Path) -> Evening:
 
 def test_a_new_show_that_does_not_dance_is_put_aside_at_the_fourth_start(evening: Evening) -> None:
     assert [evening.start(danced_s=None) for _ in range(4)] == [NEW, NEW, NEW, BEFORE]
-    [(put_aside, words)] = evening.choice.aside
+    [(put_aside, message)] = evening.choice.aside
     assert put_aside == NEW
-    assert "did not dance in 3 starts and is put aside" in words
+    assert "did not dance in 3 starts and is put aside" in message
 
 
 def test_a_new_show_that_crashes_after_some_frames_is_put_aside(evening: Evening) -> None:

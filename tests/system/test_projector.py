@@ -43,11 +43,11 @@ class Projection(Process):
         """Wait until such a picture is on the wall."""
 
         def is_there() -> bool:
-            assert self.process.poll() is None, self.words
+            assert self.process.poll() is None, self.output
             picture = self.newest()
             return picture is not None and is_wanted(picture)
 
-        wait_until(is_there, lambda: self.words)
+        wait_until(is_there, lambda: self.output)
 
     def await_black(self) -> None:
         self.await_picture(lambda picture: not picture.any())
@@ -69,7 +69,7 @@ def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Pa
         projection.await_black()
         with playing(write_show(tmp_path / "show", hands=[]), tmp_path) as box:
             projection.await_dance()
-            projection.await_words("No graphics card draws here")
+            projection.await_output("No graphics card draws here")
             box.end(signal.SIGKILL)
             projection.await_black()
         (tmp_path / "another").mkdir()
@@ -78,8 +78,8 @@ def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Pa
             projection.await_dance()
             assert projection.end() == 0
             box.frames(5)
-    assert re.search(r"Shown: [\d.]+ pictures/s, frame age at the swap \d+ ms p50", projection.words)
-    assert projection.words.count("No graphics card draws here") == 1  # once for two stages
+    assert re.search(r"Shown: [\d.]+ pictures/s, frame age at the swap \d+ ms p50", projection.output)
+    assert projection.output.count("No graphics card draws here") == 1  # once for two stages
 
 
 def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path: Path) -> None:
@@ -111,8 +111,8 @@ def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
         corners = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0)
         assert asker.order("/projector/corners", *corners)[2] == 1
         projection.await_picture(lambda seen: seen[40:].max() > 100 and not seen[:36].any())
-        done, words = asker.order("/projector/corner", 1, 1.0, 1.0)[2:]
-        assert not done and "fold" in words
+        done, message = asker.order("/projector/corner", 1, 1.0, 1.0)[2:]
+        assert not done and "fold" in message
         projection.end()
     with Projection(box.box_file, tmp_path) as projection:
         projection.await_picture(lambda seen: seen[40:].max() > 100 and not seen[:36].any())
@@ -136,13 +136,13 @@ def test_no_room_for_pictures(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (("--offscreen", "big"), "is no size"),
         (("--offscreen", "0x10"), "from 1 to"),
         (("--window", "--fullscreen"), "Give one of"),
     ],
 )
-def test_options_that_make_no_sense(arguments: tuple[str, ...], words: str) -> None:
+def test_options_that_make_no_sense(arguments: tuple[str, ...], message: str) -> None:
     done = run_bunraku("project", *arguments)
-    assert done.returncode == 2 and words in done.stderr.replace("\n", " ")
+    assert done.returncode == 2 and message in done.stderr.replace("\n", " ")

@@ -36,9 +36,9 @@ ON_A_TERMINAL = (
 )
 
 
-def bunraku(*words: str, stdin: str = "", status: int = 0) -> str:
+def bunraku(*arguments: str, stdin: str = "", status: int = 0) -> str:
     """The output of a command that ends with this status; repeated while a slow box does not answer."""
-    command, output = words, ""
+    command, output = arguments, ""
 
     def has_ended() -> bool:
         nonlocal command, output
@@ -46,20 +46,20 @@ def bunraku(*words: str, stdin: str = "", status: int = 0) -> str:
         output += done.stdout + done.stderr
         assert "Traceback" not in done.stderr
         assert done.returncode == status or "not answer" in output, output
-        if words[:2] not in (
+        if arguments[:2] not in (
             ("sensors", "strobe"),
             ("sensors", "neutral"),
         ):  # the key file is changed already
-            command = ("sensors", "reload", "--box", words[words.index("--box") + 1])
+            command = ("sensors", "reload", "--box", arguments[arguments.index("--box") + 1])
         return done.returncode == status
 
     wait_until(has_ended, lambda: output)
     return output
 
 
-def provision(bench: Bench, *words: str, status: int = 0, password: str = PASSWORD + "\n") -> str:
+def provision(bench: Bench, *arguments: str, status: int = 0, password: str = PASSWORD + "\n") -> str:
     network = ("--network", NETWORK) if password else ()
-    return bunraku("provision", "--port", bench.device, *network, *words, stdin=password, status=status)
+    return bunraku("provision", "--port", bench.device, *network, *arguments, stdin=password, status=status)
 
 
 def resting_box(folder: Path) -> str:
@@ -76,7 +76,7 @@ def await_state(box: Box, name: str, state: str) -> dict[str, Any]:
         sensor = box.listed_sensors().get(name, {})
         return sensor if sensor.get("state") == state else None
 
-    sensor = wait_until(listed, lambda: f"{name} is not {state}: {box.words}")
+    sensor = wait_until(listed, lambda: f"{name} is not {state}: {box.output}")
     assert sensor is not None
     return sensor
 
@@ -102,12 +102,12 @@ def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: P
 
         with Bench(box.sensors) as spare:
             bench.plug_in()
-            words = bunraku(
+            message = bunraku(
                 *("sensors", "replace", "left-wrist", "--port", spare.device, "--network", NETWORK),
                 *("--box", str(box.box_file)),
                 stdin=PASSWORD + "\n",
             )
-            assert "left-wrist has its new key" in words
+            assert "left-wrist has its new key" in message
             spare.pull_out()
             await_state(box, "left-wrist", "linked")
             assert spare.state == State.LINKED
@@ -116,7 +116,7 @@ def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: P
                 "sensors", "revoke", "left-wrist", "--anyway", "--box", str(box.box_file)
             )
             assert box.listed_sensors() == {}
-            box.await_words("but not left-wrist of this show: the dancer moves freely there")
+            box.await_output("but not left-wrist of this show: the dancer moves freely there")
             wait_until(lambda: spare.state != State.LINKED)
         assert box.end() == 0
 
@@ -128,9 +128,9 @@ def test_a_spare_takes_over_the_name_while_the_box_plays(show: Path, tmp_path: P
         provision(spare, "--name", "spare-1", "--box", str(box.box_file))
         spare.pull_out()
         await_state(box, "spare-1", "linked")
-        words = bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", str(box.box_file))
-        assert "left-wrist is now the sensor that was spare-1" in words
-        assert "took it" in words
+        message = bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", str(box.box_file))
+        assert "left-wrist is now the sensor that was spare-1" in message
+        assert "took it" in message
         box.frame_that(lambda frame: frame[2] > 0)
         assert box.listed_sensors()["left-wrist"]["state"] == "linked"
         assert box.listed_sensors()["spare-1"]["id"] == f"{before['left-wrist'].device_id:08x}"
@@ -172,10 +172,10 @@ def test_a_cable_pulled_at_the_save_is_mended_by_another_run(tmp_path: Path) -> 
         provision(bench, "--name", "left-wrist", "--box", resting_box(tmp_path), password="")
         first = load_keys(keys)
         bench.pulls_at = b"save\n"
-        words = provision(
+        message = provision(
             bench, "--name", "left-wrist", "--box", resting_box(tmp_path), password="", status=2
         )
-        assert "may or may not have its new key" in words
+        assert "may or may not have its new key" in message
         assert load_keys(keys) == first
         bench.plug_in()
         provision(bench, "--name", "left-wrist", "--box", resting_box(tmp_path), password="")
@@ -195,10 +195,10 @@ def test_a_box_that_holds_the_cable_is_named(show: Path, tmp_path: Path) -> None
         settings = {"sensors": {"serial": [{"device": bench.device}]}}
         with playing(show, tmp_path, settings=settings) as box:
             box.frames(10)
-            words = provision(
+            message = provision(
                 bench, "--name", "left-wrist", "--box", str(box.box_file), password="", status=2
             )
-            assert "in use by another program. Stop the running bunraku" in words
+            assert "in use by another program. Stop the running bunraku" in message
             assert box.end() == 0
 
 
@@ -225,16 +225,16 @@ def test_the_password_is_read_on_the_terminal_without_echo(tmp_path: Path) -> No
     assert load_keys(keys)["head"].key.hex().encode() not in shown
 
 
-def read_until(master: int, words: bytes) -> bytes:
+def read_until(master: int, wanted: bytes) -> bytes:
     shown, until = b"", time.monotonic() + PATIENCE_S
-    while words not in shown:
+    while wanted not in shown:
         assert select.select([master], [], [], until - time.monotonic())[0], shown
         shown += os.read(master, 4096)
     return shown
 
 
-def as_processes(*words: str, stdin: str) -> subprocess.CompletedProcess[str]:
-    return run([*BUNRAKU, *words], input=stdin, timeout=120)
+def as_processes(*arguments: str, stdin: str) -> subprocess.CompletedProcess[str]:
+    return run([*BUNRAKU, *arguments], input=stdin, timeout=120)
 
 
 def test_no_secret_is_visible_to_other_users(
@@ -262,7 +262,7 @@ def test_no_secret_is_visible_to_other_users(
             said += bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", str(box.box_file))
             box.frame_that(lambda frame: frame[2] > 0)
             assert box.end() == 0
-            said += box.words
+            said += box.output
     finally:
         os.umask(before)
     seen = b"".join(snoop.seen)

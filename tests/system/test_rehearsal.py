@@ -28,7 +28,7 @@ def rehearse(box: Box, *arguments: str) -> None:
     venue, box.command = box.command, [*box.command, "--emulate", *arguments]
     box.kill_and_restart()
     box.frame_that(lambda frame: frame[2] > 5)
-    assert box.end() == 0, box.words
+    assert box.end() == 0, box.output
     box.command = venue
 
 
@@ -49,8 +49,8 @@ def test_a_rehearsal_changes_no_file_of_the_venue_and_the_show_goes_on_afterward
         rehearse(box, "--journal", str(tmp_path / "rehearsed"))
         assert {name: files_of(tmp_path / name) for name in kept} == kept
         assert {name: (runtime / name).read_bytes() for name in noted} == noted
-        assert "A rehearsal" in box.words
-        assert "the show goes on" not in box.words
+        assert "A rehearsal" in box.output
+        assert "the show goes on" not in box.output
         assert len(read_journal(tmp_path / "rehearsed").ticks)
         assert {path.name for path in runtime.iterdir() if path.is_dir()} <= {"prepared"}
 
@@ -58,9 +58,9 @@ def test_a_rehearsal_changes_no_file_of_the_venue_and_the_show_goes_on_afterward
         rehearse(box)
         assert {name: files_of(tmp_path / name) for name in kept} == kept
         box.kill_and_restart()
-        box.await_words("After a restart of the stage the show goes on")
+        box.await_output("After a restart of the stage the show goes on")
         assert box.end() == 0
-        assert "Traceback" not in box.words
+        assert "Traceback" not in box.output
     assert read_memory((tmp_path / "state" / FILE_NAME).read_bytes())[1] == PROFILES
 
 
@@ -74,7 +74,7 @@ def test_a_killed_rehearsal_is_not_resumed(tmp_path: Path) -> None:
         box.kill_and_restart()
         box.frames(5)
         assert box.end() == 0
-        assert "the show goes on" not in box.words
+        assert "the show goes on" not in box.output
 
 
 def test_the_shared_frame_marks_a_rehearsal(tmp_path: Path) -> None:

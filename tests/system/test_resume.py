@@ -40,7 +40,7 @@ def await_kept_checkpoint(box: Box) -> None:
     """Wait until the keeper has written another checkpoint to the disk."""
     path = box.box_file.with_name("state") / FILE
     before = read_checkpoint(path)
-    wait_until(lambda: read_checkpoint(path) not in (None, before), lambda: box.words, box.pause)
+    wait_until(lambda: read_checkpoint(path) not in (None, before), lambda: box.output, box.pause)
 
 
 def danced(frames: list[list[Any]]) -> int:
@@ -56,8 +56,8 @@ def has_gone_on(from_s: float, to_s: float, least: int, most: int) -> bool:
 
 def goes_on_at(box: Box, count: int) -> float:
     """Where the phrase goes on, as the box reports it for the `count`-th time."""
-    box.await_words("goes on at", count)
-    return float(box.words.split("goes on at ")[count].split()[0])
+    box.await_output("goes on at", count)
+    return float(box.output.split("goes on at ")[count].split()[0])
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
@@ -82,7 +82,7 @@ def test_goes_on_at_the_same_place_however_it_died(show: Path, tmp_path: Path, h
             died_at.puppets[0].position_s, now.puppets[0].position_s, danced(frames) - 1, now.tick + 1
         )
         if how == signal.SIGABRT:  # the watchdog's: the traceback shows the line that hung
-            assert "Fatal Python error: Aborted" in box.words and "run.py" in box.words
+            assert "Fatal Python error: Aborted" in box.output and "run.py" in box.output
 
 
 def test_kills_in_a_row(show: Path, tmp_path: Path, long_run: bool) -> None:
@@ -111,7 +111,7 @@ def test_a_show_that_was_ended_begins_at_the_beginning(show: Path, tmp_path: Pat
         now = checkpoint_of(box)
         assert has_gone_on(0.0, now.puppets[0].position_s, 0, now.tick + 1)
         assert box.end() == 0
-        assert "the show goes on" not in box.words
+        assert "the show goes on" not in box.output
 
 
 def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Pa
         box.kill_and_restart()
         box.frames(2)
         assert box.end() == 0
-        assert "the show goes on" not in box.words
+        assert "the show goes on" not in box.output
 
 
 def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path)
         box.start()
         box.frames(5)
         assert goes_on_at(box, 1) == pytest.approx(on_disk.puppets[0].position_s, abs=0.051)
-        assert "After a power cut the show goes on" in box.words
+        assert "After a power cut the show goes on" in box.output
         assert checkpoint_of(box).power_cuts == 1
 
 
@@ -157,7 +157,7 @@ def test_the_box_file_decides_whether_it_goes_on(show: Path, tmp_path: Path, res
         box.kill_and_restart()
         box.frames(3)
         assert box.end() == 0
-        assert ("the show goes on" in box.words) == (resume == "after_crash")
+        assert ("the show goes on" in box.output) == (resume == "after_crash")
 
 
 def test_a_restart_measures_nothing_and_reads_no_phrase(show: Path, tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def await_fluent(box: Box, count: int) -> None:
             row = row + 1 if same < 4 else 0
         return row >= count
 
-    wait_until(is_fluent, lambda: box.words, lambda: None)
+    wait_until(is_fluent, lambda: box.output, lambda: None)
 
 
 def since_a_pause_s(ticks: np.ndarray) -> np.ndarray:
@@ -73,8 +73,8 @@ def test_a_sensor_switched_on_is_used_and_standing_still_gives_the_neutral_pose(
         box.wearables(on_sent=lambda one: sent.update({one.sample.sequence: one})) as wearables,
     ):
         box.frame_that(reading())
-        box.await_words("Sensor left-wrist: neutral pose taken. Dance.")
-        assert box.words.index("stands still for a breath now") < box.words.index("neutral pose taken")
+        box.await_output("Sensor left-wrist: neutral pose taken. Dance.")
+        assert box.output.index("stands still for a breath now") < box.output.index("neutral pose taken")
         still_from = box.frames(1)[-1][2]
         still_until = box.frame_that(reading(still_from + 30))[2]
         wearables.dance()
@@ -97,44 +97,44 @@ def test_killed_and_restarted_it_uses_the_readings_and_the_neutral_pose_again(
     show: Path, tmp_path: Path
 ) -> None:
     with playing(show, tmp_path) as box, box.wearables() as wearables:
-        box.await_words("neutral pose taken")
+        box.await_output("neutral pose taken")
         wearables.dance()
         before = box.frame_that(reading())[2]
         box.kill_and_restart()
         after = box.frame_that(reading())[2]
-        box.await_words("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
+        box.await_output("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
         assert box.end() == 0
         assert wearables.sensors[0].reboots == 0
     assert after > before  # the same power-on, still counting
-    assert box.words.count("neutral pose taken.") == 1
+    assert box.output.count("neutral pose taken.") == 1
 
 
 def test_after_a_power_cut_the_neutral_pose_is_used_again(show: Path, tmp_path: Path) -> None:
     """The sensor has a battery; the box loses its memory."""
     with playing(show, tmp_path) as box, box.wearables() as wearables:
-        box.await_words("neutral pose taken")
+        box.await_output("neutral pose taken")
         wearables.dance()
         wait_until((tmp_path / "sensors.memory").exists)
         box.end(signal.SIGKILL)
         await_end_of_keeper(tmp_path / "runtime")
         remove_folder(tmp_path / "runtime")
         box.kill_and_restart()
-        box.await_words("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
+        box.await_output("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
         assert box.end() == 0
-        assert box.words.count("neutral pose taken.") == 1
+        assert box.output.count("neutral pose taken.") == 1
 
 
 def test_out_of_reach_and_back_in_the_same_session(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path) as box, box.wearables() as wearables:
         box.frame_that(reading(20))
         wearables.radios[0].in_reach = False
-        box.await_words("Sensor left-wrist silent for")
+        box.await_output("Sensor left-wrist silent for")
         last = box.frames(1)[-1][2]
         wearables.radios[0].in_reach = True
         box.frame_that(reading(last))
-        box.await_words("Sensor left-wrist is back.")
+        box.await_output("Sensor left-wrist is back.")
         assert box.end() == 0
-    assert "Danced" in box.words
+    assert "Danced" in box.output
 
 
 def test_lost_for_longer_than_a_link_lasts_it_pairs_again(show: Path, tmp_path: Path) -> None:
@@ -144,7 +144,7 @@ def test_lost_for_longer_than_a_link_lasts_it_pairs_again(show: Path, tmp_path: 
         for linked in (False, True):  # it gives up the box after three seconds, then finds it again
             until = time.monotonic() + PATIENCE_S
             while wearables.sensors[0].is_linked != linked:
-                assert time.monotonic() < until, box.words
+                assert time.monotonic() < until, box.output
                 last = box.frames(1)[-1][2]  # the network may still deliver readings of the old session
             wearables.radios[0].in_reach = True
         box.frame_that(reading(last))
@@ -153,13 +153,13 @@ def test_lost_for_longer_than_a_link_lasts_it_pairs_again(show: Path, tmp_path: 
 
 def test_switched_off_and_on_its_joint_goes_on_without_standing_still(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path) as box, box.wearables() as wearables:
-        box.await_words("neutral pose taken")
+        box.await_output("neutral pose taken")
         wearables.dance()
         boot_nonce = wearables.sensors[0].boot_nonce
         before = box.frame_that(reading())[2]
         wearables.do(lambda now: wearables.sensors[0].switch_off(now, 1.0))
         box.frame_that(lambda frame: 0 <= frame[2] < before)  # it counts from zero
-        box.await_words("Sensor left-wrist is on again: its joint goes on where it was.")
+        box.await_output("Sensor left-wrist is on again: its joint goes on where it was.")
         assert wearables.sensors[0].boot_nonce != boot_nonce
         assert box.end() == 0
 
@@ -169,13 +169,13 @@ def test_a_double_tap_takes_the_neutral_pose_again(show: Path, tmp_path: Path) -
         playing(show, tmp_path) as box,
         box.wearables(motion=lambda _: lambda t_s: (1.0, 0.0, 0.0, 0.0)) as wearables,
     ):
-        box.await_words("neutral pose taken")
+        box.await_output("neutral pose taken")
 
         def tap(now: float) -> None:
             wearables.sensors[0].taps += 1
 
         wearables.do(tap)
-        box.await_words("neutral pose taken", count=2)
+        box.await_output("neutral pose taken", count=2)
         assert box.end() == 0
 
 
@@ -192,10 +192,10 @@ def test_eight_sensors_at_once_and_the_list_of_them(tmp_path: Path) -> None:
         assert len({one["way"] for one in sensors.values()}) == 8
         assert {one["firmware"] for one in sensors.values()} == {"1.0.0"}
         for name in EIGHT[: len(MOVING)]:
-            box.await_words(f"Sensor {name}: neutral pose taken")
+            box.await_output(f"Sensor {name}: neutral pose taken")
         await_sensors(box, lambda one: 0 < (one["round_trip_s"] or 0) < 1.0)
         assert box.end() == 0
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output
 
 
 def test_from_the_network_to_a_cable_and_back(show: Path, tmp_path: Path) -> None:
@@ -203,12 +203,12 @@ def test_from_the_network_to_a_cable_and_back(show: Path, tmp_path: Path) -> Non
     serial = {"sensors": {"serial": [{"device": str(cable.far)}]}}
     with playing(show, tmp_path, settings=serial) as box, box.wearables(cable=cable.near) as wearables:
         first = box.frame_that(reading(20))[2]
-        box.await_words("Sensor left-wrist is linked by 127.0.0.1:")
+        box.await_output("Sensor left-wrist is linked by 127.0.0.1:")
         with cable:
-            box.await_words(f"Sensor left-wrist now speaks by {cable.far}. The dance goes on.")
+            box.await_output(f"Sensor left-wrist now speaks by {cable.far}. The dance goes on.")
             on_cable = box.frame_that(reading(first + 30))[2]
-        box.await_words("Sensor left-wrist now speaks by 127.0.0.1:")
+        box.await_output("Sensor left-wrist now speaks by 127.0.0.1:")
         box.frame_that(reading(on_cable))
         assert wearables.sensors[0].reboots == 0
         assert box.end() == 0
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output

@@ -104,7 +104,7 @@ def test_without_room_for_the_frames_the_dance_goes_on_and_says_so(show: Path, t
     with playing(show, tmp_path, "--alone", command=command) as box:
         frames = box.frames(60)
         assert [frame[3] for frame in frames].count(0) > 0
-        box.await_words("the frames cannot be shared (No space left on device). The dance goes on")
+        box.await_output("the frames cannot be shared (No space left on device). The dance goes on")
         assert box.end() == 0
 
 

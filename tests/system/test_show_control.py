@@ -91,8 +91,8 @@ def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_p
             box.control = port
             box.frames(1)
 
-            def send(*words: str) -> None:
-                subprocess.run(["oscsend", HOST, str(port), *words], check=True)
+            def send(*arguments: str) -> None:
+                subprocess.run(["oscsend", HOST, str(port), *arguments], check=True)
 
             def says(**wanted: str) -> bool:
                 line = re.compile(r"/bunraku/status/(\w+) \w \"?([^\"\n]*)\"?$", re.M)
@@ -166,7 +166,7 @@ def test_cues_stop_and_go_reach_the_dance_and_are_answered(show: Path, tmp_path:
     stood = max((run for run in runs if not moves[run[0]]), key=len)  # a late tick is one that stands, too
     assert len(stood) >= 5
     assert moves[stood[-1] + 1 :].sum() > 20  # and it went on
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output
 
 
 @pytest.mark.parametrize("command", [PLAY, STOPPING], ids=["anywhere", "within a tick"])
@@ -223,7 +223,7 @@ def test_a_cue_called_while_the_dance_is_away_is_in_force_when_it_comes_back(
         box.kill_and_restart()
         await_status(asker, state="dancing", cue="storm", coding=4, interaction=3)
         assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0, "orientation"]
-        box.await_words("the show goes on in the cue 'calm'")
+        box.await_output("the show goes on in the cue 'calm'")
         assert box.end() == 0
 
 
@@ -240,13 +240,13 @@ def test_a_killed_box_leaves_no_process_behind_and_panic_is_in_force_when_it_com
         wait_until(lambda: not Path(f"/proc/{control}").exists())
         box.kill_and_restart()
         with asking(box) as asker:
-            box.await_words("Still from before: Panic is in force")
-            box.await_words("the show goes on in the cue 'storm'")
+            box.await_output("Still from before: Panic is in force")
+            box.await_output("the show goes on in the cue 'storm'")
             assert status(asker)["panic"] == 1
             assert asker.ask("/go")[2] == 1
             await_status(asker, state="dancing", cue="storm")
             assert box.end() == 0
-    assert "Traceback" not in box.words
+    assert "Traceback" not in box.output
 
 
 def test_a_show_that_ends_as_usual_leaves_nothing_in_force(show: Path, tmp_path: Path) -> None:

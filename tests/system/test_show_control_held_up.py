@@ -36,8 +36,8 @@ def test_a_flood_does_not_touch_the_dance(show: Path, tmp_path: Path) -> None:
     assert numbers[-1] > before
     ticks = read_journal(tmp_path / "run.journal").ticks
     assert float(np.median(ticks["sections_ms"].sum(axis=1))) < 20.0
-    assert "refused, the last one" in box.words
-    assert "Traceback" not in box.words
+    assert "refused, the last one" in box.output
+    assert "Traceback" not in box.output
 
 
 def test_a_full_pipe_at_the_output_blocks_no_panic(show: Path, tmp_path: Path) -> None:
@@ -46,11 +46,11 @@ def test_a_full_pipe_at_the_output_blocks_no_panic(show: Path, tmp_path: Path) -
     [port] = free_ports(1)
     (tmp_path / "box.yaml").write_text(yaml.safe_dump({"runtime": "runtime", "control": {"port": port}}))
     command = [*PLAY, "--show", str(show), "--box", str(tmp_path / "box.yaml")]
-    box_words = b"x" * 4096
+    unread = b"x" * 4096
     os.set_blocking(writing, False)
     with contextlib.suppress(BlockingIOError):
         while True:
-            os.write(writing, box_words)
+            os.write(writing, unread)
     os.set_blocking(writing, True)
     running = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=writing, stderr=subprocess.DEVNULL)
     try:

@@ -33,8 +33,8 @@ def test_show_control_that_is_killed_comes_back_and_misses_nothing(show: Path, t
         assert show_state(box)[MASTER].value == 0.5
         assert control_of(box.process.pid) != control
         assert box.end() == 0
-    assert "Show control was killed (signal 9)." in box.words
-    assert "Still from before: Panic is in force" in box.words
+    assert "Show control was killed (signal 9)." in box.output
+    assert "Still from before: Panic is in force" in box.output
 
 
 def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_both(
@@ -43,7 +43,7 @@ def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_bo
     """As separate units: `bunraku play --alone` and `bunraku control`."""
     with playing(show, tmp_path, "--alone") as box:
         control = [*CONTROL, box.box_file]
-        box.await_words("commands by another process")
+        box.await_output("commands by another process")
         with Process(tmp_path / "control.txt", control) as first:
             with asking(box) as asker:
                 await_status(asker, state="dancing")

@@ -48,7 +48,7 @@ class Venue:
     ports: dict[str, int]
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
-    def words(self, name: str) -> str:
+    def output(self, name: str) -> str:
         """The output of a process so far."""
         return (self.folder / f"{name}.txt").read_text(errors="replace")
 
@@ -114,8 +114,8 @@ def venue(folder: Path, picture: str = "320x180") -> Iterator[Venue]:
         emulator += ["--stand-still", str(STAND_STILL_S)]
         emulator += ["--keys", str(folder / "sensors.keys"), "--port", str(sensors)]
         projector = [*BUNRAKU, "project", "--box", str(box), "--offscreen", picture]
-        for name, words in (("stage", stage), ("sensor", emulator), ("projector", projector)):
-            running.processes[name] = _start(opened, network.command(*words), folder / f"{name}.txt")
+        for name, arguments in (("stage", stage), ("sensor", emulator), ("projector", projector)):
+            running.processes[name] = _start(opened, network.command(*arguments), folder / f"{name}.txt")
         yield running
 
 
@@ -169,8 +169,8 @@ def _sockets(port: int) -> list[str]:
     return [row for rows in tables for row in rows if row.split()[1].endswith(f":{port:04X}")]
 
 
-def _start(opened: contextlib.ExitStack, command: Sequence[str], words: Path) -> subprocess.Popen[bytes]:
-    with words.open("wb") as out:
+def _start(opened: contextlib.ExitStack, command: Sequence[str], output: Path) -> subprocess.Popen[bytes]:
+    with output.open("wb") as out:
         process = start(command, out)
     opened.callback(_stop, process)
     return process

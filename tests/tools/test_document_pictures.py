@@ -28,9 +28,9 @@ def test_every_joint_but_fingers_and_eyes_is_named(tmp_path: Path, monkeypatch: 
     written: list[str] = []
     text = ImageDraw.ImageDraw.text
 
-    def noted(pen: ImageDraw.ImageDraw, at: tuple[float, float], words: str, **style: object) -> None:
-        written.append(words)
-        text(pen, at, words, **style)  # type: ignore[arg-type]
+    def noted(pen: ImageDraw.ImageDraw, at: tuple[float, float], message: str, **style: object) -> None:
+        written.append(message)
+        text(pen, at, message, **style)  # type: ignore[arg-type]
 
     monkeypatch.setattr(ImageDraw.ImageDraw, "text", noted)
     assert Image.open(draw_joints(tmp_path / "joints.png")).size == (960, 760)
@@ -40,7 +40,7 @@ def test_every_joint_but_fingers_and_eyes_is_named(tmp_path: Path, monkeypatch: 
 
 def test_each_limit_of_a_measurement_has_its_own_note() -> None:
     page = certificate_picture.verdict(_figures())
-    notes = [note_of(limit.words) for limit in page]
+    notes = [note_of(limit.label) for limit in page]
     assert len(set(notes)) == len(page)
     assert set(notes) == set(NOTES.values())
 
@@ -54,6 +54,7 @@ def _figures() -> dict[str, object]:
     """A measurement with every figure that has a limit."""
     percentiles = {"p50": 1.0, "p99": 1.0, "p999": 1.0, "max": 1.0}
     ways = ("transport_ms", "free_running_transport_ms", "response_ms", "tick_ms", "hand_to_light_ms")
+    ways = (*ways, "hand_to_sound_ms")
     soon = ("power_on_to_reading_s", "restart_to_reading_s", "kill_to_reading_s")
     return {
         **dict.fromkeys((*ways, *soon), percentiles),

@@ -65,15 +65,15 @@ class Machine:
         command += " -display none -device i6300esb -action watchdog=reset -device qemu-xhci,id=usb"
         command += " -netdev user,id=net -device virtio-net-pci,netdev=net,romfile= -device virtio-rng-pci"
         command += " -uuid 6c1f3c8e-6a55-4a0e-9a63-0b5a6c0b8d11 -chardev null,id=adapter"
-        words = ["qemu-system-aarch64" if self.is_pi else "qemu-system-x86_64", *command.split()]
+        arguments = ["qemu-system-aarch64" if self.is_pi else "qemu-system-x86_64", *command.split()]
         pc = ["-machine", "q35", "-cpu", "max", "-m", "2048", *_uefi()]
-        words += self._loader() if self.is_pi else pc
-        words += ["-drive", f"file={self.disk},format=raw,if=none,id=disk,discard=unmap"]
-        words += ["-device", "virtio-blk-pci,drive=disk"]
+        arguments += self._loader() if self.is_pi else pc
+        arguments += ["-drive", f"file={self.disk},format=raw,if=none,id=disk,discard=unmap"]
+        arguments += ["-device", "virtio-blk-pci,drive=disk"]
         console = f"socket,id=tty,path={self.console.path},server=on,wait=off"
-        words += ["-chardev", console, "-serial", "chardev:tty"]
-        words += ["-monitor", f"unix:{self.folder / 'monitor'},server=on,wait=off"]
-        return words
+        arguments += ["-chardev", console, "-serial", "chardev:tty"]
+        arguments += ["-monitor", f"unix:{self.folder / 'monitor'},server=on,wait=off"]
+        return arguments
 
     def _loader(self) -> list[str]:
         """What a Pi's loader does: kernel, start image and command line from the boot partition.
@@ -87,8 +87,8 @@ class Machine:
         # Linux takes one number of a kind of serial port; a Pi 5's is 10.
         options = (self.folder / "cmdline.txt").read_text().strip().replace("ttyAMA10,115200", "ttyAMA0")
         # The memory that docs/hardware.md names: the check of a show may take a fifth of it.
-        words = ["-machine", "virt,gic-version=2", "-cpu", "cortex-a72", "-m", "4096", "-append", options]
-        return [*words, "-kernel", str(self.folder / "linux"), "-initrd", str(self.folder / "initrd")]
+        arguments = ["-machine", "virt,gic-version=2", "-cpu", "cortex-a72", "-m", "4096", "-append", options]
+        return [*arguments, "-kernel", str(self.folder / "linux"), "-initrd", str(self.folder / "initrd")]
 
 
 class Console:
@@ -142,9 +142,9 @@ class Console:
         before, self._read = self._read[: found.end()], self._read[found.end() :]
         return before
 
-    def type(self, words: str) -> None:
+    def type(self, text: str) -> None:
         assert self._line is not None, "the machine is off"
-        self._line.sendall(words.encode())
+        self._line.sendall(text.encode())
 
     def log_in(self, within_s: float = 600.0) -> None:
         """Logs in as root, which the image allows at the rack."""

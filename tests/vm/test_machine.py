@@ -48,9 +48,9 @@ class Box:
         """From the kernel's first moment to the stage's first frame; its unit is ready when that has left."""
         return int(self.stage("ActiveEnterTimestampMonotonic")) / 1e6
 
-    def note(self, words: str) -> None:
-        self.measured.append(words)
-        print(words, flush=True)
+    def note(self, output: str) -> None:
+        self.measured.append(output)
+        print(output, flush=True)
 
 
 @pytest.fixture(scope="module")

@@ -56,14 +56,14 @@ def root(pytestconfig: pytest.Config) -> Path:
     return BUILT
 
 
-def bunraku_on_arm64(root: Path, folder: Path, *words: str) -> str:
+def bunraku_on_arm64(root: Path, folder: Path, *arguments: str) -> str:
     """What a command of bunraku prints there; `folder` is /run/given in it."""
     work, cpuinfo = folder / "work", folder / "cpuinfo"
     work.mkdir(exist_ok=True)
     cpuinfo.write_text(CPUINFO)
     given = {"root": root, "work": work, "cpuinfo": cpuinfo, "given": folder, "start": START}
     environment = {**os.environ, **{name: str(value) for name, value in given.items()}}
-    command = ["unshare", "--mount", "--propagation", "private", "sh", "-ec", INSIDE, "bunraku", *words]
+    command = ["unshare", "--mount", "--propagation", "private", "sh", "-ec", INSIDE, "bunraku", *arguments]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout + done.stderr

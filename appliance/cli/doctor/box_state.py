@@ -42,18 +42,18 @@ def stage(host: HostView) -> Iterator[Finding]:
         int(health.get("ticks") or 0),
         int(health.get("late") or 0) + int(health.get("skipped") or 0),
     )
-    words = f"{health.get('rate_hz', 0.0):.1f} Hz; {late} of {ticks} ticks late or skipped."
+    message = f"{health.get('rate_hz', 0.0):.1f} Hz; {late} of {ticks} ticks late or skipped."
     if ticks and late > _LATE_SHARE * ticks:
-        yield better("stage", f"{words} A few do not show.", "Look at wake-ups and other programs here.")
+        yield better("stage", f"{message} A few do not show.", "Look at wake-ups and other programs here.")
     else:
-        yield ok("stage", words)
+        yield ok("stage", message)
     for complaint in health.get("complaints") or []:
         yield better("stage", *_halves(str(complaint), "stage"))
     for process, fallback in host.stage.fallbacks:
         if fallback.active and process != "preflight":  # its refusals are shown with the show
             judged = wrong if fallback.name in _SEEN or fallback.name.endswith("-died") else better
             about = f" ({fallback.about})" if fallback.about else ""
-            yield judged(f"{process}: {fallback.name}{about}", *_halves(fallback.words, process))
+            yield judged(f"{process}: {fallback.name}{about}", *_halves(fallback.message, process))
 
 
 def _halves(sentences: str, process: str) -> tuple[str, str]:

@@ -90,10 +90,10 @@ def _show(found: list[Finding]) -> None:
     for _ in range(3):
         table.add_column(overflow="fold")
     for finding in found:
-        words = Text(finding.words)
+        message = Text(finding.message)
         if finding.cure:
-            words.append(f"\n-> {finding.cure}", style="dim")
-        table.add_row(Text(finding.verdict, style=_COLOURS[finding.verdict]), Text(finding.what), words)
+            message.append(f"\n-> {finding.cure}", style="dim")
+        table.add_row(Text(finding.verdict, style=_COLOURS[finding.verdict]), Text(finding.what), message)
     console = Console(highlight=False)
     console.print(table)
     count = {verdict: sum(one.verdict == verdict for one in found) for verdict in ORDER}

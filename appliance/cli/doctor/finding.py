@@ -15,7 +15,7 @@ class Finding(NamedTuple):
 
     what: str
     verdict: Verdict
-    words: str
+    message: str
     cure: str = ""
 
 
@@ -26,16 +26,16 @@ def for_phone(text: str) -> str:
     return "`".join(parts)
 
 
-def ok(what: str, words: str) -> Finding:
+def ok(what: str, message: str) -> Finding:
     """All is well."""
-    return Finding(what, "ok", words)
+    return Finding(what, "ok", message)
 
 
-def better(what: str, words: str, cure: str) -> Finding:
+def better(what: str, message: str, cure: str) -> Finding:
     """The show runs; this could be better."""
-    return Finding(what, "better", words, cure)
+    return Finding(what, "better", message, cure)
 
 
-def wrong(what: str, words: str, cure: str) -> Finding:
+def wrong(what: str, message: str, cure: str) -> Finding:
     """Not before the doors open."""
-    return Finding(what, "wrong", words, cure)
+    return Finding(what, "wrong", message, cure)

@@ -80,14 +80,14 @@ class HostView:
 
         The program's folder proves nothing: everything started in a checkout has the same one.
         """
-        program, *words = (self.text(process / "cmdline") or "").split("\0")
+        program, *arguments = (self.text(process / "cmdline") or "").split("\0")
         if not Path(program).name.startswith("python"):
             return False
-        while words and words[0].startswith("-") and words[0] != "-m":
-            del words[: 1 + (words[0] in ("-W", "-X"))]  # these two options take the next word
-        if words[:1] == ["-m"]:
-            return words[1:2] == ["appliance"] or "".join(words[1:2]).startswith("appliance.")
-        return Path("".join(words[:1])).name == "bunraku"
+        while arguments and arguments[0].startswith("-") and arguments[0] != "-m":
+            del arguments[: 1 + (arguments[0] in ("-W", "-X"))]  # these two options take the next word
+        if arguments[:1] == ["-m"]:
+            return arguments[1:2] == ["appliance"] or "".join(arguments[1:2]).startswith("appliance.")
+        return Path("".join(arguments[:1])).name == "bunraku"
 
     def mounts(self) -> list[Mount]:
         """The mounted file systems, in the order of mounting."""

@@ -74,7 +74,7 @@ def wakeup_latency(seen: Sample) -> Iterator[Finding]:
     what, late = "wake-ups", seen.late_ms
     worst = late[-1]
     of = "with real-time priority" if seen.real_time else "without the real-time priority of the stage"
-    words = (
+    message = (
         f"{len(late)} in {SECONDS:g} s, {of}: half came within {late[len(late) // 2]:.2f} ms, 99 % within "
         f"{late[len(late) * 99 // 100]:.2f} ms, the latest {worst:.1f} ms after its time."
     )
@@ -85,11 +85,11 @@ def wakeup_latency(seen: Sample) -> Iterator[Finding]:
         "`cyclictest -p 69 -i 20000` (Debian package rt-tests) shows it for longer."
     )
     if very_late > 0.01 * len(late):
-        yield wrong(what, f"{words} {very_late} were late by more than a frame may be.", cure)
+        yield wrong(what, f"{message} {very_late} were late by more than a frame may be.", cure)
     elif worst > LATE_MS:
-        yield better(what, f"{words} Some frames will leave late; a few do not show.", cure)
+        yield better(what, f"{message} Some frames will leave late; a few do not show.", cure)
     else:
-        yield ok(what, words)
+        yield ok(what, message)
 
 
 def others(seen: Sample) -> Iterator[Finding]:
@@ -155,14 +155,14 @@ def temperature(host: HostView) -> Iterator[Finding]:
     if not degrees:
         yield ok(what, "This machine does not tell it.")
         return
-    words = f"{max(degrees):.0f} degrees C."
+    message = f"{max(degrees):.0f} degrees C."
     cure = "Air: a fan that turns, a free unit above and below in the rack, no amplifier beneath."
     if max(degrees) >= HOT_C:
-        yield wrong(what, f"{words} It slows itself down now: frames come late.", cure)
+        yield wrong(what, f"{message} It slows itself down now: frames come late.", cure)
     elif max(degrees) >= WARM_C:
-        yield better(what, f"{words} It slows itself down from {HOT_C:g} on.", cure)
+        yield better(what, f"{message} It slows itself down from {HOT_C:g} on.", cure)
     else:
-        yield ok(what, words)
+        yield ok(what, message)
 
 
 def power(host: HostView) -> Iterator[Finding]:

@@ -49,25 +49,25 @@ def _roster(health: dict[str, Any]) -> Iterator[RosterLine]:
 def _sensor(line: RosterLine) -> Finding:
     what = f"sensor {line.name}"
     if line.state in _STATES:
-        words, cure = _STATES[line.state]
+        message, cure = _STATES[line.state]
         ago = f", last heard {_duration(line.age_s)} ago" if line.age_s >= 0 else ""
         if line.way in SOURCES:
             cure = _PROGRAM
         else:
             cure = line.complaint or f"{cure} {_SPARE.format(name=line.name)}"
-        return wrong(what, f"{words.format(ago=ago)}: its joint moves freely.", cure)
+        return wrong(what, f"{message.format(ago=ago)}: its joint moves freely.", cure)
     known = line.battery != BATTERY_UNKNOWN
     battery = f"its battery is at {line.battery} %" if known else "its battery is not known"
     if known and line.battery_left_s >= 0:
         battery += f" and lasts about {_duration(line.battery_left_s)} yet"
-    words = f"It sends {line.rate_hz:.0f} readings a second; {100 * line.loss:.1f} % are lost; {battery}."
+    message = f"It sends {line.rate_hz:.0f} readings a second; {100 * line.loss:.1f} % are lost; {battery}."
     if line.complaint:
-        return better(what, f"{words} {line.complaint}", "See to that before the doors open.")
+        return better(what, f"{message} {line.complaint}", "See to that before the doors open.")
     if line.battery < LOW_BATTERY:
-        return better(what, words, "Charge it, or wear a spare.")
+        return better(what, message, "Charge it, or wear a spare.")
     if line.loss > HIGH_LOSS:
-        return better(what, words, "Another channel of the Wi-Fi, or the router nearer to the stage.")
-    return ok(what, words)
+        return better(what, message, "Another channel of the Wi-Fi, or the router nearer to the stage.")
+    return ok(what, message)
 
 
 def _duration(seconds: float) -> str:

@@ -65,7 +65,7 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
             "again after each power-on.",
         )
     free, whole = room.f_bavail * room.f_frsize, room.f_blocks * room.f_frsize
-    words = f"{folder}: {free / 1e6:,.0f} of {whole / 1e6:,.0f} MB are free."
+    message = f"{folder}: {free / 1e6:,.0f} of {whole / 1e6:,.0f} MB are free."
     if room.f_flag & os.ST_RDONLY:
         return wrong(
             what,
@@ -87,16 +87,16 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
     if disk is not None and disk.kind in _WITHOUT_JOURNAL:
         return better(
             what,
-            f"{words} It is on {disk.kind}, which a power cut can damage: {_KEPT} may be lost with it.",
+            f"{message} It is on {disk.kind}, which a power cut can damage: {_KEPT} may be lost with it.",
             "`sudo mkfs.ext4 -L data /dev/sdX1` on an empty one, `sudo bunraku release data /dev/sdX1`.",
         )
     if free < min(LEAST_FREE_BYTES, LEAST_FREE_SHARE * whole):
         return better(
             what,
-            f"{words} The journal keeps less than it should. The audience sees nothing.",
+            f"{message} The journal keeps less than it should. The audience sees nothing.",
             "`journal: {minutes: 10}` in the box file, or remove what else lies there.",
         )
-    return ok(what, f"{words} What is written there lasts{f' ({disk.kind})' if disk is not None else ''}.")
+    return ok(what, f"{message} What is written there lasts{f' ({disk.kind})' if disk is not None else ''}.")
 
 
 def _why_not_kept(folder: Path) -> str | None:
@@ -188,11 +188,11 @@ def memory(host: HostView) -> Iterator[Finding]:
         free_kb = int(rows["MemAvailable"].split()[0])
     except (KeyError, ValueError, IndexError):
         return
-    words = f"{free_kb / 1024:,.0f} MiB are available."
+    message = f"{free_kb / 1024:,.0f} MiB are available."
     if free_kb < LEAST_MEMORY_KB:
-        yield wrong("memory", f"{words} The kernel may end the projector.", "End other programs.")
+        yield wrong("memory", f"{message} The kernel may end the projector.", "End other programs.")
     else:
-        yield ok("memory", words)
+        yield ok("memory", message)
     swaps = [line.split()[0] for line in (host.text("/proc/swaps") or "").splitlines()[1:]]
     on_disk = [name for name in swaps if "zram" not in name]
     if on_disk:
@@ -212,10 +212,10 @@ def choice(host: HostView) -> Iterator[Finding]:
         "show", f"{_name_of(chosen.first.show)} ({chosen.first.source}), box file {chosen.first.box.name}."
     )
     if chosen.refused:
-        words = "The new show was refused, and the one before it dances:\n" + "\n".join(chosen.refused)
-        yield better("show", words, "Mend it on the stick, and plug it in again.")
+        message = "The new show was refused, and the one before it dances:\n" + "\n".join(chosen.refused)
+        yield better("show", message, "Mend it on the stick, and plug it in again.")
     for one in chosen.aside:
-        yield better("show", one.words, "Mend it, and bring it again on a stick.")
+        yield better("show", one.message, "Mend it, and bring it again on a stick.")
 
 
 def _name_of(show: Path) -> str:

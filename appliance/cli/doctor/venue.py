@@ -19,7 +19,7 @@ from appliance.outputs.dmx.serial_port import (
     is_usb_pro,
 )
 from appliance.show.box import out_of_reach
-from appliance.show.dmx import IN_WORDS, DmxConfig
+from appliance.show.dmx import WIRE_NAMES, DmxConfig
 
 _KINDS: dict[str, Callable[[ListPortInfo], bool]] = {"usb-pro": is_usb_pro, "open-dmx": is_bare_ftdi}
 _UDMX = ("16c0", "05dc")
@@ -44,8 +44,8 @@ def ports(host: HostView) -> Iterator[Finding]:
                 f"{names} has UDP port {port}: the box would receive nothing there.",
                 "End that program, or give the box another port in its box file.",
             )
-    if (words := out_of_reach(host.box.sensors)) is not None:
-        yield better("sensors by Wi-Fi", words, "If all sensors are on cables, leave it as it is.")
+    if (message := out_of_reach(host.box.sensors)) is not None:
+        yield better("sensors by Wi-Fi", message, "If all sensors are on cables, leave it as it is.")
 
 
 def _holders(host: HostView, port: int) -> list[tuple[str, bool]]:
@@ -164,16 +164,16 @@ def access_point(host: HostView) -> Iterator[Finding]:
         here = "10.77.0.1/" in output_of("ip", "-brief", "address", "show", "dev", card)
         joined = output_of("iw", "dev", card, "station", "dump").count("Station ")
         country = output_of("iw", "reg", "get").partition("country ")[2][:2] or "unknown"
-        words = (
+        message = (
             f"{card} is on the air as '{facts.get('ssid', '')}', channel {channel}, country {country}; "
             f"{joined} joined."
         )
         if here:
-            yield ok(what, words)
+            yield ok(what, message)
         else:
             yield wrong(
                 what,
-                f"{words} It has no address: sensors find no box.",
+                f"{message} It has no address: sensors find no box.",
                 "`sudo systemctl restart NetworkManager`, then look again.",
             )
 
@@ -217,7 +217,7 @@ def _adapter(host: HostView, what: str, wire: DmxConfig) -> Finding:
     except AdapterError as error:
         return wrong(
             what,
-            f"{IN_WORDS[wire.wire]}: {error}. Its lamps stay as they are.",
+            f"{WIRE_NAMES[wire.wire]}: {error}. Its lamps stay as they are.",
             "Plug it in: it is taken by itself.",
         )
     others = [port for port in adapters_here(_KINDS[wire.wire]) if port.device != device]

@@ -71,11 +71,11 @@ def send_command(box_keys: BoxKeys, address: str, name: str | None) -> None:
     except NoBoxError as error:
         raise StageError(f"{error} {_WHICH_BOX}" if box_keys.running.has_port else str(error)) from None
     if not answer.done:
-        raise StageError(answer.words)
-    print(answer.words)
+        raise StageError(answer.message)
+    print(answer.message)
 
 
-def edit_keys(box_keys: BoxKeys, change_it: Callable[[KeyEditing], None], words: str) -> int:
+def edit_keys(box_keys: BoxKeys, change_it: Callable[[KeyEditing], None], message: str) -> int:
     """Change the key file and have the running box read it. Returns the exit status."""
     with clear_errors(box_keys.keys):
         if not box_keys.keys.exists():
@@ -83,7 +83,7 @@ def edit_keys(box_keys: BoxKeys, change_it: Callable[[KeyEditing], None], words:
         with editing(box_keys.keys) as change:
             change_it(change)
             change.commit()
-    print(words)
+    print(message)
     if why := forgotten(box_keys.keys):
         print(why)
     return reload_and_say(box_keys)
@@ -100,8 +100,8 @@ def forgotten(keys: Path) -> str:
 
 def reload_and_say(box_keys: BoxKeys) -> int:
     """Have the running box read the key file, and report whether it did. Returns the exit status."""
-    is_well, words = reload_keys(box_keys)
-    print(words)
+    is_well, message = reload_keys(box_keys)
+    print(message)
     return 0 if is_well else NOT_TAKEN
 
 
@@ -116,8 +116,8 @@ def reload_keys(box_keys: BoxKeys) -> tuple[bool, str]:
             return _ask_to_reload(box_keys)
         except NoBoxError as error:
             if not box_keys.running.has_port:
-                words = "The box has no control port: the change counts when it starts again."
-                return True, words
+                message = "The box has no control port: the change counts when it starts again."
+                return True, message
             if running_stage(box_keys.box) is None:
                 return True, f"{error} The change counts when it starts."
         if time.monotonic() >= until:
@@ -134,7 +134,7 @@ def _ask_to_reload(box_keys: BoxKeys) -> tuple[bool, str]:
     if roll.key_file is not None and roll.key_file.resolve() != box_keys.keys.resolve():
         return False, f"{other_file(roll.key_file)} and knows nothing of this change. {THAT_BOX}"
     answer = box_keys.running.ask("/sensors/reload")
-    return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.words}"
+    return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.message}"
 
 
 def other_file(key_file: Path) -> str:

@@ -140,11 +140,11 @@ def replace(
         )
     if spare is not None:
         refuse_worn(box_keys, spare, f"in the place of {broken} it leaves its own", anyway)
-        words = (
+        message = (
             f"{broken} is now the sensor that was {spare}; the broken one is called {spare} from now on. "
             "Put it on, switch it on, stand still for a breath."
         )
-        raise typer.Exit(edit_keys(box_keys, lambda change: change.swap(broken, spare), words))
+        raise typer.Exit(edit_keys(box_keys, lambda change: change.swap(broken, spare), message))
     wearable = network, password_file, fusion, axes, crystal
     raise typer.Exit(provision_sensor(box_keys, broken, port, *wearable, takes_over=True, anyway=anyway))
 
@@ -157,8 +157,8 @@ def revoke(name: Name, anyway: Anyway = False, box: ThisBoxFile = None, keys: Ke
 
     box_keys = box_keys_of(box, keys)
     refuse_worn(box_keys, name, "without its key it is not let in", anyway)
-    words = f"{name} is revoked: its key opens nothing any more. To use it again, provision it again."
-    raise typer.Exit(edit_keys(box_keys, lambda change: change.remove(name), words))
+    message = f"{name} is revoked: its key opens nothing any more. To use it again, provision it again."
+    raise typer.Exit(edit_keys(box_keys, lambda change: change.remove(name), message))
 
 
 @sensors.command()
@@ -175,8 +175,8 @@ def rename(
 
     box_keys = box_keys_of(box, keys)
     refuse_worn(box_keys, name, f"as {new} it is none of the show's", anyway)
-    words = f"{name} is now {new}. Shows name it by that."
-    raise typer.Exit(edit_keys(box_keys, lambda change: change.rename(name, new), words))
+    message = f"{name} is now {new}. Shows name it by that."
+    raise typer.Exit(edit_keys(box_keys, lambda change: change.rename(name, new), message))
 
 
 @sensors.command("reload")

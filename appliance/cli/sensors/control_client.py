@@ -33,7 +33,7 @@ class Answer:
     """The box's reply: whether it was done, and a sentence."""
 
     done: bool
-    words: str
+    message: str
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ def _picture(box_keys: BoxKeys) -> Group:
         return _picture_of_file(box_keys, str(error))
     complaints = [line.complaint for line in roll.lines if line.complaint]
     complaints += _about_file(box_keys, roll)
-    parts: list[object] = [Text(f"{words}\n", style="yellow") for words in complaints]
+    parts: list[object] = [Text(f"{message}\n", style="yellow") for message in complaints]
     if roll.age_s > _OLD_ROLL_S:
         parts.append(Text(f"This is {roll.age_s:.0f} s old: the box hangs, or is very busy.\n", style="red"))
     if roll.age_s < 0:

@@ -53,8 +53,8 @@ def provision_sensor(
     """
     console = people_console()
 
-    def say(what: str, words: str) -> None:
-        _step(console, what, words)
+    def say(what: str, message: str) -> None:
+        _step(console, what, message)
 
     require_folder(box_keys.keys)
     try:
@@ -76,16 +76,16 @@ def provision_sensor(
             f"Stopped half-way: {box_keys.keys} was not changed, and the wearable may have its new key. "
             "Run this again: that mends it."
         ) from None
-    is_well, words = reload_keys(box_keys)
-    _step(console, "box", words, is_well)
+    is_well, message = reload_keys(box_keys)
+    _step(console, "box", message, is_well)
     for hint in _hints(box_keys, done, settings, device, done.was in worn):
         console.print(hint, markup=False, soft_wrap=True)
     return 0 if is_well else NOT_TAKEN
 
 
-def _step(console: Console, what: str, words: str, is_well: bool = True) -> None:
+def _step(console: Console, what: str, message: str, is_well: bool = True) -> None:
     marks = ("[green]✓[/]", "[red]✗[/]") if console.encoding.startswith("utf") else ("ok", "!!")
-    console.print(f"{marks[not is_well]} [bold]{escape(what):<14}[/] {escape(words)}", soft_wrap=True)
+    console.print(f"{marks[not is_well]} [bold]{escape(what):<14}[/] {escape(message)}", soft_wrap=True)
 
 
 def _ask_password(network: str) -> str:

@@ -105,14 +105,14 @@ export class Box extends EventTarget {
   }
 }
 
-// The box's answer to a request: {status, words, done, ...}; status 0: no answer.
+// The box's answer to a request: {status, message, done, ...}; status 0: no answer.
 export async function request(path, said, patienceMs = 6000) {
   const options = said === undefined ? {} : { method: "POST", body: JSON.stringify(said) };
   try {
     const response = await fetch(path, { ...options, signal: AbortSignal.timeout(patienceMs) });
-    if (!response.ok) return { status: response.status, words: await response.text() };
+    if (!response.ok) return { status: response.status, message: await response.text() };
     return { status: 200, value: await response.json() };
   } catch {
-    return { status: 0, words: "" };
+    return { status: 0, message: "" };
   }
 }

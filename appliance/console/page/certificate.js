@@ -9,9 +9,9 @@ export const madeAt = (proof) => new Date(1000 * proof.made).toLocaleString(loca
 
 // The name of a limit in the reader's language.
 export function limitWords(limit) {
-  const key = `limit_${limit.words.toLowerCase().replace(/[^a-z0-9]+/g, "_")}`;
+  const key = `limit_${limit.label.toLowerCase().replace(/[^a-z0-9]+/g, "_")}`;
   const said = words(key);
-  return said === key ? limit.words : said;
+  return said === key ? limit.label : said;
 }
 
 // A finding in the reader's language: [account, cure]. One about a fallback is named like `stage: receiver-gone
@@ -20,7 +20,7 @@ export function findingWords(finding) {
   const [, , name, about] = /^(\w+): ([a-z-]+)(?: \((.*)\))?$/.exec(finding.what) ?? [];
   const key = about && hasWords(`named_${name}`) ? `named_${name}` : `fallback_${name}`;
   if (name && hasWords(key)) return [`${about && key.startsWith("fallback_") ? `${about}: ` : ""}${words(key, { about })}`, ""];
-  return [`${translated(finding.what)}: ${translated(finding.words)}`, translated(finding.cure)];
+  return [`${translated(finding.what)}: ${translated(finding.message)}`, translated(finding.cure)];
 }
 
 export const valueOf = (limit) => limit.value === null ? words("prove_nothing_came") : `${number(limit.value, 2)} ${limit.unit}`;

@@ -41,7 +41,7 @@ export async function ask(path, said, patience) {
 export async function command(address, ...given) {
   const answer = await ask("/api/command", { address, arguments: given });
   const done = answer.status === 200 && answer.value.done;
-  say(translated(answer.status === 200 ? answer.value.words : answer.words) || words("no_page"), !done);
+  say(translated(answer.status === 200 ? answer.value.message : answer.message) || words("no_page"), !done);
   return done;
 }
 

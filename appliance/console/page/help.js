@@ -36,7 +36,7 @@ async function make() {
   say(words("help_makes"));
   const answer = await ask("/api/help", { journal: byId("help-journal").checked }, MADE_WITHIN_MS);
   byId("help-make").disabled = false;
-  if (answer.status !== 200) return say(translated(answer.words) || words("no_page"));
+  if (answer.status !== 200) return say(translated(answer.message) || words("no_page"));
   const link = document.createElement("a");
   link.href = "/api/help.zip";
   link.download = answer.value.name;

@@ -10,12 +10,12 @@ export function initLogs() {
 async function readLogs() {
   byId("logs-said").textContent = words("box_reading");
   const answer = await ask("/api/logs");
-  byId("logs-said").textContent = answer.status === 200 ? words(answer.value.length ? "logs_newest" : "logs_none") : answer.words || words("no_page");
+  byId("logs-said").textContent = answer.status === 200 ? words(answer.value.length ? "logs_newest" : "logs_none") : answer.message || words("no_page");
   if (answer.status !== 200) return;
   byId("logs").replaceChildren(...answer.value.reverse().map((line) => {
     const item = document.createElement("li"), small = document.createElement("small");
     const name = words(`unit_${line.unit}`);
-    item.textContent = line.words;
+    item.textContent = line.message;
     small.textContent = `${clock(line.time)} · ${name.startsWith("unit_") ? line.unit : name}`;
     item.append(small);
     return item;

@@ -9,6 +9,7 @@ import { byId, every } from "./elements.js";
 import { initHelp, readNight } from "./help.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
 import { initLogs } from "./logs.js";
+import { initMidi, read as readMidi, showMidi } from "./midi.js";
 import { initPhones } from "./phones.js";
 import { initPicture, showPicture } from "./picture.js";
 import { initProve, leaveProve, showProve } from "./prove.js";
@@ -39,6 +40,7 @@ function show(page) {
     readAbout();
     readNight();
     readUpdate();
+    readMidi();
   }
   if (known === "prove") showProve();
   else leaveProve();
@@ -68,13 +70,13 @@ function verdict() {
   const said = { ...values };
   if ("since" in said) said.since = clock(said.since);
   if ("rate" in said) said.rate = number(said.rate, 1);
-  if (key === "fallbacks") said.words = beginning(spoken(value.fallbacks.find((one) => one.active) ?? said));
+  if (key === "fallbacks") said.message = beginning(spoken(value.fallbacks.find((one) => one.active) ?? said));
   setText(byId("verdict"), words(`verdict_${key}`, said));
 }
 
 // In the reader's language, and always by the name of the sensor, receiver, wire or disk that it is about. The box
 // says it in English; other languages have a sentence for each fallback.
-function spoken({ name, about, words: said }) {
+function spoken({ name, about, message: said }) {
   if (about && hasWords(`named_${name}`)) return words(`named_${name}`, { about });
   const sentence = hasWords(`fallback_${name}`) ? words(`fallback_${name}`) : translated(said ?? "");
   return about && !sentence.includes(about) ? `${about}: ${sentence}` : sentence;
@@ -109,6 +111,8 @@ function tonight(value) {
     pair.append(term, meaning);
     return pair;
   }));
+  if (value.remote?.state) figures.push(["timecode", `${value.remote.timecode || "–"} · ${words(`code_${value.remote.state}`)}`]);
+  showMidi(value.remote ?? {});
   showCues(value);
   showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
   showChoices(byId("overlays"), byId("overlays-part"), value.cards, (name) => command("/card", name));

@@ -136,7 +136,7 @@ async function join(takeOver) {
     }
     byId("take-over").hidden = answer.status !== 409;
     const keys = { 0: "no_page", 401: "phone_code_missing", 403: "phone_code_wrong", 409: "phone_taken", 429: "pin_wait" };
-    say(keys[answer.status] ? words(keys[answer.status], { name }) : translated(answer.words));
+    say(keys[answer.status] ? words(keys[answer.status], { name }) : translated(answer.message));
     return false;
   }
   if (answer.value.pass) kept.passes[name] = answer.value.pass;

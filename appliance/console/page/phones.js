@@ -20,7 +20,7 @@ export async function initPhones() {
 
 async function showCode(name) {
   const answer = await ask("/api/phones/code", { name });
-  if (answer.status !== 200) return say(answer.words || words("no_page"), true);
+  if (answer.status !== 200) return say(answer.message || words("no_page"), true);
   const { address, seconds, squares } = answer.value;
   byId("phone-code").hidden = false;
   byId("phone-code-said").textContent = words("phone_code_said", { name, minutes: seconds / 60 });

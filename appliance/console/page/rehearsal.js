@@ -4,6 +4,7 @@ import { request } from "./box.js";
 import { ask, command, withPin } from "./device.js";
 import { byId, first } from "./elements.js";
 import { Figure } from "./figure.js";
+import { initLearn, leaveLearn } from "./learn.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
 import { twice } from "./hold.js";
@@ -32,6 +33,7 @@ export function initRehearsal(me, box) {
   figure = new Figure(byId("figure"), byId("figure-said"), box, words);
   initMotion();
   initSprings();
+  initLearn();
   const offerCopy = () => {
     byId("cue-show").hidden = false;
     byId("cue-dance").hidden = !me.installed;
@@ -69,7 +71,7 @@ async function keepCue(offerCopy) {
   byId("cue-said").textContent = words("change_runs");
   const answer = await request("/api/cue", { name: byId("cue-name").value }, KEEPING_MS);
   byId("cue-keep").disabled = false;
-  byId("cue-said").textContent = answer.status === 200 ? answer.value.words : answer.words || words("no_page");
+  byId("cue-said").textContent = answer.status === 200 ? answer.value.message : answer.message || words("no_page");
   if (answer.status === 200) offerCopy();
 }
 
@@ -77,12 +79,15 @@ async function keepCue(offerCopy) {
 async function danceCopy() {
   byId("cue-said").textContent = words("file_checking");
   const answer = await ask("/api/cue/dance", {}, KEEPING_MS);
-  const problems = answer.value?.problems?.map((one) => one.words).join(" ");
-  byId("cue-said").textContent = answer.status === 200 ? problems || answer.value.words : answer.words || words("no_page");
+  const problems = answer.value?.problems?.map((one) => one.message).join(" ");
+  byId("cue-said").textContent = answer.status === 200 ? problems || answer.value.message : answer.message || words("no_page");
 }
 
 // Away from the page no joint is held.
-export function leaveRehearsal() { figure.letGo(); }
+export function leaveRehearsal() {
+  figure.letGo();
+  leaveLearn();
+}
 
 function tell() {
   for (const id of ["coding", "interaction"]) byId(`${id}-said`).textContent = byId(id).value;

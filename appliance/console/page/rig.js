@@ -31,7 +31,7 @@ async function look() {
   beams = answer.value.beams;
   const walk = answer.value.walk;
   byId("rig-part").hidden = beams.length === 0;
-  byId("rig-said").textContent = walk && words("rig_now", { words: walk });
+  byId("rig-said").textContent = walk && words("rig_now", { description: walk });
   byId("rig-walk").hidden = Boolean(walk);
   byId("rig-end").hidden = !walk;
   lamps();

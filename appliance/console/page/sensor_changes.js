@@ -105,7 +105,7 @@ async function run(said, tell) {
       const lines = (rest + part.value).split("\n");
       rest = lines.pop();
       for (const line of lines.map((one) => JSON.parse(one))) {
-        if ("words" in line) tell(translated(line.words));
+        if ("message" in line) tell(translated(line.message));
         else isDone = line.done;
       }
     }

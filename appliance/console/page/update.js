@@ -50,7 +50,7 @@ async function sendFiles() {
   for (const file of [...byId("update-file").files].sort((one, other) => other.size - one.size)) {
     const answer = await sent(file);
     if (answer.status !== 200) return refuse(answer);
-    ready = JSON.parse(answer.words).ready;
+    ready = JSON.parse(answer.message).ready;
   }
   byId("update-file").value = "";
   if (ready) show(ready);
@@ -64,8 +64,8 @@ function sent(file) {
     asked.upload.onprogress = (event) => {
       say(words("update_sends", { name: file.name, percent: Math.floor((100 * event.loaded) / event.total) }));
     };
-    asked.onload = () => answered({ status: asked.status, words: asked.responseText });
-    asked.onerror = () => answered({ status: 0, words: "" });
+    asked.onload = () => answered({ status: asked.status, message: asked.responseText });
+    asked.onerror = () => answered({ status: 0, message: "" });
     asked.open("POST", `/api/update/file?name=${encodeURIComponent(file.name)}`);
     asked.send(file);
   });
@@ -87,6 +87,6 @@ async function confirm() {
   return say(words("update_runs"));
 }
 
-function refuse(answer) { say(translated(answer.words) || words("no_page")); }
+function refuse(answer) { say(translated(answer.message) || words("no_page")); }
 
 function say(sentence) { byId("update-said").textContent = sentence; }

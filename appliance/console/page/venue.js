@@ -19,14 +19,14 @@ export function initVenue() {
 export async function danceAgain(id) {
   byId("box-said").textContent = words("file_checking");
   const answer = await ask("/api/box/show", { id }, CHECKED_WITHIN_MS);
-  byId("box-said").textContent = translated(answer.status === 200 ? answer.value.words : answer.words) || words("no_page");
+  byId("box-said").textContent = translated(answer.status === 200 ? answer.value.message : answer.message) || words("no_page");
 }
 
 async function readFile() {
   tell(words("box_reading"), []);
   const answer = await ask("/api/box/file", undefined, CHECKED_WITHIN_MS);
   byId("file-part").hidden = answer.status !== 200;
-  if (answer.status !== 200) return tell(translated(answer.words) || words("no_page"), []);
+  if (answer.status !== 200) return tell(translated(answer.message) || words("no_page"), []);
   file = answer.value;
   receivers = file.receivers.map((written) => ({ written, removed: false, added: false }));
   byId("file-name").textContent = file.file;
@@ -58,7 +58,7 @@ function field(key) {
   else input.value = key.kind === "list" ? key.value.join(", ") : key.value ?? "";
   plain(input, key.location);
   const within = key.within ? ` (${translated(key.within)})` : "";
-  small.textContent = `${translated(key.words)}${within} · ${dotted(key.location)}`;
+  small.textContent = `${translated(key.purpose)}${within} · ${dotted(key.location)}`;
   label.className = "venue-key";
   label.append(name, input, small);
   return label;
@@ -148,12 +148,12 @@ async function save(now) {
   asked = "";
   const answer = await ask("/api/box/file", { ...wanted, sure }, CHECKED_WITHIN_MS);
   for (const button of buttons) button.disabled = false;
-  if (answer.status !== 200) return tell(translated(answer.words) || words("no_page"), []);
-  const { problems, asks, words: said } = answer.value;
+  if (answer.status !== 200) return tell(translated(answer.message) || words("no_page"), []);
+  const { problems, asks, message: said } = answer.value;
   if (problems.length) return tell(words("file_refused"), problems, wanted.values);
   if (asks) {
     asked = JSON.stringify(wanted);
-    return tell(words("file_sure"), asks.map((one) => ({ words: one })));
+    return tell(words("file_sure"), asks.map((one) => ({ message: one })));
   }
   if (!now) await readFile();
   return tell(translated(said), []);
@@ -165,7 +165,7 @@ function tell(sentence, problems, values = []) {
   for (const input of document.querySelectorAll("#file-part input")) input.removeAttribute("aria-invalid");
   for (const note of document.querySelectorAll("#file-part .wrong")) note.remove();
   byId("file-problems").replaceChildren(...problems.map((one) => {
-    const item = document.createElement("li"), said = translated(one.words), input = fieldOf(one.words, values);
+    const item = document.createElement("li"), said = translated(one.message), input = fieldOf(one.message, values);
     item.textContent = one.line && !input ? `${words("file_line", one)} ${said}` : said;
     if (input) mark(input, said);
     return item;

@@ -57,10 +57,10 @@ def write_material(path: Path, material: Material, joints: tuple[str, ...]) -> N
         "step": [loop.step.yaw, loop.step.x, loop.step.z],
         "start_s": loop.start_s,
     }
-    words = json.dumps(facts).encode()
-    words = words.ljust(-(-(_HEAD.size + len(words)) // _ALIGNED) * _ALIGNED - _HEAD.size)
+    encoded = json.dumps(facts).encode()
+    encoded = encoded.ljust(-(-(_HEAD.size + len(encoded)) // _ALIGNED) * _ALIGNED - _HEAD.size)
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    write_whole(path, b"".join((_HEAD.pack(_MAGIC, len(words)), words, poses.tobytes(), track.tobytes())))
+    write_whole(path, b"".join((_HEAD.pack(_MAGIC, len(encoded)), encoded, poses.tobytes(), track.tobytes())))
 
 
 def read_material(path: Path, joints: tuple[str, ...]) -> Material:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from appliance.dancer.material.improvising import BEFORE, MOVE, Numbers
 from appliance.dancer.material.motion_network import MotionNetwork
 from appliance.dancer.material.steps import ROOT
@@ -14,9 +16,11 @@ SEEN = BEFORE + MOVE
 
 
 class PartnerNetwork(MotionNetwork):
-    """Steps are features (T, F) of the show's improviser; see steps.Steps.
+    """Steps are features (T, F) of the show's improviser; see steps.Steps. It dances as one of the dancers
+    that it learned from: `who` (W,) is 1 for that one, 0 for the others. Couples are numbered 0, 1; then the
+    same in the mirror.
 
-    mixtures: Gaussians of an answer.
+    mixtures: Gaussians of an answer. dancers: W.
     """
 
     kind = "partner"
@@ -27,14 +31,28 @@ class PartnerNetwork(MotionNetwork):
         """
         return self._run(["scores"], led=led[None], moves=moves)[0]
 
-    def answers(self, before: Numbers, led: Numbers) -> Numbers:
-        """After its own last steps (3, F) and the other's steps (16, F): the mixture (1, K * (2 C + 1)) of
-        the code of the next move.
+    def natural(self, moves: Numbers, who: Numbers) -> Numbers:
+        """How much likelier each move, with the 3 steps before it (N, 11, F), is of the dancer than drawn by
+        this network: (N,), a logarithm.
         """
-        return self._run(["mixture"], before=before[None], led=led[None])[0]
+        return self._run(["natural"], moves=moves, who=who[None])[0]
+
+    def answers(self, own: Numbers, led: Numbers | None, who: Numbers) -> Numbers:
+        """After its own last steps (11, F) and the other's (16, F), None: nobody's: the mixture
+        (1, K * (2 C + 1)) of the code of the next move.
+        """
+        if led is None:
+            return self._run(["mixture"], own=own[None], who=who[None])[0]
+        heard = np.ones((1, 1), np.float32)
+        return self._run(["mixture"], own=own[None], led=led[None], heard=heard, who=who[None])[0]
+
+    def recognised(self, steps: Numbers) -> int:
+        """Number of the dancer that steps (11, F) are most like."""
+        return int(self._run(["alike"], own=steps[None])[0].argmax())
 
     def _take_facts(self, facts: Mapping[str, str]) -> None:
         self.features, self.mixtures = self._idle["led"].shape[2], int(facts["bunraku.mixtures"])
+        self.dancers = self._idle["who"].shape[1]
         shapes = (1, LED_STEPS, self.features), (1, SEEN, self.latent + ROOT)
-        if (self._idle["led"].shape, self._idle["moves"].shape) != shapes:
+        if (self._idle["led"].shape, self._idle["moves"].shape) != shapes or self.dancers % 2:
             raise ValueError("its steps are not those of an improviser")

@@ -11,7 +11,7 @@ from typing import Protocol
 FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 2.0
 ENDS_WITHIN_S = 1.0  # the last universe leaves within this, unless the device hangs
-_IN_WORDS = {
+_MEANINGS = {
     errno.ENOENT: "it is not plugged in",
     errno.ENODEV: "it is not plugged in",
     errno.ENXIO: "it is not plugged in",
@@ -136,7 +136,7 @@ class AdapterWire:
 
     def _failed(self, error: Exception) -> None:
         number = error.errno if isinstance(error, OSError) else None
-        self.last_error = _IN_WORDS.get(number or 0, str(error))
+        self.last_error = _MEANINGS.get(number or 0, str(error))
 
 
 def _write_twice(adapter: Adapter, data: bytes) -> None:

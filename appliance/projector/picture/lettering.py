@@ -60,14 +60,14 @@ class _Line:
             (path, "".join(letter for letter, _ in run)) for path, run in groupby(chosen, lambda one: one[1])
         ]
         self._runs = [
-            (_opened(path, size_px), words) for path, words in (runs[::-1] if self._right_to_left else runs)
+            (_opened(path, size_px), run) for path, run in (runs[::-1] if self._right_to_left else runs)
         ]
-        self.width = round(sum(font.getlength(words) for font, words in self._runs))
+        self.width = round(sum(font.getlength(run) for font, run in self._runs))
 
     def write(self, draw: ImageDraw.ImageDraw, x: float, baseline: float, colour: tuple[int, ...]) -> None:
-        for font, words in self._runs:
-            draw.text((x, baseline), words, colour, font, anchor="ls")
-            x += font.getlength(words)
+        for font, text in self._runs:
+            draw.text((x, baseline), text, colour, font, anchor="ls")
+            x += font.getlength(text)
 
 
 def _first_then_machines(font: Path | None) -> list[Path]:

@@ -36,7 +36,7 @@ def test_card(size: tuple[int, int], lines: Sequence[str], address: str = "") ->
     for x in (width / 2 - 23.7 * unit, width / 2 + 23.7 * unit):
         _star(draw, x, height / 2 - 3.6 * unit, 4.2 * unit)
         _focus(draw, x, height / 2 + 2.3 * unit, unit)
-    _words(image, lines, address, unit)
+    _lettering(image, lines, address, unit)
     return np.asarray(image)
 
 
@@ -115,7 +115,7 @@ def _focus(draw: ImageDraw.ImageDraw, x: float, y: float, unit: float) -> None:
                 draw.rectangle(box, fill=(255, 255, 255))
 
 
-def _words(image: Files.Image, lines: Sequence[str], address: str, unit: float) -> None:
+def _lettering(image: Files.Image, lines: Sequence[str], address: str, unit: float) -> None:
     """The words, and the address as a QR code beside them."""
     parts: list[Files.Image] = []
     if address:
@@ -124,12 +124,12 @@ def _words(image: Files.Image, lines: Sequence[str], address: str, unit: float) 
         times = max(1, round(10.0 * unit / white.width))
         parts.append(white.resize((times * white.width, times * white.height), Files.Resampling.NEAREST))
     if lines:
-        words = Files.fromarray(lettered("\n".join(lines), max(1, round(1.35 * unit)), (255, 255, 255)))
+        text = Files.fromarray(lettered("\n".join(lines), max(1, round(1.35 * unit)), (255, 255, 255)))
         limit = max(1, round(29.4 * unit - sum(part.width for part in parts) - unit))
-        if words.width > limit:
-            words = words.resize((limit, max(1, words.height * limit // words.width)))
-        ground = Files.new("RGB", words.size, (0, 0, 0))
-        ground.paste(words, (0, 0), words)
+        if text.width > limit:
+            text = text.resize((limit, max(1, text.height * limit // text.width)))
+        ground = Files.new("RGB", text.size, (0, 0, 0))
+        ground.paste(text, (0, 0), text)
         parts.append(ground)
     gap = round(unit) if len(parts) > 1 else 0
     left = (image.width - sum(part.width for part in parts) - gap) // 2

@@ -95,5 +95,5 @@ def _ppm(pipe: IO[bytes]) -> _Picture | None:
     return ((width, height), pixels) if len(pixels) == 3 * width * height > 0 else None
 
 
-def _say(words: str) -> None:
-    print(words, file=sys.stderr)
+def _say(message: str) -> None:
+    print(message, file=sys.stderr)

@@ -16,7 +16,7 @@ from appliance.show.stream import StreamConfig
 AGAIN_S = 5.0  # before a process that ended is started once more
 HUNG_S = 5.0  # without a sign, of which it gives one a second
 _STARTS_WITHIN_S = 20.0
-_LAST_WORDS_S = 1.0
+_LAST_OUTPUT_S = 1.0
 
 
 class Feed:
@@ -50,7 +50,7 @@ class Feed:
         self._process.terminate()  # first: then no picture waits for it
         if self._pictures is not None:
             self._pictures.close()
-        await_end(self._process, _LAST_WORDS_S)
+        await_end(self._process, _LAST_OUTPUT_S)
         assert self._process.stdout is not None
         self._process.stdout.close()
         self._process = self._pictures = None

@@ -109,10 +109,10 @@ class WearableConsole:
             if answer == "ok" or answer.startswith("ok "):
                 return answer[3:]
             if answer.startswith("error: "):
-                words = answer.removeprefix("error: ")
-                if secret and secret in words:
-                    words = "it repeated what is secret, as no bunraku wearable does; is this one?"
-                raise RefusedError(f"The wearable refused '{command}': {words}.")
+                message = answer.removeprefix("error: ")
+                if secret and secret in message:
+                    message = "it repeated what is secret, as no bunraku wearable does; is this one?"
+                raise RefusedError(f"The wearable refused '{command}': {message}.")
         raise UnpluggedError(f"The wearable on {self.device} stopped answering (asked: '{command}').")
 
     def proves(self, key: bytes) -> bool:

@@ -38,14 +38,14 @@ class TrainingRun:
         """Train until done or stopped (Ctrl-C, SIGTERM). True if done; always writes the checkpoint."""
         with stop_signals() as stop_asked, self._progress() as progress:
             self.console.print("Ctrl-C stops without losing anything.")
-            bar = progress.add_task("training", total=1.0, words="")
+            bar = progress.add_task("training", total=1.0, message="")
             steps_at_start, began = self.training.step, time.monotonic()
 
             def stop() -> bool:
                 done = self.training.step - steps_at_start
                 if done % 10 == 0:
-                    words = self._words(done / max(time.monotonic() - began, 1e-6))
-                    progress.update(bar, completed=self.training.fraction, words=words)
+                    message = self._message(done / max(time.monotonic() - began, 1e-6))
+                    progress.update(bar, completed=self.training.fraction, message=message)
                 return stop_asked()
 
             self.training.run(self._report, self._save, REPORT_S, stop=stop)
@@ -53,11 +53,11 @@ class TrainingRun:
         return self.training.fraction >= 1.0
 
     def _progress(self) -> Progress:
-        words = TextColumn("{task.fields[words]}")
-        columns = [SpinnerColumn(), TextColumn("training"), BarColumn(), TaskProgressColumn(), words]
+        message = TextColumn("{task.fields[message]}")
+        columns = [SpinnerColumn(), TextColumn("training"), BarColumn(), TaskProgressColumn(), message]
         return Progress(*columns, console=self.console, disable=not self.console.is_terminal)
 
-    def _words(self, steps_a_second: float) -> str:
+    def _message(self, steps_a_second: float) -> str:
         left = time_left_s(self.training.seconds, self.training.fraction)
         return f"{steps_a_second:.1f} steps/s, {_clock(left)} left. {self._line}"
 

@@ -37,7 +37,7 @@ class Preference:
         low, high = self.interval
         return low > 0.5 or high < 0.5
 
-    def words(self) -> str:
+    def text(self) -> str:
         """'14 of 20 votes, 70 % (95 % interval 48 to 85 %)'."""
         low, high = self.interval
         share = f"{self.chosen} of {self.votes} votes, {self.chosen / self.votes:.0%}"
@@ -63,9 +63,9 @@ class Result:
             else "No preference is shown: a coin may vote like this."
         )
         people = "1 voter" if self.voters == 1 else f"{self.voters} voters"
-        said = [f"{one} over {other}: {self.first.words()}, {people}. {verdict}"]
+        said = [f"{one} over {other}: {self.first.text()}, {people}. {verdict}"]
         if self.left.is_shown:
-            said.append(f"A side was preferred: left has {self.left.words()}. Do not trust the preference.")
+            said.append(f"A side was preferred: left has {self.left.text()}. Do not trust the preference.")
         return said
 
 

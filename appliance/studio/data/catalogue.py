@@ -192,12 +192,12 @@ class CatalogueFile(Section):
     def _spans(cls, by_pattern: Any, info: ValidationInfo) -> Any:
         if not isinstance(by_pattern, dict):
             return by_pattern
-        words = "'all', or " if info.field_name == "keep" else ""
+        choice = "'all', or " if info.field_name == "keep" else ""
         spans = {}
         for pattern, several in by_pattern.items():
-            spans[pattern] = [ALWAYS] if several == "all" and words else several
+            spans[pattern] = [ALWAYS] if several == "all" and choice else several
             if not _are_spans(spans[pattern]):
-                cure = f"Write {words}pairs of seconds, from and to: [[12.5, 14], [20, 21.5]]."
+                cure = f"Write {choice}pairs of seconds, from and to: [[12.5, 14], [20, 21.5]]."
                 raise refusal(f"'{pattern}' does not say when.", cure, pattern)
         return spans
 

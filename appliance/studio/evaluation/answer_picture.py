@@ -32,11 +32,11 @@ def draw_answer(path: Path, measurement: Measurement, joint: str, iterations: It
         return Strip(whole, roots, label, behind, holds)
 
     phrase = strip(rehearsal.phrase, f"The phrase: {pair.phrase_name}")
-    answer_words = "The dancer's answer; behind it, in grey, the same dance without a hand"
+    caption = "The dancer's answer; behind it, in grey, the same dance without a hand"
     strips = (
         phrase,
         strip(pasted, f"Pasted on: {joint} as in {pair.hand_name}; all else is the phrase", phrase),
-        strip(danced, answer_words, strip(free, "")),
+        strip(danced, caption, strip(free, "")),
     )
     answer = measurement.answer(joint, danced, free)
     title = (

@@ -9,7 +9,7 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-# Figure, words, digits; the words say what is good.
+# Figure, text, digits; the text says what is good.
 ROWS = (
     ("critic", "critic, whole body (0.5: as the dancer)", 2),
     ("critic_legs", "critic, legs", 2),
@@ -55,10 +55,10 @@ def comparison_table(found: dict[str, Any], joints: Sequence[str]) -> Table | No
     made.add_column("figure")
     for kind in kinds:
         made.add_column(kind, justify="right")
-    for name, words, digits in ROWS:
+    for name, text, digits in ROWS:
         cells = [_mean([one[kind][name] for one in compared], digits) for kind in kinds]
         if any(cells):
-            made.add_row(words, *cells)
+            made.add_row(text, *cells)
     return made
 
 
@@ -75,8 +75,8 @@ def comparison_sentences(found: dict[str, Any]) -> list[str]:
         if row.get("critic") is not None:
             lines.append(
                 f"Without a hand, after {coding} iterations: critic {row['critic']:.2f}, legs "
-                f"{_words(row.get('critic_legs'))}, with speed and jerk {_words(row.get('critic_moving'))}; "
-                f"energy of the legs {_words(row.get('energy_legs'))}."
+                f"{_shown(row.get('critic_legs'))}, with speed and jerk {_shown(row.get('critic_moving'))}; "
+                f"energy of the legs {_shown(row.get('energy_legs'))}."
             )
     return lines
 
@@ -86,5 +86,5 @@ def _mean(values: Sequence[float | None], digits: int) -> str:
     return f"{statistics.fmean(known):.{digits}f}" if known else ""
 
 
-def _words(value: float | None) -> str:
+def _shown(value: float | None) -> str:
     return "unknown" if value is None else f"{value:.2f}"

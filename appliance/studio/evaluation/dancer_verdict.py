@@ -71,8 +71,8 @@ class Verdict:
 
 def judge(seen: Seen, learned: Learned) -> Verdict:
     """The verdict and what follows from it."""
-    cause, words = _seen(seen)
-    return Verdict(cause, words, _advice(cause, seen, learned))
+    cause, text = _seen(seen)
+    return Verdict(cause, text, _advice(cause, seen, learned))
 
 
 def _seen(seen: Seen) -> tuple[str, str]:
@@ -94,7 +94,7 @@ def _seen(seen: Seen) -> tuple[str, str]:
     wrong = _reservations(seen)
     much = "answers" if seen.answer >= ANSWERS else "answers a little"
     if wrong:
-        named = " and ".join(list(dict.fromkeys(words for _, words in wrong))[:MOST_NAMED])
+        named = " and ".join(list(dict.fromkeys(text for _, text in wrong))[:MOST_NAMED])
         return wrong[0][0], f"The dancer {much} ({seen.answer:.0f} degrees), but {named}."
     if much != "answers":
         return "little", f"The dancer answers a little: a hand moves the rest by {seen.answer:.1f} degrees."

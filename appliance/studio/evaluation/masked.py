@@ -41,13 +41,13 @@ class MaskedStretch:
     def sentence(self) -> str:
         """'salsa_07, 20.95 to 34.47 s: head stands as it does at no other time (163 degrees); also neck'."""
         worst = self.worst
-        words = f"{worst.joint} {REASONS[worst.reason]}".strip()
+        message = f"{worst.joint} {REASONS[worst.reason]}".strip()
         if worst.degrees:
-            words += f" ({worst.degrees:.0f} degrees)"
+            message += f" ({worst.degrees:.0f} degrees)"
         others = sorted({error.joint for error in self.errors} - {worst.joint, ""})
         also = f"; also {', '.join(others)}" if others else ""
         start_s, end_s = self.take.begins_s + self.start_s, self.take.begins_s + self.end_s
-        return f"{self.take.file}, {start_s:.2f} to {end_s:.2f} s: {words}{also}"
+        return f"{self.take.file}, {start_s:.2f} to {end_s:.2f} s: {message}{also}"
 
 
 def masked_stretches(takes: Sequence[Take]) -> list[MaskedStretch]:
@@ -81,8 +81,8 @@ def _row(stretch: MaskedStretch) -> Row:
     start, end, last = stretch.start_s, stretch.end_s, (len(recording) - 1) / FPS
     inside = np.linspace(start, min(end, last), COLUMNS - 2)
     seconds = [start - BESIDE_S, *inside, end + BESIDE_S]
-    words = ["before, ", *[""] * len(inside), "after, "]
-    there = [(at, word) for at, word in zip(seconds, words, strict=True) if 0 <= at <= last]
+    labels = ["before, ", *[""] * len(inside), "after, "]
+    there = [(at, word) for at, word in zip(seconds, labels, strict=True) if 0 <= at <= last]
     chosen = np.round(np.array([at for at, _ in there]) * FPS).astype(np.int64)
     names = {error.joint for error in stretch.errors if error.joint}
     return Row(

@@ -68,7 +68,11 @@ def own_answer(
             measurements, joints[: size.joints], ITERATIONS, FREE, advance, turning=False, recorded=recorded
         )
     draw_answer(picture, measurements[0], joints[0], puppetry.IN_PLAY)
-    return {**found, "measured_on": takes.words, **judged(found, learned(dataset, steps), one_pass_error)}
+    return {
+        **found,
+        "measured_on": takes.description,
+        **judged(found, learned(dataset, steps), one_pass_error),
+    }
 
 
 def learned(dataset: Dataset, steps: int | None) -> Learned:

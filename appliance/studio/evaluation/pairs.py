@@ -65,7 +65,7 @@ class OwnTakes:
 
     pairs: list[Pair]
     reference: Sequence[Take]
-    words: str
+    description: str
 
 
 def own_takes(dataset: Dataset) -> OwnTakes:
@@ -86,14 +86,14 @@ def _on_one_apart(apart: Take, dataset: Dataset) -> OwnTakes:
     training = _longest_of_each(dataset.training)
     if apart.recording.seconds >= HALVES_S:
         phrase, hand = _part(apart, 0, 2), _part(apart, 1, 2)
-        words = f"on two halves of {apart.name}, never seen"
-        return OwnTakes(pair_up([phrase], [hand]), dataset.training, words)
+        description = f"on two halves of {apart.name}, never seen"
+        return OwnTakes(pair_up([phrase], [hand]), dataset.training, description)
     if len(training) == 1:
         hand, rest = (_part(training[0], number, 2) for number in range(2))
-        words = f"on {apart.name}, never seen, with the hand of {hand.name}, which it learned"
-        return OwnTakes(pair_up([apart], [hand]), [rest], words)
-    words = f"on {apart.name}, never seen, with hands of {training[0].name}"
-    return OwnTakes(pair_up([apart], training[:1]), apart_from(dataset, training[:1]), words)
+        description = f"on {apart.name}, never seen, with the hand of {hand.name}, which it learned"
+        return OwnTakes(pair_up([apart], [hand]), [rest], description)
+    description = f"on {apart.name}, never seen, with hands of {training[0].name}"
+    return OwnTakes(pair_up([apart], training[:1]), apart_from(dataset, training[:1]), description)
 
 
 def _on_thirds(take: Take) -> OwnTakes:
@@ -104,8 +104,8 @@ def _on_thirds(take: Take) -> OwnTakes:
             "what the dancer did besides. Record more."
         )
     phrase, rest, hand = (_part(take, number, 3) for number in range(3))
-    words = f"on thirds of {take.name}, which it learned: the figures flatter it, keep a take apart"
-    return OwnTakes(pair_up([phrase], [hand]), [rest], words)
+    description = f"on thirds of {take.name}, which it learned: the figures flatter it, keep a take apart"
+    return OwnTakes(pair_up([phrase], [hand]), [rest], description)
 
 
 def _longest_of_each(takes: Sequence[Take]) -> list[Take]:

@@ -64,8 +64,8 @@ def _mean(rows: list[dict[str, Any]], name: str) -> float | None:
 def print_answer(console: Console, found: dict[str, Any]) -> None:
     """Print table and sentences, or why nothing was measured."""
     if "not_measured" in found:
-        words = f"Whether this dancer answers a hand could not be measured: {found['not_measured']}"
-        console.print(words, highlight=False)
+        message = f"Whether this dancer answers a hand could not be measured: {found['not_measured']}"
+        console.print(message, highlight=False)
         return
     console.print(table(found))
     compared = comparison_table(found, joints_of(found))

@@ -54,7 +54,7 @@ def write_up(
         **figures,
         "quantization": {
             "passed": verdict.passed,
-            "words": verdict.sentence(),
+            "message": verdict.sentence(),
             "limits_degrees": {str(k): limit for k, limit in LIMITS_DEGREES.items()},
             "degrees": {
                 str(k): {"mean": round(verdict.mean[k], 4), "max": round(verdict.largest[k], 4)}

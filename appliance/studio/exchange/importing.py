@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.pose.kept_rows import place_words
+from appliance.pose.kept_rows import place_text
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
@@ -123,7 +123,7 @@ def _with_zeros_as_gaps(
             if always or np.linalg.norm(around, axis=-1).max() > _FAR * size:
                 found[gap.first : gap.last + 1, joint] = np.nan
                 if not always:
-                    frames = place_words(range(gap.first, gap.last + 1), "frame")
+                    frames = place_text(range(gap.first, gap.last + 1), "frame")
                     told.append(f"{names[joint]} is 0, 0, 0 in {frames}: taken as not seen.")
     for line in told[:_SHOWN_GAPS]:
         say(line)
@@ -207,19 +207,19 @@ def _say_gaps(
     fps: float,
     say: Callable[[str], None],
 ) -> None:
-    def words(gap: Gap) -> str:
-        return f"{names[gap.joint]} in {place_words(range(gap.first, gap.last + 1), 'frame')}"
+    def text(gap: Gap) -> str:
+        return f"{names[gap.joint]} in {place_text(range(gap.first, gap.last + 1), 'frame')}"
 
     short = [gap for gap in gaps if gap not in too_long]
     if short:
         longest = max(gap.last - gap.first + 1 for gap in short) / fps
         more = f" and {len(short) - _SHOWN_GAPS} more" if len(short) > _SHOWN_GAPS else ""
-        shown = ", ".join(words(gap) for gap in short[:_SHOWN_GAPS])
+        shown = ", ".join(text(gap) for gap in short[:_SHOWN_GAPS])
         say(f"Gaps: {len(short)} of up to {longest:.2f} s, crossed in straight lines: {shown}{more}.")
     for gap in too_long[:_SHOWN_GAPS]:
         seconds = (gap.last - gap.first + 1) / fps
         say(
-            f"{words(gap)} was not seen for {seconds:.2f} s, from {gap.first / fps:.2f} s on: its bone turns "
+            f"{text(gap)} was not seen for {seconds:.2f} s, from {gap.first / fps:.2f} s on: its bone turns "
             "evenly from the pose before to the pose after. Look whether that can be danced."
         )
     if len(too_long) > _SHOWN_GAPS:

@@ -23,10 +23,10 @@ def retarget(dance: Recording, target: Skeleton) -> Recording:
     Raises ValueError for a skeleton whose names do not say what its joints are.
     """
     source = dance.skeleton
-    for skeleton, words in ((source, "The dance"), (target, "The other skeleton")):
+    for skeleton, label in ((source, "The dance"), (target, "The other skeleton")):
         missing = missing_roles(skeleton.roles)
         if missing:
-            raise ValueError(f"{words} has no joint that is known as {', '.join(missing)}.")
+            raise ValueError(f"{label} has no joint that is known as {', '.join(missing)}.")
     ours, theirs = t_pose(source), t_pose(target)
     positions, world = source.forward_kinematics(dance.poses, dance.roots, dance.translations)
     poses = _turned_alike(world, ours, theirs, _counterparts(source, target))

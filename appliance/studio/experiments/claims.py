@@ -23,10 +23,10 @@ RIGHTLY = (Copy.name, Paste.name)
 
 @dataclass(frozen=True)
 class Bound:
-    """The bound of a figure: at most or at least `limit`; words: 'degrees from the excerpt'."""
+    """The bound of a figure: at most or at least `limit`; text: 'degrees from the excerpt'."""
 
     figure: str
-    words: str
+    text: str
     limit: float
     at_least: bool = False
 
@@ -41,19 +41,19 @@ class Bound:
 
     def __str__(self) -> str:
         """For people: 'degrees from the excerpt at most 3'."""
-        return f"{self.words} {'at least' if self.at_least else 'at most'} {self.limit:g}"
+        return f"{self.text} {'at least' if self.at_least else 'at most'} {self.limit:g}"
 
 
 @dataclass(frozen=True)
 class Claim:
-    """letter and words of the paper; measure: what the figures are; figures: by excerpt and name.
+    """letter and text of the paper; measure: what the figures are; figures: by excerpt and name.
 
     about: the excerpts that the claim speaks of. rightly: null networks that pass it as they should, because
     the claim is that nothing changes.
     """
 
     letter: str
-    words: str
+    text: str
     measure: str
     bounds: tuple[Bound, ...]
     figures: Mapping[str, Mapping[str, float]]
@@ -88,7 +88,7 @@ class Claim:
             for name, row in self.figures.items()
         }
         return {
-            "claim": self.words,
+            "claim": self.text,
             "measure": self.measure,
             "bounds": [str(bound) for bound in self.bounds],
             "figures": figures,
@@ -208,7 +208,7 @@ def _each(
 
 def _claim(
     letter: str,
-    words: str,
+    text: str,
     measure: str,
     bounds: tuple[Bound, ...],
     figures: Mapping[str, Mapping[str, float]],
@@ -216,7 +216,7 @@ def _claim(
     rightly: tuple[str, ...] = (),
 ) -> Claim:
     names = tuple(one.excerpt.name for one in about)
-    return Claim(letter, words, measure, bounds, figures, names, rightly)
+    return Claim(letter, text, measure, bounds, figures, names, rightly)
 
 
 def verdict(claim: Claim) -> str:

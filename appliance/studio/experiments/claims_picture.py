@@ -57,8 +57,8 @@ def _table(axes: Any, name: str, claims: Sequence[Claim], nulls: Mapping[str, Se
         axes.text(CLAIM_SHARE + (column + 0.5) * width, -0.3, excerpt, color=FAINT, fontsize=10, ha="center")
     for row, claim in enumerate(claims):
         drawn = _drawn(claim)
-        words = fill(f"({claim.letter}) {claim.words}", 70)
-        axes.text(0, row + 0.06, words, color=INK, fontsize=9.5, va="top")
+        text = fill(f"({claim.letter}) {claim.text}", 70)
+        axes.text(0, row + 0.06, text, color=INK, fontsize=9.5, va="top")
         told = " / ".join(name.replace("_", " ") for name in drawn)
         axes.text(0, row + 0.92, f"{told}\n{worth(claim, nulls)}", color=FAINT, fontsize=8.5, va="bottom")
         for column, excerpt in enumerate(names):

@@ -134,9 +134,9 @@ def named(file: Path, takes: Sequence[Take], joints: Sequence[str]) -> list[Exce
             continue
         if first > len(take.recording) - FRAMES:
             longest = (len(take.recording) - FRAMES) / FPS
-            words = f"{take.name} ends before an excerpt of {FRAMES / FPS:g} s that starts there."
+            message = f"{take.name} ends before an excerpt of {FRAMES / FPS:g} s that starts there."
             problems.append(
-                entries.problem((name,), words, f"Start at {max(0.0, longest):.1f} s at the latest.")
+                entries.problem((name,), message, f"Start at {max(0.0, longest):.1f} s at the latest.")
             )
             continue
         skeleton = take.recording.skeleton

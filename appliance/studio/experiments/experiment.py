@@ -109,7 +109,7 @@ def run(options: ExperimentOptions) -> None:
     write_page(
         options.out / "experiments.html",
         TITLE,
-        _words(joints, options),
+        _paragraphs(joints, options),
         excerpts,
         found,
         nulls,
@@ -173,10 +173,10 @@ def _joints(wanted: Sequence[str], coder: Coder) -> tuple[str, ...]:
     """As asked for, each once; else the left upper arm."""
     usual = held_joints(coder.joints).get("left upper arm")
     joints = tuple(dict.fromkeys(wanted)) or (() if usual is None else (usual,))
-    words = [f"'{joint}' is not moved by the network" for joint in joints if joint not in coder.joints]
-    if words or not joints:
-        words = words or ["There is no left shoulder by a usual name"]
-        raise StudioError(f"{words[0]}. Say what to hold with --joint: {', '.join(coder.joints)}.")
+    messages = [f"'{joint}' is not moved by the network" for joint in joints if joint not in coder.joints]
+    if messages or not joints:
+        messages = messages or ["There is no left shoulder by a usual name"]
+        raise StudioError(f"{messages[0]}. Say what to hold with --joint: {', '.join(coder.joints)}.")
     return joints
 
 
@@ -235,7 +235,7 @@ def _report(
     }
 
 
-def _words(joints: Sequence[str], options: ExperimentOptions) -> list[str]:
+def _paragraphs(joints: Sequence[str], options: ExperimentOptions) -> list[str]:
     trace = "recorded in the liveliest excerpt, both ways" if options.trace is None else options.trace.name
     return [
         "The experiments of 'Puppeteering an AI' (section 4). Five excerpts of 200 frames at 50 Hz are "
@@ -261,7 +261,7 @@ def _print_verdicts(
     for rows in zip(*found.values(), strict=True):
         bounds = "; ".join(map(str, rows[0].bounds))
         table.add_row(
-            f"({rows[0].letter}) {rows[0].words} ({bounds})",
+            f"({rows[0].letter}) {rows[0].text} ({bounds})",
             *map(verdict, rows),
             worth(rows[0], nulls),
         )

@@ -92,7 +92,7 @@ class Trial:
         self.dances: dict[Condition, Dance] = {}
 
     def run(self, advance: Callable[[str], None] = lambda _: None) -> None:
-        """Dance all conditions; advance(words) before each."""
+        """Dance all conditions; advance(description) before each."""
         for condition in CONDITIONS:
             advance(f"{self.excerpt.name}: {condition.label}")
             self.dances[condition] = self._dance(condition)

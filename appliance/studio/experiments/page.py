@@ -18,7 +18,7 @@ h1, h2, h3 { font-weight: 500 } h1 { font-size: 1.7rem } h2 { margin-top: 3rem }
 table { border-collapse: collapse; margin: 1rem 0; width: 100% }
 th, td { border-bottom: 1px solid #34353d; padding: .35rem .6rem; text-align: right; vertical-align: top }
 th:first-child, td:first-child { text-align: left } th { color: #9a948c; font-weight: 400 }
-.yes { color: #8fc98f } .no { color: #f5462a } .words { color: #9a948c }
+.yes { color: #8fc98f } .no { color: #f5462a } .measure { color: #9a948c }
 img { width: 100%; margin: .5rem 0 1.5rem }
 """
 
@@ -26,14 +26,14 @@ img { width: 100%; margin: .5rem 0 1.5rem }
 def write_page(
     path: Path,
     title: str,
-    words: Sequence[str],
+    text: Sequence[str],
     excerpts: Sequence[Excerpt],
     networks: Mapping[str, Sequence[Claim]],
     nulls: Mapping[str, Sequence[Claim]],
     pictures: Mapping[str, Sequence[Path]],
 ) -> None:
-    """words: paragraphs below the title; networks, nulls: claims by name; pictures: PNG files by heading."""
-    parts = [f"<h1>{html.escape(title)}</h1>", *(f"<p>{html.escape(one)}</p>" for one in words)]
+    """text: paragraphs below the title; networks, nulls: claims by name; pictures: PNG files by heading."""
+    parts = [f"<h1>{html.escape(title)}</h1>", *(f"<p>{html.escape(one)}</p>" for one in text)]
     parts += ["<h2>The excerpts</h2>", _excerpts(excerpts), "<h2>The paper's claims</h2>"]
     parts += [_summary(networks, nulls), "<h3>Networks that know nothing</h3>", _nulls(nulls)]
     for name, claims in networks.items():
@@ -62,13 +62,13 @@ def _summary(networks: Mapping[str, Sequence[Claim]], nulls: Mapping[str, Sequen
     rows = [["claim", "bounds", *networks, "null networks"]]
     for claims in zip(*networks.values(), strict=True):
         first, verdicts = claims[0], map(verdict, claims)
-        rows.append([_words(first), _bounds(first), *verdicts, worth(first, nulls)])
+        rows.append([_title(first), _bounds(first), *verdicts, worth(first, nulls)])
     return _table(rows)
 
 
 def _nulls(nulls: Mapping[str, Sequence[Claim]]) -> str:
     rows = zip(*nulls.values(), strict=True)
-    return _table([["claim", *nulls], *([_words(row[0]), *map(verdict, row)] for row in rows)])
+    return _table([["claim", *nulls], *([_title(row[0]), *map(verdict, row)] for row in rows)])
 
 
 def _claim(claim: Claim) -> str:
@@ -79,12 +79,12 @@ def _claim(claim: Claim) -> str:
         margin = times(claim.margins[name]) if name in claim.about else ""
         rows.append([name, *(f"{figures[column]:.2f}" for column in columns), margin, said])
     measure = html.escape(f"{claim.measure}. Holds with {_bounds(claim)}.")
-    words = html.escape(_words(claim))
-    return f"<p>{words}<br><span class=words>{measure}</span></p>{_table(rows)}"
+    text = html.escape(_title(claim))
+    return f"<p>{text}<br><span class=measure>{measure}</span></p>{_table(rows)}"
 
 
-def _words(claim: Claim) -> str:
-    return f"({claim.letter}) {claim.words}"
+def _title(claim: Claim) -> str:
+    return f"({claim.letter}) {claim.text}"
 
 
 def _bounds(claim: Claim) -> str:

@@ -57,7 +57,7 @@ def strips_of_trial(trial: Trial, folder: Path, network: str) -> list[tuple[Any,
     """The input of draw_strips for each of the FIGURES: the recording, and the conditions under it."""
     skeleton = trial.excerpt.recording.skeleton
     wanted: list[tuple[Any, ...]] = []
-    for number, (words, base, conditions) in enumerate(FIGURES, 1):
+    for number, (text, base, conditions) in enumerate(FIGURES, 1):
         rehearsal = trial.once if base == "once" else trial.looped
         recorded = rehearsal.recording
         held = [skeleton.index(joint) for joint in trial.held_joints(conditions[0])]
@@ -67,6 +67,6 @@ def strips_of_trial(trial: Trial, folder: Path, network: str) -> list[tuple[Any,
             holds = held_throughout(danced.poses, held)
             strips.append(Strip(danced.poses, danced.roots, condition.label, holds=holds))
         path = folder / f"{number}_{conditions[0].family}.png"
-        title = f"{trial.excerpt.name}: {words} ({network})"
+        title = f"{trial.excerpt.name}: {text} ({network})"
         wanted.append((path, skeleton, strips, FPS, title, COLUMNS))
     return wanted

@@ -228,13 +228,15 @@ def _own_phrase(dataset: Dataset) -> tuple[Recording, str, dict[str, Any]]:
     chosen = choose_phrase(dataset)
     if chosen is None:
         phrase, take = _excerpt(dataset)
-        words = f"{phrase.seconds:.0f} s of the recording {take}: none is long enough for a phrase that loops"
-        return phrase, words, {"recording": take}
-    words = (
+        message = (
+            f"{phrase.seconds:.0f} s of the recording {take}: none is long enough for a phrase that loops"
+        )
+        return phrase, message, {"recording": take}
+    message = (
         f"{chosen.recording} from {chosen.from_s:.1f} to {chosen.to_s:.1f} s, the stretch of the recordings "
         "that loops best"
     )
-    return chosen.phrase, words, chosen.as_json()
+    return chosen.phrase, message, chosen.as_json()
 
 
 def _excerpt(dataset: Dataset) -> tuple[Recording, str]:

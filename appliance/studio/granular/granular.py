@@ -6,13 +6,16 @@ or, between two excerpts, where the first one faces.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import torch
 
 from appliance.dancer.blending import Blending
 from appliance.pose import quaternion
-from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.evaluation.coders import Poses
+
+if TYPE_CHECKING:
+    from appliance.studio.autoencoder.autoencoder import Autoencoder
 
 
 def once(windows: Poses, hop: int) -> Poses:
@@ -29,18 +32,20 @@ def cycle(windows: Poses, hop: int) -> Poses:
     return _blended(windows, hop, max(2 * ticks, ticks + length), cyclic=True)[-ticks:]
 
 
-@torch.no_grad()
 def fed_back(autoencoder: Autoencoder, phrase: Poses, share: float, passes: int = 1) -> Poses:
     """The network on its own motion, as long as the phrase's windows (W, T, M, 4): poses (W, M, 4).
 
     Each tick its last window, a tick further on, is coded again, with a share of the phrase's window mixed
     into it by SLERP: 1 is the phrase coded, 0 is left alone with what it danced before.
     """
+    import torch
+
     blending = Blending(phrase.shape[2], phrase.shape[1], shape="hann")
     own, danced = phrase[0], np.empty((len(phrase), *phrase.shape[2:]), dtype=np.float32)
     for tick, given in enumerate(phrase):
         mixed = quaternion.slerp(own, given, np.full(given.shape[:2], share)).astype(np.float32)
-        made = autoencoder.iterate(torch.from_numpy(mixed[None]), passes)[0].numpy()[0]
+        with torch.no_grad():
+            made = autoencoder.iterate(torch.from_numpy(mixed[None]), passes)[0].numpy()[0]
         blending.add(made)
         danced[tick] = blending.take()
         own = _a_tick_on(made)

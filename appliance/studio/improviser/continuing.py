@@ -63,18 +63,18 @@ def continue_prompt(
     asked = options.phrase
     made = continued(follower, dataset, prompt, asked.seconds, asked.temperature, asked.seed, is_quick)
     figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
-    dance, words = made.dance, f"the prompt ends at {made.joined_s:.1f} s"
+    dance, message = made.dance, f"the prompt ends at {made.joined_s:.1f} s"
     if options.prompt is None:
-        dance, figures, words = dance.excerpt(made.joined_s), {}, "after a recorded moment"
+        dance, figures, message = dance.excerpt(made.joined_s), {}, "after a recorded moment"
     natural = measure(dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
     report = {"phrase": asdict(asked), **figures, "naturalness": natural.as_json()}
-    write_dance(options.out, dance, f"{options.out.stem}: {words}", report, rows=3)
+    write_dance(options.out, dance, f"{options.out.stem}: {message}", report, rows=3)
     seam = (
         f" The largest step of a joint around there is {made.seam:.1f} degrees, {made.usual:.1f} are usual "
         "in the prompt."
     )
     Console().print(naturalness_table({options.out.stem: natural}))
-    say(f"{options.out}: {dance.seconds:.1f} s; {words}.{seam if figures else ''}")
+    say(f"{options.out}: {dance.seconds:.1f} s; {message}.{seam if figures else ''}")
 
 
 def _recorded_moment(dataset: Dataset, seed: int) -> Recording:

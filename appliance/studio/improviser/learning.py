@@ -102,17 +102,17 @@ def train_until_done(training: AnyTraining, file: Path, picture: Path, console: 
     file.parent.mkdir(parents=True, exist_ok=True)
 
     with stop_signals() as stop_asked, _progress(console) as progress:
-        bar = progress.add_task("improviser", total=1.0, words="")
+        bar = progress.add_task("improviser", total=1.0, message="")
 
         def stop() -> bool:
             progress.update(bar, completed=training.fraction)
             return stop_asked()
 
         def report(line: ImproviserReport) -> None:
-            words = _history_line(line)
-            progress.update(bar, completed=line.fraction, words=words)
+            message = _history_line(line)
+            progress.update(bar, completed=line.fraction, message=message)
             if not console.is_terminal:
-                console.print(f"{100 * line.fraction:5.1f} %  {words}", highlight=False, soft_wrap=True)
+                console.print(f"{100 * line.fraction:5.1f} %  {message}", highlight=False, soft_wrap=True)
 
         def save() -> None:
             training.save_checkpoint(file)
@@ -125,8 +125,8 @@ def train_until_done(training: AnyTraining, file: Path, picture: Path, console: 
 
 def _progress(console: Console) -> Progress:
     columns = [TextColumn("learning to improvise"), BarColumn(), TaskProgressColumn()]
-    words = TextColumn("{task.fields[words]}")
-    return Progress(*columns, words, console=console, disable=not console.is_terminal)
+    message = TextColumn("{task.fields[message]}")
+    return Progress(*columns, message, console=console, disable=not console.is_terminal)
 
 
 def _history_line(line: ImproviserReport) -> str:

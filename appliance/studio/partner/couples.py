@@ -1,39 +1,55 @@
-"""Couples: two recordings of one take, as steps of an improviser, and moves drawn beside their own."""
+"""Couples: two recordings of one take, as steps of an improviser; the moments that a partner learns from."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from appliance.dancer.material.improviser_network import ImproviserNetwork
-from appliance.dancer.material.improvising import BEFORE, MOVE, Numbers, drawn, parts_of
-from appliance.dancer.material.partner_network import GAP, LED_STEPS
+from appliance.dancer.material.improvising import BEFORE, MOVE, Numbers
+from appliance.dancer.material.partner_network import GAP, LED_STEPS, SEEN
 from appliance.dancer.material.steps import HOP, steps_of
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, Dataset, Take
 from appliance.studio.data.jumps import runs
 from appliance.studio.data.mirror import mirrored
 
-DRAWN = 12  # other moves at each moment
 FIRST = LED_STEPS + GAP  # steps before the first moment
-_EVERY = 2  # steps from one moment to the next
-_AT_ONCE = 512
+DANCED = 4  # steps of a move until the next one
+_EVERY = 2  # recorded steps from one moment to the next
+_ASTRAY = (0.5, 1.0)  # noise on the codes of moves that lead away from a recording, in deviations
+_AT_ONCE = 2048
+
+
+class Stretch(NamedTuple):
+    """A dancer's steps (T, F), and the other's of the couple at the same moments; None where that one was not
+    recorded soundly. who: see PartnerNetwork. take: its number.
+    """
+
+    own: Numbers
+    led: Numbers | None
+    who: int
+    take: int
 
 
 class Moments(NamedTuple):
-    """N moments of couples: what one dancer had danced (N, 16, F), and moves of the other, each with the 3
-    steps before it (N, 1 + 12, 11, F): its own, then others that its improviser could have danced there.
-
-    codes (N, C): its moves. takes (N,): numbers of the takes.
+    """N moments: what the other one had danced (N, 16, F), heard (N,): whether it is known; the dancer's own
+    steps before (N, 11, F), the recorded move after them (N, 8, F) and its code (N, C); who (N,); takes (N,);
+    recorded (N,): whether its own steps are.
     """
 
-    led: Numbers
-    moves: Numbers
+    led: NDArray[np.float16]
+    heard: NDArray[np.bool_]
+    own: NDArray[np.float16]
+    move: NDArray[np.float16]
     codes: Numbers
-    takes: Numbers
+    who: NDArray[np.int_]
+    takes: NDArray[np.int_]
+    recorded: NDArray[np.bool_]
 
 
 def couples_of(takes: Sequence[Take]) -> dict[str, tuple[Take, Take]]:
@@ -44,53 +60,88 @@ def couples_of(takes: Sequence[Take]) -> dict[str, tuple[Take, Take]]:
     return {name: (both[0], both[1]) for name, both in found.items() if len(both) == 2}
 
 
-def moments_of(
-    network: ImproviserNetwork, dataset: Dataset, takes: Sequence[Take], rng: np.random.Generator
-) -> Moments:
-    """Moments of all couples among the takes, either dancer as the one that answers, and in the mirror."""
-    led, moves, codes, names = [], [], [], []
-    for number, (first, second) in enumerate(couples_of(takes).values()):
-        for start, end in runs(first.sound & second.sound):
-            for both in _recorded(first, second, start, end, dataset.mirrors):
-                steps = [steps_of(network, one, dataset.moving).features for one in both]
-                if len(steps[0]) < FIRST + MOVE + 1:
-                    continue
-                for one, other in permutations(steps):
-                    moments, found, own = _moves(network, other, rng)
-                    led.append(np.stack([one[at - FIRST : at - GAP] for at in moments]))
-                    moves.append(found)
-                    codes.append(own)
-                    names += [number] * len(moments)
-    return Moments(np.concatenate(led), np.concatenate(moves), np.concatenate(codes), np.array(names))
+def stretches_of(network: ImproviserNetwork, dataset: Dataset, takes: Sequence[Take]) -> list[Stretch]:
+    """Sound stretches of all couples among the takes, of either dancer, and in the mirror."""
+    found = []
+    for number, both in enumerate(couples_of(takes).values()):
+        sound = np.array([take.sound for take in both])
+        for start, end in runs(sound.all(axis=0)):
+            for mirror, pair in _recorded(both, start, end, dataset.mirrors):
+                steps = [steps_of(network, one, dataset.moving).features for one in pair]
+                for own, led in permutations((0, 1)):
+                    found.append(Stretch(steps[own], steps[led], own + 2 * mirror, number))
+        for own in (0, 1):
+            for start, end in runs(sound[own] & ~sound[1 - own]):
+                for mirror, (one,) in _recorded(both[own : own + 1], start, end, dataset.mirrors):
+                    steps_alone = steps_of(network, one, dataset.moving).features
+                    found.append(Stretch(steps_alone, None, own + 2 * mirror, number))
+    return [stretch for stretch in found if len(stretch.own) >= FIRST + MOVE + 1]
 
 
-def _recorded(first: Take, second: Take, start: int, end: int, mirrors: bool) -> Iterator[list[Recording]]:
-    both = [take.recording.excerpt(start / FPS, end / FPS) for take in (first, second)]
-    for shift in range(0, HOP, 2):
+def _recorded(
+    takes: Sequence[Take], start: int, end: int, mirrors: bool
+) -> Iterator[tuple[int, list[Recording]]]:
+    both = [take.recording.excerpt(start / FPS, end / FPS) for take in takes]
+    for shift in range(HOP):
         shifted = [one.without_first(shift) for one in both]
-        yield shifted
+        yield 0, shifted
         if mirrors:
-            yield [mirrored(one) for one in shifted]
+            yield 1, [mirrored(one) for one in shifted]
 
 
-def _moves(
-    network: ImproviserNetwork, steps: Numbers, rng: np.random.Generator
-) -> tuple[list[int], Numbers, Numbers]:
-    """Moments; (N, 1 + 12, 11, F): the recorded move as the networks give it, and moves drawn there; and
-    the codes (N, C) of the recorded ones.
-    """
-    moments = list(range(FIRST, len(steps) - MOVE, _EVERY))
-    cells = np.zeros((MOVE // _EVERY, network.cells), np.float32)  # a memory for each beginning of moves
-    found, recorded = [], []
-    for number, at in enumerate(moments):
-        chain = number % len(cells)
-        code = network.code_of(steps[None, at - MOVE - BEFORE : at - MOVE], steps[None, at - MOVE : at])
-        before = steps[None, at - BEFORE : at]
-        mixture, cells[chain : chain + 1] = network.forecast(before, code, cells[chain : chain + 1])
-        logits, means, scales = (np.repeat(part, DRAWN, 0) for part in parts_of(mixture, network.mixtures))
-        own = network.code_of(before, steps[None, at : at + MOVE])
-        recorded.append(own)
-        codes = np.concatenate([own, drawn(logits, means, scales, 1.0, rng)])
-        repeated = np.repeat(before, len(codes), 0)
-        found.append(np.concatenate([repeated, network.move_of(repeated, codes)], 1).astype(np.float16))
-    return moments, np.stack(found), np.concatenate(recorded)
+def moments_of(network: ImproviserNetwork, stretches: Sequence[Stretch], rng: np.random.Generator) -> Moments:
+    """Moments of the recordings; and of dances that go astray from them, whose next move leads back."""
+    rows = []
+    for stretch in stretches:
+        rows += [(stretch, stretch.own, at) for at in range(FIRST, len(stretch.own) - MOVE, _EVERY)]
+    for astray in _ASTRAY:
+        for begin in range(0, DANCED, _EVERY):
+            rows += list(_astray(network, stretches, begin, astray, rng))
+    own = np.stack([made[at - SEEN : at] for _, made, at in rows]).astype(np.float16)
+    move = np.stack([stretch.own[at : at + MOVE] for stretch, _, at in rows]).astype(np.float16)
+    led = np.stack([led_of(stretch, at) for stretch, _, at in rows]).astype(np.float16)
+    codes = [
+        network.code_of(own[some, -BEFORE:].astype(np.float32), move[some].astype(np.float32))
+        for some in (slice(at, at + _AT_ONCE) for at in range(0, len(rows), _AT_ONCE))
+    ]
+    return Moments(
+        led,
+        np.array([stretch.led is not None for stretch, _, _ in rows]),
+        own,
+        move,
+        np.concatenate(codes),
+        np.array([stretch.who for stretch, _, _ in rows]),
+        np.array([stretch.take for stretch, _, _ in rows]),
+        np.array([made is stretch.own for stretch, made, _ in rows]),
+    )
+
+
+def led_of(stretch: Stretch, at: int) -> Numbers:
+    """What the other one had danced (16, F) before the step; 0 where it is not known."""
+    if stretch.led is None:
+        return np.zeros((LED_STEPS, stretch.own.shape[1]), np.float32)
+    return stretch.led[at - FIRST : at - GAP]
+
+
+def together(stretches: Sequence[Stretch], begin: int) -> Iterator[tuple[int, list[int]]]:
+    """Each step at which moves begin, and the numbers of the stretches that have one there."""
+    for at in range(FIRST + begin, max(len(one.own) for one in stretches) - MOVE, DANCED):
+        yield at, [n for n, one in enumerate(stretches) if at + MOVE < len(one.own)]
+
+
+def _astray(
+    network: ImproviserNetwork,
+    stretches: Sequence[Stretch],
+    begin: int,
+    astray: float,
+    rng: np.random.Generator,
+) -> Iterable[tuple[Stretch, Numbers, int]]:
+    """Each dance that follows a stretch on and off, with where a move of it begins."""
+    dances = [stretch.own.copy() for stretch in stretches]
+    for at, some in together(stretches, begin):
+        before = np.stack([dances[n][at - BEFORE : at] for n in some])
+        codes = network.code_of(before, np.stack([stretches[n].own[at : at + MOVE] for n in some]))
+        codes += astray * rng.standard_normal(codes.shape).astype(np.float32)
+        for n, move in zip(some, network.move_of(before, codes), strict=True):
+            dances[n][at : at + DANCED] = move[:DANCED]
+            yield stretches[n], dances[n], at

@@ -1,8 +1,10 @@
-"""Trains a partner: to tell the move that a dancer danced with another from moves danced without.
+"""Trains a partner: to dance as one of a couple, after the other one or alone, and to tell what answers.
 
-Two encoders, of what the other one has danced and of a move; their product is a move's score. The loss is
-InfoNCE (Oord et al. 2018): the own move among 12 that the improviser could have danced at that moment, and
-among the moves of other moments.
+Four networks, in this order. Answers: the mixture of the next move's code. Then it dances along the recorded
+takes, and Natural learns to tell its moves from the dancer's: the logarithm of a ratio of densities, by which
+moves are drawn anew on the stage. Scorer: which move answers? Its loss is InfoNCE (Oord et al. 2018), the
+own move among 12 that Answers could have danced at that moment without the other one, and among the moves of
+other moments. Alike: which of the dancers is this?
 """
 
 from __future__ import annotations
@@ -10,23 +12,55 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from appliance.dancer.material.improvising import BEFORE
+from appliance.dancer.material.improviser_network import ImproviserNetwork
+from appliance.dancer.material.improvising import BEFORE, Numbers, drawn, parts_of
 from appliance.dancer.material.partner_network import LED_STEPS, SEEN
 from appliance.studio.improviser.improviser import Mixture
-from appliance.studio.partner.couples import Moments
+from appliance.studio.partner.couples import DANCED, Moments, Stretch, led_of, moments_of, together
 
 BATCH, EMBEDDING, NOISE, DECAY, RATE = 256, 32, 0.3, 0.1, 1e-3
-BEFORE_NOISE = 0.5  # on the steps before a move: on the stage they are its own, not recorded
+ALONE = 0.3  # share of the moments at which the other one is not heard
+OTHERS = 12  # moves drawn at a moment
+_MOST = 12_000  # moments for which they are
 NARROWEST_ANSWER = math.log(0.2)
 LOOK_EVERY = 100  # steps between two looks at the take that is kept apart
+Told = Callable[[str], None]
+Side = tuple[Tensor, Tensor]  # moves with the steps before them (N, 11, F), and who (N, W)
+N = TypeVar("N", bound=nn.Module)
+
+
+class Scale(nn.Module):
+    """Steps (..., T, F) -> (..., T * F), standardised."""
+
+    def __init__(self, features: int) -> None:
+        super().__init__()
+        self.middle: Tensor
+        self.scale: Tensor
+        self.register_buffer("middle", torch.zeros(features))
+        self.register_buffer("scale", torch.ones(features))
+
+    def learn(self, steps: Tensor) -> None:
+        """Set both from steps (N, T, F)."""
+        flat = steps.flatten(0, 1)
+        self.middle.copy_(flat.mean(0))
+        self.scale.copy_(1 / flat.std(0).clamp_min(1e-3))
+
+    def forward(self, steps: Tensor) -> Tensor:
+        out: Tensor = ((steps - self.middle) * self.scale).flatten(-2)
+        return out
+
+    def shaken(self, steps: Tensor, noise: float) -> Tensor:
+        """Steps with noise, in their deviations."""
+        return steps + noise * torch.randn_like(steps) / self.scale
 
 
 class Scorer(nn.Module):
@@ -34,27 +68,18 @@ class Scorer(nn.Module):
 
     def __init__(self, features: int, width: int = 256, dropped: float = 0.4) -> None:
         super().__init__()
-        self.middle: Tensor
-        self.scale: Tensor
-        self.register_buffer("middle", torch.zeros(features))
-        self.register_buffer("scale", torch.ones(features))
-        self.of_led = _encoder(LED_STEPS * features, width, dropped)
-        self.of_move = _encoder(SEEN * features, width, dropped)
-
-    def learn_scale(self, led: Tensor) -> None:
-        """Set middle and scale from steps (N, T, F)."""
-        flat = led.flatten(0, 1)
-        self.middle.copy_(flat.mean(0))
-        self.scale.copy_(1 / flat.std(0).clamp_min(1e-3))
+        self.scale = Scale(features)
+        self.of_led = _dense(LED_STEPS * features, width, width // 2, EMBEDDING, dropped)
+        self.of_move = _dense(SEEN * features, width, width // 2, EMBEDDING, dropped)
 
     def led(self, led: Tensor) -> Tensor:
         """(N, 16, F) -> (N, 32)."""
-        out: Tensor = self.of_led(((led - self.middle) * self.scale).flatten(1))
+        out: Tensor = self.of_led(self.scale(led))
         return out
 
     def move(self, moves: Tensor) -> Tensor:
         """(..., 11, F) -> (..., 32)."""
-        out: Tensor = self.of_move(((moves - self.middle) * self.scale).flatten(-2))
+        out: Tensor = self.of_move(self.scale(moves))
         return out
 
     def forward(self, led: Tensor, moves: Tensor) -> Tensor:
@@ -63,213 +88,399 @@ class Scorer(nn.Module):
 
 
 class Answers(nn.Module):
-    """A dancer's last steps (N, 3, F) and those of the other one (N, 16, F) -> the numbers of the mixture of
-    its next move's code.
+    """A dancer's last steps (N, 11, F), those of the other one (N, 16, F), which dancer it is (N, W) and
+    whether the other one is heard (N, 1) -> the numbers of the mixture of its next move's code.
     """
 
-    def __init__(self, features: int, code: int, mixtures: int = 8, width: int = 384, dropped: float = 0.4):
+    def __init__(
+        self,
+        features: int,
+        code: int,
+        dancers: int,
+        mixtures: int = 8,
+        width: int = 384,
+        dropped: float = 0.4,
+    ) -> None:
         super().__init__()
-        self.middle: Tensor
-        self.scale: Tensor
-        self.register_buffer("middle", torch.zeros(features))
-        self.register_buffer("scale", torch.ones(features))
-        self.mixtures = mixtures
-        self.network = nn.Sequential(
-            nn.Dropout(dropped / 2),
-            nn.Linear((BEFORE + LED_STEPS) * features, width),
-            nn.ELU(),
-            nn.Dropout(dropped),
-            nn.Linear(width, width),
-            nn.ELU(),
-            nn.Dropout(dropped),
-            nn.Linear(width, mixtures * (2 * code + 1)),
-        )
+        self.scale, self.mixtures, self.dancers = Scale(features), mixtures, dancers
+        size = (SEEN + LED_STEPS) * features + dancers + 1
+        self.network = _dense(size, width, width, mixtures * (2 * code + 1), dropped)
 
-    def forward(self, before: Tensor, led: Tensor) -> Tensor:
-        seen = torch.cat([before, led], 1)
-        out: Tensor = self.network(((seen - self.middle) * self.scale).flatten(1))
+    def forward(self, own: Tensor, led: Tensor, who: Tensor, heard: Tensor) -> Tensor:
+        seen = torch.cat([self.scale(own), self.scale(led) * heard, who, heard], 1)
+        out: Tensor = self.network(seen)
+        return out
+
+    def of(self, moments: _Batch, heard: Tensor) -> Mixture:
+        """Mixtures at moments."""
+        numbers = self(moments.own, moments.led, moments.who, heard)
+        return Mixture.of(numbers, self.mixtures, NARROWEST_ANSWER)
+
+
+class Natural(nn.Module):
+    """Moves with the steps before them (N, 11, F), which dancer (N, W) -> the logarithm (N,) of how much
+    likelier they are the dancer's than the partner's.
+    """
+
+    def __init__(self, features: int, dancers: int, width: int = 256, dropped: float = 0.4) -> None:
+        super().__init__()
+        self.scale = Scale(features)
+        self.network = _dense(SEEN * features + dancers, width, width // 2, 1, dropped)
+
+    def forward(self, moves: Tensor, who: Tensor) -> Tensor:
+        out: Tensor = self.network(torch.cat([self.scale(moves), who], 1))[:, 0]
         return out
 
 
-def train_answers(
-    training: Moments,
-    apart: Moments,
+class Alike(nn.Module):
+    """Steps (N, 11, F) -> logits (N, W) of which dancer this is."""
+
+    def __init__(self, features: int, dancers: int, width: int = 64, dropped: float = 0.4) -> None:
+        super().__init__()
+        self.scale = Scale(features)
+        self.network = _dense(SEEN * features, width, width, dancers, dropped)
+
+    def forward(self, steps: Tensor) -> Tensor:
+        out: Tensor = self.network(self.scale(steps))
+        return out
+
+
+class Partner(NamedTuple):
+    """What partner.onnx holds."""
+
+    answers: Answers
+    natural: Natural
+    scorer: Scorer
+    alike: Alike
+
+
+class _Batch(NamedTuple):
+    """Moments on a device, see Moments; who (N, W), heard and recorded (N, 1)."""
+
+    led: Tensor
+    heard: Tensor
+    own: Tensor
+    move: Tensor
+    codes: Tensor
+    who: Tensor
+    recorded: Tensor
+
+    @property
+    def whole(self) -> Tensor:
+        """The recorded move with the 3 steps before it, (N, 11, F)."""
+        return torch.cat([self.own[:, -BEFORE:], self.move], 1)
+
+    def rows(self, chosen: Tensor | slice) -> _Batch:
+        return _Batch(*(part[chosen].float() for part in self))
+
+
+def train(
+    network: ImproviserNetwork,
+    stretches: Sequence[Stretch],
+    apart: Sequence[Stretch],
+    dancers: int,
     seconds: float,
     steps: int,
     device: str = "cpu",
     seed: int = 1,
-    told: Callable[[str], None] = lambda words: None,
-) -> tuple[Answers, float, float]:
-    """The network; of moments kept apart the negative log likelihood of the codes that were danced, with the
-    couple's steps and with another moment's, nats a number.
-    """
+    told: Told = lambda message: None,
+) -> Partner:
+    """All networks within the seconds, or with so many steps each; the best on the stretches kept apart."""
     torch.manual_seed(seed)
-    led, moves, codes = (torch.tensor(np.asarray(part, np.float32)).to(device) for part in training[:3])
-    before = moves[:, 0, :BEFORE]
-    answers = Answers(led.shape[-1], codes.shape[-1]).to(device)
-    flat = led.flatten(0, 1)
-    answers.middle.copy_(flat.mean(0))
-    answers.scale.copy_(1 / flat.std(0).clamp_min(1e-3))
-    average = copy.deepcopy(answers)
-    descent = _Descent(answers, average, seconds, steps)
-    best, least, least_other = copy.deepcopy(answers), math.inf, math.inf
-    while descent.goes_on():
-        chosen = torch.randint(len(led), (BATCH,), device=device)
-        seen = [
-            part[chosen] + noise * torch.randn_like(part[chosen]) / answers.scale
-            for part, noise in ((before, BEFORE_NOISE), (led, NOISE))
-        ]
-        mixture = Mixture.of(answers(*seen), answers.mixtures, NARROWEST_ANSWER)
-        loss = mixture.negative_log_likelihood(codes[chosen]).mean()
-        step = descent.learn(loss)
-        if step % LOOK_EVERY == 0:
-            nats, other = nats_of(average, apart, device)
-            told(
-                f"step {step}: loss {float(loss.detach()):.3f}; kept apart: {nats:.3f} nats, {other:.3f} "
-                "with another moment's steps"
-            )
-            if nats < least:
-                best, least, least_other = copy.deepcopy(average), nats, other
-    return best.cpu().eval(), least, least_other
+    rng = np.random.default_rng(seed)
+    descent = _Descent(steps, told)
+    began = time.monotonic()
+    both = [_moved(moments_of(network, part, rng), dancers, device) for part in (stretches, apart)]
+    seconds = max(seconds - (time.monotonic() - began), 1.0)
+    answers = train_answers(*both, descent.within(0.45 * seconds, "answers"))
+    danced = [dances(network, answers, part, rng, device) for part in (stretches, apart)]
+    natural = train_natural(*both, *danced, descent.within(0.2 * seconds, "natural"))
+    beside = [others(network, answers, part, rng, device) for part in both]
+    scorer = train_scorer(*beside, descent.within(0.3 * seconds, "scores"))
+    alike = train_alike(*both, descent.within(0.05 * seconds, "alike"))
+    return Partner(answers, natural, scorer, alike)
 
 
-class _Descent:
-    """Learns a network until its time or its steps are over: the rate rises in 100 steps and then falls.
+def train_answers(training: _Batch, apart: _Batch, descent: _Descent) -> Answers:
+    """The network of the least negative log likelihood of the moves that were danced."""
+    answers = Answers(training.own.shape[-1], training.codes.shape[-1], training.who.shape[1])
+    answers.scale.learn(training.own.float())
+    answers.to(training.own.device)
 
-    average: becomes the network's running mean, which is what is looked at and kept.
-    """
+    def loss_of(network: Answers) -> Tensor:
+        some = training.rows(_some(training.own))
+        heard = some.heard * (torch.rand_like(some.heard) >= ALONE)
+        scale = network.scale
+        shaken = some._replace(own=scale.shaken(some.own, NOISE), led=scale.shaken(some.led, NOISE))
+        return network.of(shaken, heard).negative_log_likelihood(some.codes).mean()
 
-    def __init__(self, network: nn.Module, average: nn.Module, seconds: float, steps: int) -> None:
-        self._network, self._average, self._seconds, self._steps = network, average, seconds, steps
-        self._optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
-        self._began, self._step = time.monotonic(), 0
+    def look(network: Answers) -> tuple[float, str]:
+        own, other, alone = nats_of(network, apart)
+        return own, f"{own:.3f} nats; {other:.3f} with another moment's steps, {alone:.3f} alone"
 
-    def goes_on(self) -> bool:
-        """Whether another step is due; its rate is set."""
-        gone = (time.monotonic() - self._began) / self._seconds
-        if self._step >= self._steps or gone >= 1:
-            return False
-        for group in self._optimizer.param_groups:
-            rise, fall = (self._step + 1) / 100, 1 - max(gone, self._step / self._steps)
-            group["lr"] = RATE * min(1.0, rise) * max(0.02, fall)
-        return True
-
-    def learn(self, loss: torch.Tensor) -> int:
-        """A step down this loss; how many that makes."""
-        self._optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        self._optimizer.step()
-        self._step += 1
-        with torch.no_grad():
-            _follow(self._average, self._network, self._step)
-        return self._step
-
-
-def _follow(average: nn.Module, network: nn.Module, step: int) -> None:
-    """The mean of the weights of some 200 steps."""
-    for mean, own in zip(average.parameters(), network.parameters(), strict=True):
-        mean.lerp_(own, 1 - min(0.995, step / (step + 10)))
+    return descent.learn(answers, loss_of, look)
 
 
 @torch.no_grad()
-def nats_of(answers: Answers, moments: Moments, device: str = "cpu") -> tuple[float, float]:
-    """Negative log likelihood of the moves' codes with the couple's steps, and with another moment's."""
-    answers.eval()
-    led, moves, codes = (torch.tensor(np.asarray(part, np.float32)).to(device) for part in moments[:3])
+def nats_of(answers: Answers, moments: _Batch) -> tuple[float, float, float]:
+    """Negative log likelihood of the moves' codes, nats a number: with the couple's steps, with another
+    moment's, and with nobody's.
+    """
+    every = slice(None, None, max(1, len(moments.own) // 4096))
+    known = moments.rows(every)
+    is_heard = known.heard[:, 0] > 0
+    some = _Batch(*(part[is_heard] for part in known))
+    wrong = some._replace(led=some.led.roll(len(some.led) // 3, 0))
     found = [
-        float(
-            Mixture.of(answers(moves[:, 0, :BEFORE], steps), answers.mixtures, NARROWEST_ANSWER)
-            .negative_log_likelihood(codes)
-            .mean()
-        )
-        for steps in (led, led.roll(len(led) // 3, 0))
+        float(answers.of(one, heard).negative_log_likelihood(some.codes).mean())
+        for one, heard in ((some, some.heard), (wrong, some.heard), (some, 0 * some.heard))
     ]
-    return found[0], found[1]
+    return found[0], found[1], found[2]
 
 
-def _encoder(size: int, width: int, dropped: float) -> nn.Sequential:
+def train_natural(
+    training: _Batch,
+    apart: _Batch,
+    danced: Side,
+    danced_apart: Side,
+    descent: _Descent,
+) -> Natural:
+    """danced: moves with the steps before them (N, 11, F), and who (N, W), as `dances` gives them."""
+    natural = Natural(training.own.shape[-1], training.who.shape[1])
+    natural.scale.learn(training.own.float())
+    natural.to(training.own.device)
+    recorded = [(one.whole, one.who) for one in map(_recorded, (training, apart))]
+
+    def of(network: Natural, real: Side, made: Side, noise: float) -> Tensor:
+        scores = [network(network.scale.shaken(moves.float(), noise), who) for moves, who in (real, made)]
+        return (functional.softplus(-scores[0]).mean() + functional.softplus(scores[1]).mean()) / 2
+
+    def loss_of(network: Natural) -> Tensor:
+        sides = []
+        for moves, who in (recorded[0], danced):
+            chosen = _some(moves)
+            sides.append((moves[chosen], who[chosen]))
+        return of(network, *sides, NOISE)
+
+    def look(network: Natural) -> tuple[float, str]:
+        with torch.no_grad():
+            found = float(of(network, recorded[1], danced_apart, 0.0))
+        return found, f"tells its moves from the dancer's: {found:.3f} nats (chance {math.log(2):.3f})"
+
+    return descent.learn(natural, loss_of, look)
+
+
+def train_scorer(training: tuple[_Batch, Tensor], apart: tuple[_Batch, Tensor], descent: _Descent) -> Scorer:
+    """training, apart: moments, and moves at each with the steps before them, the own one first
+    (N, 1 + 12, 11, F), as `others` gives them.
+    """
+    moments, moves = training
+    scorer = Scorer(moves.shape[-1])
+    scorer.scale.learn(moments.own.float())
+    scorer.to(moves.device)
+
+    def loss_of(network: Scorer) -> Tensor:
+        chosen, scale = _some(moves), network.scale
+        of_led = network.led(scale.shaken(moments.led[chosen].float(), NOISE))
+        of_moves = network.move(scale.shaken(moves[chosen].float(), NOISE))
+        among = torch.einsum("ne,nce->nc", of_led, of_moves) / EMBEDDING**0.5
+        across = of_led @ of_moves[:, 0].T / EMBEDDING**0.5
+        alike = torch.arange(len(chosen), device=moves.device)
+        other = torch.einsum("ne,nce->nc", of_led.roll(1, 0), of_moves) / EMBEDDING**0.5
+        none = torch.full_like(other, 1 / other.shape[1])  # with another's steps no move is better
+        return (
+            functional.cross_entropy(among, torch.zeros_like(alike))
+            + 0.5 * functional.cross_entropy(across, alike)
+            + 0.5 * functional.cross_entropy(other, none)
+        )
+
+    def look(network: Scorer) -> tuple[float, str]:
+        found, shuffled = found_of(network, *apart)
+        return shuffled - found, (
+            f"finds {100 * found:.1f} % of the moves, {100 * shuffled:.1f} % with another moment's steps"
+        )
+
+    return descent.learn(scorer, loss_of, look)
+
+
+@torch.no_grad()
+def found_of(scorer: Scorer, moments: _Batch, moves: Tensor) -> tuple[float, float]:
+    """Shares of moments whose own move scores highest: with the couple's steps, and with another moment's."""
+    of_moves, led = scorer.move(moves.float()), moments.led.float()
+    shares = []
+    for steps in (led, led.roll(len(led) // 3, 0)):
+        scores = torch.einsum("ne,nce->nc", scorer.led(steps), of_moves)
+        shares.append(float((scores.argmax(1) == 0).float().mean()))
+    return shares[0], shares[1]
+
+
+def train_alike(training: _Batch, apart: _Batch, descent: _Descent) -> Alike:
+    """The network that best tells the dancers."""
+    alike = Alike(training.own.shape[-1], training.who.shape[1])
+    alike.scale.learn(training.own.float())
+    alike.to(training.own.device)
+
+    def loss_of(network: Alike) -> Tensor:
+        some = training.rows(_some(training.own))
+        return functional.cross_entropy(network(network.scale.shaken(some.own, NOISE)), some.who.argmax(1))
+
+    def look(network: Alike) -> tuple[float, str]:
+        with torch.no_grad():
+            scores, who = network(apart.own.float()), apart.who.argmax(1)
+        found = float((scores.argmax(1) == who).float().mean())
+        return float(functional.cross_entropy(scores, who)), f"knows {100 * found:.1f} % of the dancers"
+
+    return descent.learn(alike, loss_of, look)
+
+
+@torch.no_grad()
+def dances(
+    network: ImproviserNetwork,
+    answers: Answers,
+    stretches: Sequence[Stretch],
+    rng: np.random.Generator,
+    device: str,
+) -> Side:
+    """Moves that the partner dances beside the takes, with the steps before them (N, 11, F); who (N, W)."""
+    own = [stretch.own.copy() for stretch in stretches]
+    is_alone = rng.random(len(stretches)) < ALONE
+    found, names = [], []
+    for at, some in together(stretches, 0):
+        seen = np.stack([own[n][at - SEEN : at] for n in some])
+        led = np.stack([led_of(stretches[n], at) for n in some])
+        who = np.array([stretches[n].who for n in some])
+        heard = np.array([stretches[n].led is not None and not is_alone[n] for n in some])
+        codes = _codes(answers, seen, led, who, heard, 1, rng, device)
+        moves = network.move_of(seen[:, -BEFORE:], codes)
+        for n, move in zip(some, moves, strict=True):
+            own[n][at : at + DANCED] = move[:DANCED]
+        found.append(np.concatenate([seen[:, -BEFORE:], moves], 1).astype(np.float16))
+        names.append(who)
+    return _tensor(np.concatenate(found), device), _one_hot(np.concatenate(names), answers.dancers, device)
+
+
+@torch.no_grad()
+def others(
+    network: ImproviserNetwork, answers: Answers, moments: _Batch, rng: np.random.Generator, device: str
+) -> tuple[_Batch, Tensor]:
+    """Some of the moments whose other dancer is known; and moves there with the steps before them
+    (N, 1 + 12, 11, F): the recorded one as the networks give it, and moves drawn without the other dancer.
+    """
+    known = (moments.heard * moments.recorded)[:, 0].nonzero()[:, 0].cpu().numpy()
+    if len(known) > _MOST:
+        known = np.sort(rng.choice(known, _MOST, replace=False))
+    chosen = torch.from_numpy(known).to(device)
+    kept = _Batch(*(part[chosen] for part in moments))
+    found = []
+    for first in range(0, len(known), 512):
+        some = kept.rows(slice(first, first + 512))
+        own, who = some.own.cpu().numpy(), some.who.argmax(1).cpu().numpy()
+        codes = _codes(answers, own, 0 * some.led.cpu().numpy(), who, 0 * who, OTHERS, rng, device)
+        codes = np.concatenate([some.codes.cpu().numpy()[:, None], codes.reshape(len(own), OTHERS, -1)], 1)
+        before = np.repeat(own[:, -BEFORE:], 1 + OTHERS, 0)
+        moves = np.concatenate([before, network.move_of(before, codes.reshape(len(before), -1))], 1)
+        found.append(moves.reshape(len(own), 1 + OTHERS, SEEN, -1).astype(np.float16))
+    return kept, _tensor(np.concatenate(found), device)
+
+
+def _codes(
+    answers: Answers,
+    own: Numbers,
+    led: Numbers,
+    who: NDArray[np.int_],
+    heard: NDArray[np.bool_] | NDArray[np.int_],
+    count: int,
+    rng: np.random.Generator,
+    device: str,
+) -> Numbers:
+    """(N * count, C) drawn."""
+    numbers = answers(
+        _tensor(own, device),
+        _tensor(led, device),
+        _one_hot(who, answers.dancers, device),
+        _tensor(heard.astype(np.float32)[:, None], device),
+    )
+    parts = parts_of(numbers.float().cpu().numpy(), answers.mixtures)
+    logits, means, log_scales = (np.repeat(part, count, 0) for part in parts)
+    return drawn(logits, means, log_scales, 1.0, rng)
+
+
+def _moved(moments: Moments, dancers: int, device: str) -> _Batch:
+    return _Batch(
+        _tensor(moments.led, device),
+        _tensor(moments.heard.astype(np.float32)[:, None], device),
+        _tensor(moments.own, device),
+        _tensor(moments.move, device),
+        _tensor(moments.codes, device),
+        _one_hot(moments.who, dancers, device),
+        _tensor(moments.recorded.astype(np.float32)[:, None], device),
+    )
+
+
+def _recorded(moments: _Batch) -> _Batch:
+    is_recorded = moments.recorded[:, 0] > 0
+    return _Batch(*(part[is_recorded] for part in moments))
+
+
+def _tensor(values: NDArray[np.floating], device: str) -> Tensor:
+    return torch.from_numpy(np.ascontiguousarray(values)).to(device)
+
+
+def _one_hot(who: NDArray[np.int_], dancers: int, device: str) -> Tensor:
+    return functional.one_hot(torch.from_numpy(who), dancers).float().to(device)
+
+
+def _some(rows: Tensor) -> Tensor:
+    return torch.randint(len(rows), (min(BATCH, len(rows)),), device=rows.device)
+
+
+def _dense(size: int, width: int, narrow: int, out: int, dropped: float) -> nn.Sequential:
     return nn.Sequential(
         nn.Dropout(dropped / 2),
         nn.Linear(size, width),
         nn.ELU(),
         nn.Dropout(dropped),
-        nn.Linear(width, width // 2),
+        nn.Linear(width, narrow),
         nn.ELU(),
         nn.Dropout(dropped),
-        nn.Linear(width // 2, EMBEDDING),
+        nn.Linear(narrow, out),
     )
 
 
-@dataclass
-class Learned:
-    """The best scorer, and of moments kept apart: how often it finds the move that was danced (chance 1/13),
-    and how often it does with the steps of another moment in place of the couple's.
+class _Descent:
+    """Learns networks, each until its time or its steps are over: the rate rises in 100 steps and then falls.
+
+    A network's running mean is what is looked at, and kept where it is best.
     """
 
-    scorer: Scorer
-    found: float = 0.0
-    found_shuffled: float = 0.0
-    step: int = 0
-    history: list[tuple[int, float, float, float]] = field(default_factory=list)
+    def __init__(self, steps: int, told: Told) -> None:
+        self._steps, self._told, self._seconds, self._name = steps, told, math.inf, ""
 
+    def within(self, seconds: float, name: str) -> _Descent:
+        """For the next network."""
+        self._seconds, self._name = seconds, name
+        return self
 
-def train(
-    training: Moments,
-    apart: Moments,
-    seconds: float,
-    steps: int,
-    device: str = "cpu",
-    seed: int = 1,
-    told: Callable[[str], None] = lambda words: None,
-) -> Learned:
-    """Train until the time or the steps are over; the scorer of the best look at `apart` is given."""
-    torch.manual_seed(seed)
-    led, moves = (torch.tensor(np.asarray(part, np.float32)).to(device) for part in training[:2])
-    scorer = Scorer(led.shape[-1]).to(device)
-    scorer.learn_scale(led)
-    average = copy.deepcopy(scorer)
-    descent = _Descent(scorer, average, seconds, steps)
-    learned = Learned(copy.deepcopy(average))
-    while descent.goes_on():
-        chosen = torch.randint(len(led), (BATCH,), device=device)
-        noisy = led[chosen] + NOISE * torch.randn_like(led[chosen]) / scorer.scale
-        seen = moves[chosen] + NOISE * torch.randn_like(moves[chosen]) / scorer.scale
-        of_led, of_moves = scorer.led(noisy), scorer.move(seen)
-        among = torch.einsum("ne,nce->nc", of_led, of_moves) / EMBEDDING**0.5
-        across = of_led @ of_moves[:, 0].T / EMBEDDING**0.5
-        alike = torch.arange(BATCH, device=device)
-        other = torch.einsum("ne,nce->nc", of_led.roll(1, 0), of_moves) / EMBEDDING**0.5
-        none = torch.full_like(other, 1 / other.shape[1])  # with another's steps no move is better
-        loss = (
-            functional.cross_entropy(among, torch.zeros_like(alike))
-            + 0.5 * functional.cross_entropy(across, alike)
-            + 0.5 * functional.cross_entropy(other, none)
-        )
-        step = descent.learn(loss)
-        if step % LOOK_EVERY == 0:
-            found, shuffled = found_of(average, apart, device)
-            learned.history.append((step, float(loss.detach()), found, shuffled))
-            told(
-                f"step {step}: loss {float(loss.detach()):.3f}; kept apart: finds {100 * found:.1f} % of the "
-                f"moves, {100 * shuffled:.1f} % with another moment's steps"
-            )
-            if found - shuffled > learned.found - learned.found_shuffled:
-                learned.scorer, learned.found = copy.deepcopy(average).cpu().eval(), found
-                learned.found_shuffled, learned.step = shuffled, step
-    learned.scorer.cpu().eval()
-    return learned
-
-
-@torch.no_grad()
-def found_of(scorer: Scorer, moments: Moments, device: str = "cpu") -> tuple[float, float]:
-    """Shares of moments whose own move scores highest: with the couple's steps, and with another moment's."""
-    was = scorer.training
-    scorer.eval()
-    led, moves = (torch.tensor(np.asarray(part, np.float32)).to(device) for part in moments[:2])
-    of_moves = scorer.move(moves)
-    shares = []
-    for steps in (led, led.roll(len(led) // 3, 0)):
-        scores = torch.einsum("ne,nce->nc", scorer.led(steps), of_moves)
-        shares.append(float((scores.argmax(1) == 0).float().mean()))
-    scorer.train(was)
-    return shares[0], shares[1]
+    def learn(self, network: N, loss_of: Callable[[N], Tensor], look: Callable[[N], tuple[float, str]]) -> N:
+        """The running mean of the least value that `look` gave; with what it says."""
+        average = copy.deepcopy(network).eval().requires_grad_(False)
+        optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
+        best, least, began, step = copy.deepcopy(average), math.inf, time.monotonic(), 0
+        while step < self._steps and (gone := (time.monotonic() - began) / self._seconds) < 1:
+            for group in optimizer.param_groups:
+                fall = 1 - max(gone, step / self._steps)
+                group["lr"] = RATE * min(1.0, (step + 1) / 100) * max(0.02, fall)
+            loss = loss_of(network)
+            optimizer.zero_grad(set_to_none=True)
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimizer.step()
+            step += 1
+            with torch.no_grad():
+                for mean, own in zip(average.parameters(), network.parameters(), strict=True):
+                    mean.lerp_(own, 1 - min(0.995, step / (step + 10)))
+            if step % LOOK_EVERY == 0:
+                value, said = look(average)
+                self._told(f"{self._name}, step {step}: loss {float(loss.detach()):.3f}; kept apart: {said}")
+                if value < least:
+                    best, least = copy.deepcopy(average), value
+        return best

@@ -23,7 +23,7 @@ from appliance.studio.pose_space.drawing import read_line
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.pose_space.latent_poses import latents_of, poses_of
 from appliance.studio.progress import doing, shown
-from appliance.studio.standing_dance import excerpt_of, standing
+from appliance.studio.standing_dance import excerpt_of, only_in, standing
 
 COLUMNS = 8  # in a strip
 
@@ -42,6 +42,7 @@ class PathOptions:
     seed: int = 1
     start: float = 0.0
     seconds: float = 10.0
+    regions: tuple[str, ...] = ()
     reading: ReadingOptions = AS_THE_FILES_SAY
 
 
@@ -50,7 +51,7 @@ def run(options: PathOptions) -> None:
     console = Console(stderr=True)
     opened = open_either(PATH, options.model, options.show, options.recordings, console, options.reading)
     network, dataset, moving = opened.network, opened.dataset, list(opened.dataset.moving)
-    given, phrase = None, options.phrase or (None if options.wobble is None else opened.phrase)
+    given, phrase = None, options.phrase or (opened.phrase if options.wobble or options.regions else None)
     if phrase is not None:
         given = excerpt_of(phrase, options.start, options.seconds, opened.moved, dataset, options.reading)
     if given is not None and options.wobble is not None:
@@ -63,7 +64,9 @@ def run(options: PathOptions) -> None:
         poses = poses_of(network, ground.pose_map.latents(line))
         if ground.reach.is_dead:
             console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
-    progress = partial(shown, words="planting the feet", console=console)
+    if given is not None and options.regions:
+        poses = only_in(options.regions, poses, given, dataset)
+    progress = partial(shown, description="planting the feet", console=console)
     whole = standing(poses, given, dataset, progress, opened.is_of_show)
     write_recording(options.out, whole)
     with doing("measuring the dance and the recordings", console):
@@ -74,14 +77,14 @@ def run(options: PathOptions) -> None:
         "nearest_recorded_pose_degrees": nearest,
         "degrees_a_second": FPS * energy(without_heading(poses)),
     }
-    strips = [Strip(whole.poses, whole.roots, _words(options))]
+    strips = [Strip(whole.poses, whole.roots, _title(options))]
     if given is not None:
         own = given.poses[: len(poses), moving]
         figures["degrees_from_the_phrase"] = float(
             degrees_apart(without_heading(own), without_heading(poses)).mean()
         )
         strips.insert(0, Strip(given.poses, given.roots, "phrase"))
-        strips[1] = Strip(whole.poses, whole.roots, _words(options), behind=strips[0])
+        strips[1] = Strip(whole.poses, whole.roots, _title(options), behind=strips[0])
     with doing("drawing the strip", console):
         picture = options.out.with_suffix(".png")
         draw_strips(picture, dataset.skeleton, strips, FPS, options.out.stem, COLUMNS, options.start)
@@ -92,8 +95,9 @@ def run(options: PathOptions) -> None:
     console.print(f"{options.out}: {said}.", highlight=False, soft_wrap=True)
 
 
-def _words(options: PathOptions) -> str:
+def _title(options: PathOptions) -> str:
+    where = f"{' and '.join(options.regions)} only: " if options.regions else ""
     if options.wobble is not None:
-        return f"wobbling by {options.wobble[0]:g} sigma at {options.wobble[1]:g} Hz"
+        return f"{where}wobbling by {options.wobble[0]:g} sigma at {options.wobble[1]:g} Hz"
     assert options.draw is not None
-    return f"along {options.draw.name}"
+    return f"{where}along {options.draw.name}"

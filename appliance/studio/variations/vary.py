@@ -20,7 +20,6 @@ from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.studio.dance_files import write_recording, write_report
 from appliance.studio.data.dataset import FPS
-from appliance.studio.data.regions import regions_of
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.evaluation.dance_figures import energy, jerk
 from appliance.studio.evaluation.nearest import Reference, reference_of
@@ -29,7 +28,7 @@ from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.opened_model import OpenedModel, open_either
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.progress import doing, shown
-from appliance.studio.standing_dance import excerpt_of, standing
+from appliance.studio.standing_dance import excerpt_of, only_in, standing
 from appliance.studio.trained_on import open_model
 from appliance.studio.variations import variations
 from appliance.studio.variations.timing import difference, retimed
@@ -113,9 +112,13 @@ def run(options: VaryOptions) -> None:
             figures["0_sigma"] = measured(variations.varied(opened.network, own, 0.0, 0), moving, reference)
     for number, (name, one) in enumerate(danced.items(), 1):
         poses = one.poses
-        words = f"{number} of {len(danced)}: planting the feet of {name}"
+        description = f"{number} of {len(danced)}: planting the feet of {name}"
         whole = _untouched(poses, one.path, dataset.moving) or standing(
-            poses, one.path, dataset, partial(shown, words=words, console=console), opened.is_of_show
+            poses,
+            one.path,
+            dataset,
+            partial(shown, description=description, console=console),
+            opened.is_of_show,
         )
         write_recording(options.out / f"{name}.bvh", whole)
         figures[name] = measured(
@@ -125,7 +128,7 @@ def run(options: VaryOptions) -> None:
         strips.append(Strip(whole.poses, whole.roots, name, behind=strips[0] if given is not None else None))
     if options.on_map is not None:
         _draw_on_map(options, given, danced, console)
-    title = _words(options, phrase)
+    title = _title(options, phrase)
     with doing("drawing variations.png", console):
         picture = options.out / "variations.png"
         draw_strips(picture, dataset.skeleton, strips, FPS, title, COLUMNS, options.start)
@@ -208,21 +211,14 @@ def _dances(options: VaryOptions, opened: OpenedModel, given: Recording | None) 
         }
     if not options.regions:
         return made
-    regions = regions_of(dataset.skeleton, dataset.moving_names, "Omit --region.")
-    changed = sorted(place for name in options.regions for place in getattr(regions, name))
-    own = given.poses[:, moving].astype(np.float32)
-    return {name: replace(one, poses=_only(one.poses, own, changed)) for name, one in made.items()}
+    return {
+        name: replace(one, poses=only_in(options.regions, one.poses, given, dataset))
+        for name, one in made.items()
+    }
 
 
-def _only(poses: Poses, own: Poses, changed: list[int]) -> Poses:
-    """The phrase, with the changed joints of a variation."""
-    whole = own[: len(poses)].copy()
-    whole[:, changed] = poses[:, changed]
-    return whole
-
-
-def _words(options: VaryOptions, phrase: Path | None) -> str:
-    where = f", {' and '.join(options.regions)} alone" if options.regions else ""
+def _title(options: VaryOptions, phrase: Path | None) -> str:
+    where = f", {' and '.join(options.regions)} only" if options.regions else ""
     if phrase is None:
         return f"samples from the prior, spread {options.sigma:g}"
     if options.mix is not None:
