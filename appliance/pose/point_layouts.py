@@ -59,3 +59,15 @@ LAYOUTS = {
     ),
 }
 BY_COUNT = {len(layout.parts): name for name, layout in LAYOUTS.items() if name != "h36m"}
+
+# OpenPose's models, which come as files: BODY_25, and COCO with a neck.
+IN_FILES = {
+    "body25": Layout(
+        "OpenPose BODY_25",
+        _parts("nose - r.arm l.arm - r.leg l.leg r.eye l.eye r.ear l.ear l.toe - - r.toe - -"),
+        is_y_down=True,
+    ),
+    "openpose-coco": Layout(
+        "OpenPose COCO", _parts("nose - r.arm l.arm r.leg l.leg r.eye l.eye r.ear l.ear"), is_y_down=True
+    ),
+}
