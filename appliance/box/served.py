@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import ipaddress
+import re
 import socket
 import struct
 from collections.abc import Iterable
@@ -13,6 +14,7 @@ from pathlib import Path
 _ELSEWHERE = "192.0.2.1", 9  # an address of no machine (RFC 5737): which of ours would a packet leave by?
 _GET_ADDRESS, _GET_NETMASK = 0x8915, 0x891B  # SIOCGIFADDR, SIOCGIFNETMASK, netdevice(7)
 _IPV6 = Path("/proc/net/if_inet6")
+_AVAHI, _ANSWERS_WITHIN_S = Path("/run/avahi-daemon/socket"), 0.5  # nss-mdns asks there, too
 _LINK_LOCAL = "20"  # scope, in hexadecimal, as the kernel writes it
 
 
@@ -25,11 +27,11 @@ def listening(host: str, port: int) -> socket.socket:
 
 
 def outward_host() -> str:
-    """The address by which other machines reach this one; its name where it has no network."""
+    """The address by which other machines reach this one; its name where it has none."""
     with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
         asking.connect(_ELSEWHERE)
         return str(asking.getsockname()[0])
-    return socket.gethostname()
+    return next((address for _, address in addresses()), socket.gethostname())
 
 
 def addresses() -> list[tuple[str, str]]:
@@ -70,19 +72,33 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
+def name_in_network() -> str:
+    """The name by which others find this machine (mDNS), as avahi has it: another box may have had the same
+    before; empty without avahi, or without a network.
+    """
+    with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
+        asking.settimeout(_ANSWERS_WITHIN_S)
+        asking.connect(str(_AVAHI))
+        asking.sendall(f"RESOLVE-ADDRESS {outward_host()}\n".encode())
+        said = asking.recv(1024).decode(errors="replace").split()
+        return said[4] if len(said) == 5 and said[0] == "+" else ""
+    return ""
+
+
 class OwnNames:
     """The names by which browsers reach this machine; more: those that the box file lists."""
 
     def __init__(self, more: Iterable[str]) -> None:
         own = socket.gethostname().lower()
-        self._names = {"localhost", own, f"{own}.local", *(name.lower() for name in more)}
+        self._names = {"localhost", own, *(name.lower() for name in more)}
+        self._in_network = re.compile(rf"{re.escape(own)}(-\d+)?\.local")  # numbered where two have a name
 
     def has(self, host: str) -> bool:
         """Whether a Host header names this machine. Addresses do: a foreign page that points its name at the
         box (DNS rebinding) still sends its name.
         """
         name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
-        if name.lower() in self._names:
+        if name.lower() in self._names or self._in_network.fullmatch(name.lower()):
             return True
         try:
             ipaddress.ip_address(name.strip("[]"))

@@ -17,6 +17,7 @@ import typer
 from appliance.box.durable import write_whole
 from appliance.box.notify import WATCHDOG_S
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
+from appliance.box.served import is_loopback, name_in_network
 from appliance.cli.companions import Companion
 from appliance.cli.options import (
     BoxFile,
@@ -163,8 +164,10 @@ def card_lines(box: BoxConfig) -> tuple[str, ...]:
         kept, host, port, https = (runtime_of(box) / WHERE).read_text().splitlines()
         code = pending_code(runtime_of(box))
         update = (f"update code {code}",) if code else ()
-        where = f"page {address(host, int(port), bool(https))}", f"pin {Devices(Path(kept)).pin}"
-        return *where, *update, *wifi
+        at = address(host, int(port), bool(https))
+        name = "" if is_loopback(host) else name_in_network()
+        named = (f"or {address(name, int(port), bool(https))}",) if name else ()
+        return f"page {at}", *named, f"pin {Devices(Path(kept)).pin}", *update, *wifi
     except (OSError, ValueError, StageError):
         return wifi
 

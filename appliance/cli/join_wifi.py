@@ -24,13 +24,14 @@ from appliance.show.config_error import ConfigError
 
 MESSAGE_FILE = "wifi.txt"  # in the run folder: what went wrong, for the test card and the doctor
 _ACCESS_POINT_PROFILE = "sensors.nmconnection"  # by bunraku-access-point
+_AVAHI = ("org.freedesktop.Avahi", "/", "org.freedesktop.Avahi.Server")  # took the name at its own start
 _CARD_S, _JOINED_S = 20.0, 40.0
 _RETRY_S = 0.5
 
 
 class Places(NamedTuple):
     """arrivals: folders that may bring a file, the first that has one counts; kept: over power-off; run:
-    where words are left; profiles: NetworkManager's own folder in memory."""
+    where messages are left; profiles: NetworkManager's own folder in memory."""
 
     arrivals: tuple[Path, ...] = (Path("/media/bunraku"), Path("/boot"), Path("/boot/firmware"))
     kept: Path = Path("/data/network")
@@ -45,7 +46,7 @@ NameBox = Callable[[str], None]
 
 
 def join_wifi(places: Places, run: Run, wait: Wait, name_box: NameBox) -> int:
-    """Apply the newest file; 0, or 1 with words in the run folder."""
+    """Apply the newest file; 0, or 1 with a message in the run folder."""
     message = _applied(places, run, wait, name_box)
     left = places.run / MESSAGE_FILE
     with contextlib.suppress(OSError):
@@ -59,7 +60,7 @@ def join_wifi(places: Places, run: Run, wait: Wait, name_box: NameBox) -> int:
 
 
 def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
-    """The fault in words for people; empty if all is well or no Wi-Fi is asked for."""
+    """The fault as a message; empty if all is well or no Wi-Fi is asked for."""
     arrived = next((path for path in (one / NAME for one in places.arrivals) if _asks(path)), None)
     kept = places.kept / NAME
     path = arrived or kept
@@ -152,6 +153,7 @@ def main() -> int:
 def _name_box(name: str) -> None:
     with contextlib.suppress(OSError):
         socket.sethostname(name)
+        _run(("busctl", "call", *_AVAHI, "SetHostName", "s", name))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import ipaddress
 import os
 import socket
 from typing import TYPE_CHECKING
@@ -39,7 +38,7 @@ def address_of(descriptor: int, https: bool = False) -> str:
 
 
 def address(host: str, port: int, https: bool = False) -> str:
-    """The same of a socket that listens on this host and port."""
-    if ipaddress.ip_address(host).is_unspecified:
+    """The same of a socket that listens on this host and port, or of a name."""
+    if host in ("0.0.0.0", "::"):
         host = outward_host()
     return f"http{'s' * https}://{f'[{host}]' if ':' in host else host}:{port}"
