@@ -97,11 +97,12 @@ def measure(
                 print(f"Listening to the strings for {free_s:g} s ...", flush=True)
                 page.tell(phase="sound", seconds=free_s)
                 heard = run(setting, sound_course(free_s))
-            seen: list[Run] = []
+            seen: tuple[Run, Run] | tuple[None, None] = (None, None)
             if light:
                 print(f"Watching the projector's pictures for {free_s:g} s ...", flush=True)
-                seen = [run(setting, course) for course in light_courses(free_s)]
-            evidence = Evidence(locked, free, power_ons, restarts, firmware, *(seen or (None, None)), heard)
+                steps, dance = light_courses(free_s)
+                seen = run(setting, steps), run(setting, dance)
+            evidence = Evidence(locked, free, power_ons, restarts, firmware, *seen, heard)
     except (ProbeError, OSError, ValueError) as error:
         message = sentence(error) if isinstance(error, OSError) else None
         print(f"bunraku measure: {message or error}", file=sys.stderr)

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,8 @@ class Setting:
     """The subject of a measurement: a show, settings of the venue's box file, keys, the followed sensor and
     its joint.
 
-    firmware: the sensor runs the compiled firmware instead of the one in Python.
+    firmware: the sensor runs the compiled firmware instead of the one in Python. sounds: the show has
+    strings and the venue lets them sound; cue: in which of its cues, "" any.
     """
 
     show: Path
@@ -55,6 +56,8 @@ class Setting:
     joint: str
     scratch: Path
     firmware: bool = False
+    sounds: bool = False
+    cue: str = ""
 
 
 def play_command(setting: Setting, box: Path) -> list[str]:
@@ -65,6 +68,11 @@ def play_command(setting: Setting, box: Path) -> list[str]:
 def project_command(box: Path) -> list[str]:
     """The projector, on the whole screen, with time stamps."""
     return [sys.executable, "-m", "appliance.cli", "project", "--box", str(box), "--fullscreen", "--stamp"]
+
+
+def sound_command(box: Path) -> list[str]:
+    """The strings, started as their unit does."""
+    return [sys.executable, "-m", "appliance.start", "sound", "--box", str(box)]
 
 
 def emulate_command(setting: Setting, port: int, log: Path, *options: str) -> list[str]:
@@ -159,7 +167,9 @@ def remove_folder(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def process(command: Sequence[str], output: Path) -> Iterator[subprocess.Popen[bytes]]:
+def process(
+    command: Sequence[str], output: Path, environment: Mapping[str, str] | None = None
+) -> Iterator[subprocess.Popen[bytes]]:
     """Runs inside the context, and not longer than this process; its output goes into the file `output`."""
     with output.open("ab") as out:
         running = subprocess.Popen(
@@ -167,6 +177,7 @@ def process(command: Sequence[str], output: Path) -> Iterator[subprocess.Popen[b
             stdin=subprocess.DEVNULL,
             stdout=out,
             stderr=subprocess.STDOUT,
+            env=environment,
             preexec_fn=_end_with_parent,
         )
         try:

@@ -33,14 +33,16 @@ from hw_sim.peers import (
     play_command,
     process,
     project_command,
+    sound_command,
     stop,
     write_box_file,
 )
 from hw_sim.progress import LiveTransport, Progress
 from hw_sim.screen import Picture, Screen, Watcher
+from hw_sim.sound_card import Played, environment, read_played
 
-PLAYER_STOP = b"/player/stop\0\0\0\0,\0\0\0"
 POSE = b"/mocap/0/joint/rot_local\0"
+_PLAYED = "played.raw"
 STEADY_S = 1.0  # how long the box dances with the sensor before it is killed
 
 
@@ -48,8 +50,8 @@ STEADY_S = 1.0  # how long the box dances with the sensor before it is killed
 class Course:
     """Plan of one run. In its last `standing_s` the phrase stands still, so that only steps show.
 
-    projects: a projector shows the dance on the screen, and its pictures are watched. dances: the hand
-    dances, in place of steps.
+    projects: a projector shows the dance on the screen, and its pictures are watched. sounds: the strings
+    play on an emulated card. dances: the hand dances, in place of steps.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Course:
     seed: int = 1
     reboot_every_s: float | None = None
     projects: bool = False
+    sounds: bool = False
     dances: bool = False
 
 
@@ -75,6 +78,7 @@ class Run:
     start_to_first_frame_s: float
     stood_from: float
     pictures: Sequence[Picture] = ()
+    played: Played | None = None
 
 
 def run(setting: Setting, course: Course, progress: Progress | None = None) -> Run:
@@ -100,6 +104,7 @@ def run(setting: Setting, course: Course, progress: Progress | None = None) -> R
             *(setting, folder, (sensors, control, receiver.port)),
             journal={"folder": "run.journal", "minutes": max(1.0, course.seconds / 60.0 + 0.5)},
             phase_lock=course.phase_lock,
+            sound=(setting.box.get("sound") or {}) if course.sounds else None,
         )
         begun = time.monotonic()
         with process(play_command(setting, box), output) as stage:
@@ -108,7 +113,9 @@ def run(setting: Setting, course: Course, progress: Progress | None = None) -> R
             with process(emulate, folder / "emulator.txt") as emulator:
                 first_reading(emulator, log, folder / "emulator.txt")
                 live = LiveTransport(progress or Progress(None), log, setting.sensor)
-                with _seen(screen, box, folder) as pictures, closing(live):
+                if course.sounds and setting.cue:
+                    _order(control, "/cue", setting.cue)
+                with _seen(screen, box, folder) as pictures, _heard(course, box, folder), closing(live):
                     datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control, live)
             stop(stage, output)
     header, ticks = read_journal(folder / "run.journal")
@@ -121,7 +128,24 @@ def run(setting: Setting, course: Course, progress: Progress | None = None) -> R
         start_to_first_frame_s=first - begun,
         stood_from=stood_from,
         pictures=pictures,
+        played=read_played(folder / _PLAYED) if course.sounds else None,
     )
+
+
+@contextmanager
+def _heard(course: Course, box: Path, folder: Path) -> Iterator[None]:
+    """The strings play meanwhile, if the course wants them. Raises ProbeError where nothing is played."""
+    if not course.sounds:
+        yield
+        return
+    output, log = folder / "sound.txt", folder / _PLAYED
+    with process(sound_command(box), output, environment(log)) as sound:
+        until = time.monotonic() + STARTS_WITHIN_S
+        while not (log.exists() and log.stat().st_size):
+            if sound.poll() is not None or time.monotonic() > until:
+                raise ProbeError(f"The strings play nothing:\n{output.read_text().strip()}")
+            time.sleep(0.05)
+        yield
 
 
 @contextmanager
@@ -199,9 +223,16 @@ def _watch(
             rss_mb, look_at = max(rss_mb, _resident_mb(stage.pid)), now + 0.5
         if now >= stand_at and stood_from > now:
             stood_from = now
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as commander:
-                commander.sendto(PLAYER_STOP, (HOST, control))
+            _order(control, "/player/stop")
     return datagrams, rss_mb, stood_from
+
+
+def _order(port: int, address: str, *output: str) -> None:
+    """Send an OSC message of strings."""
+    texts = [address, "," + "s" * len(output), *output]
+    padded = [text.encode() + b"\0" * (4 - len(text.encode()) % 4) for text in texts]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as commander:
+        commander.sendto(b"".join(padded), (HOST, port))
 
 
 def _frames(datagrams: Sequence[tuple[float, bytes]], joint: int) -> list[Frame]:

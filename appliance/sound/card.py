@@ -16,6 +16,7 @@ from appliance.show.sound import SoundConfig
 RETRY_S = 1.0
 LIBRARY_RETRY_S = 10.0  # to look for it costs a tenth of a second
 STALLED_S = 1.0  # without a request for a block: the card is gone, whatever its driver says
+OFTEN, COUNTED_S, LONGEST = 6, 10.0, 512  # dropouts; samples
 _ALSA = "libasound.so.2"
 
 
@@ -23,7 +24,8 @@ class Card:
     """Plays what `render` gives, in PortAudio's own thread. `look` opens it again after it was away.
 
     trouble: why it is silent, else ""; is_missing: because this system has no sound at all. dropouts: blocks
-    that came too late. refused: why the thread has no real-time priority, else "".
+    that came too late; after OFTEN of them within COUNTED_S it asks for blocks twice as long, up to LONGEST,
+    until it is opened anew. refused: why the thread has no real-time priority, else "".
     """
 
     def __init__(
@@ -36,6 +38,7 @@ class Card:
         self._stream: Any = None
         self._tries_at = 0.0
         self._blocks, self._seen = 0, (0, 0.0)  # seen: the count of blocks, and when
+        self._block, self._counted = config.block, (0, 0.0)  # counted: the dropouts, and when
         self.trouble, self.dropouts, self.is_missing, self.refused = "", 0, False, ""
 
     @property
@@ -50,13 +53,25 @@ class Card:
                 self._seen = self._blocks, now
             if not self._stream.active or now - self._seen[1] > STALLED_S:
                 self._drop("The sound card was unplugged. The strings are silent until it is back.")
+            elif self._drops_out_often(now) and self._block < LONGEST:
+                self._block = min(2 * self._block, LONGEST)
+                self._drop("")
+                self._open(now)
         if self._stream is None and now >= self._tries_at:
+            self._block = self._config.block
             self._tries_at = now + RETRY_S
             self._open(now)
 
     def close(self) -> None:
         """Give the card back."""
         self._drop("")
+
+    def _drops_out_often(self, now: float) -> bool:
+        before, since = self._counted
+        if now - since <= COUNTED_S and self.dropouts - before < OFTEN:
+            return False
+        self._counted = self.dropouts, now
+        return now - since <= COUNTED_S
 
     def _open(self, now: float) -> None:
         config, self.is_missing = self._config, True
@@ -84,11 +99,11 @@ class Card:
             self._library, self._priority = library, self._wanted_priority
             stream = library.OutputStream(
                 samplerate=config.rate,
-                blocksize=config.block,
+                blocksize=self._block,
                 device=config.device,
                 channels=config.channels,
                 dtype="float32",
-                latency="low",
+                latency=self._block / config.rate,  # "low" means 8 ms to PortAudio, however small a block is
                 callback=self._fill,
             )
             stream.start()

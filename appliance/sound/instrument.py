@@ -24,15 +24,15 @@ _DOWN, _UP = 0.6, 0.7  # height of the root on the floor, and up again; shares o
 
 class Instrument:
     """Strings of one skeleton on the loudspeakers of one box. Deterministic: the same poses give the same
-    samples. dance() and level may come from another thread than render().
+    samples. level may come from another thread than dance() and render().
 
-    level: 0..1, master and fades; reached within one block, evenly. 0 stops the strings. cue: place of the
-    present cue among those of the show, which chooses the harmony.
+    joints: of the poses that it plays to. level: 0..1, master and fades; reached within one block, evenly;
+    0 stops the strings. cue: place of the present cue among those of the show, which chooses the harmony.
     """
 
     def __init__(self, skeleton: Skeleton, strings: StringsConfig, sound: SoundConfig) -> None:
         self._harmonies = [Strings(skeleton, strings, sound.rate, scale=scale) for scale in strings.harmonies]
-        self.level, self.cue = 0.0, 0
+        self.level, self.cue, self.joints = 0.0, 0, len(skeleton)
         self._tallest_m, self._is_down = 0.0, False
         self._rate = sound.rate
         self._pan = around(self.strings.places, sound.channels)

@@ -14,7 +14,7 @@ from appliance.box.fallback import Fallbacks
 from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealthWriter
-from appliance.box.realtime import share_the_interpreter
+from appliance.box.realtime import share_the_interpreter, thread_priority
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
 from appliance.box.stop_signals import stop_signals
@@ -31,7 +31,7 @@ from appliance.sound.card import Card
 from appliance.sound.fallback import CARD_AWAY, DROPOUTS, NO_CARD, OF_THE_SOUND, STAGE_UNSEEN
 from appliance.sound.instrument import Instrument
 
-LOOK_S = 0.005  # how often frame and show state are read
+LOOK_S = 0.02  # how often show, cue and fades are looked at: each look holds up the card's thread
 LOST_S = 0.5  # without a frame: as the projector
 FADE_S = 0.5  # in which the strings then fade out
 CHANGE_S = 0.1  # for the strings of one show to fall silent before those of another sound
@@ -79,7 +79,8 @@ class Sound:
         self._fades: dict[str, float] = {}
         self._places: dict[str, int] = {}
         self._generation: int | None = None
-        self._tick, self._seen_at = -1, 0.0
+        self._seen, self._seen_at = -1, 0.0  # the newest frame, and when it left the stage
+        self._danced = -1
         self._trouble = ""
 
     def look(self, now: float) -> None:
@@ -99,10 +100,8 @@ class Sound:
             return
         if self.instrument is None:
             return
-        facts = self._stage.facts
-        if frame is not None and facts is not None and frame.tick != self._tick:
-            self._tick, self._seen_at = frame.tick, frame.left
-            self.instrument.dance(facts.led_in(frame).positions, frame.frame_time)
+        if frame is not None and frame.tick != self._seen:
+            self._seen, self._seen_at = frame.tick, frame.left
         age_s = now - self._seen_at
         if age_s >= LOST_S:
             self.instrument.rest()
@@ -112,6 +111,16 @@ class Sound:
         loud = state.level(now) * state[STRINGS].level(now) * entered
         self.instrument.cue = self._places.get(state.cue, 0)
         self.instrument.level = loud * min(max(1.0 - (age_s - LOST_S) / FADE_S, 0.0), 1.0)
+
+    def dance(self, stage: FrameReader, now: float) -> None:
+        """Play to the newest frame. For the card's thread, right before each block: a frame that waited for
+        `look` would be heard up to LOOK_S later. stage: a reader of that thread's own."""
+        frame, facts, instrument = stage.newest(now), stage.facts, self.instrument
+        if frame is None or facts is None or instrument is None or frame.tick == self._danced:
+            return
+        self._danced, positions = frame.tick, facts.led_in(frame).positions
+        if len(positions) == instrument.joints:  # else of a show whose strings have not come in yet
+            instrument.dance(positions, frame.frame_time)
 
     def render(self, frames: int, show_state: ShowState) -> NDArray[np.float32]:
         """The next samples (frames, channels): for the card's thread, which is late for nothing else. It also
@@ -177,19 +186,26 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
         opened.callback(speaker.close)
         folder = runtime_folder(box)
         opened.callback(Claim(folder, "sound").close)
-        notifier, stage = Notifier(), FrameReader(folder)
+        notifier, stage, danced = Notifier(), FrameReader(folder), FrameReader(folder)
         show_state, for_the_card = ShowStateReader(folder), ShowStateReader(folder)
         fallbacks = Fallbacks(OF_THE_SOUND)
         process_health = ProcessHealthWriter(folder, "sound", fallbacks)
-        for one in (notifier, stage, show_state, for_the_card, process_health):
+        for one in (notifier, stage, danced, show_state, for_the_card, process_health):
             opened.callback(one.close)
         sound = Sound(config, stage, show_state, speaker.say, fallbacks)
         priority = (
             max(box.realtime.priority // 2, 1) if box.realtime.enabled else None
         )  # the dance goes first
-        card = Card(config, lambda frames: sound.render(frames, for_the_card.read()), priority)
+
+        def render(frames: int) -> NDArray[np.float32]:
+            sound.dance(danced, time.monotonic())
+            return sound.render(frames, for_the_card.read())
+
+        card = Card(config, render, priority)
         opened.callback(card.close)
         share_the_interpreter()
+        if priority is not None:
+            thread_priority(1)  # this thread, held up with the interpreter in hand, would hold up the card's
         notifier.ready("The strings follow the stage.")
         report_at = 0.0
         while not stopped():
