@@ -1,6 +1,8 @@
-"""The page's fallbacks: when strangers crowd it, when they try PINs, when a phone sends nonsense."""
+"""The page's fallbacks: strangers crowd it or try PINs, a phone sends nonsense, reports do not arrive."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from appliance.box.fallback import Fallback, Fallbacks
 
@@ -28,7 +30,18 @@ PHONE_REFUSED = Fallback(
     f"A phone in place of a sensor sent readings with {_NONSENSE}",
     f"The phone that is {{about}} sent readings with {_NONSENSE}",
 )
-OF_THE_PAGE = (CROWDED, PIN_CHANGED, PHONE_REFUSED)
+_UNSENT = (
+    "did not arrive, and is tried again, at last every five minutes. The dance goes on. See whether the box "
+    "reaches the internet, and `console: report` in the box file."
+)
+UNSENT = Fallback("report-unsent", f"A report {_UNSENT}", f"A report by {{about}} {_UNSENT}")
+OF_THE_PAGE = (CROWDED, PIN_CHANGED, PHONE_REFUSED, UNSENT)
+
+
+def note_unsent(fallbacks: Fallbacks, ways: Sequence[str]) -> None:
+    """Reports by these ways have not arrived; [] all have."""
+    fallbacks.concern(UNSENT.name, ways)
+    fallbacks.set(UNSENT.name, bool(ways))
 
 
 def note_crowd(fallbacks: Fallbacks, address: str) -> None:

@@ -8,8 +8,12 @@ import json
 import socket
 import time
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+from appliance.box.fallback import Fallbacks
+from appliance.console.fallback import UNSENT, note_unsent
 
 FILE = "console.report"  # in the runtime folder, readable for the box only: addresses and passwords are in it
 _PATIENCE_S = 15.0
@@ -17,7 +21,10 @@ _LOOK_S = 1.0
 _LONGEST = 300  # characters of a sentence
 _JUST_S = 300.0  # a stage that started within this time has just come on
 
-Send = Callable[[Mapping[str, Any], Mapping[str, Any]], None]
+_MOST_LINES = 40  # that wait while reports do not arrive
+_RETRY_S, _LONGEST_RETRY_S = 5.0, 300.0
+
+Send = Callable[[Mapping[str, Any]], None]
 
 
 class Reports:
@@ -60,17 +67,51 @@ class Reports:
         return lines
 
 
-async def watch(settings: Mapping[str, Any], value: Callable[[], Mapping[str, Any]], send: Send) -> None:
-    """Report until cancelled. A report that does not arrive is logged, and its changes are not told again."""
-    reports = Reports(settings["after_s"], settings["every_s"])
+class Post:
+    """One way of reports, with those that have not arrived yet: tried again ever later.
+
+    name: in the box file, "webhook" or "mail". trouble: why the last one did not arrive, else "".
+    """
+
+    def __init__(self, name: str, send: Send) -> None:
+        self.name, self.trouble = name, ""
+        self._send = send
+        self._lines: list[str] = []
+        self._tries, self._next_at = 0, 0.0
+
+    def add(self, lines: Iterable[str]) -> None:
+        """More to tell; of very many the newest."""
+        self._lines = [*self._lines, *lines][-_MOST_LINES:]
+
+    async def look(self, value: Mapping[str, Any], now: float) -> None:
+        """Send what waits, if it is time to; monotonic seconds."""
+        if not self._lines or now < self._next_at:
+            return
+        told = report(self._lines, value, time.time())
+        try:
+            await asyncio.to_thread(self._send, told)
+        except Exception as error:  # a server far away may answer with anything
+            if not self.trouble:
+                print(f"A report by {self.name} could not be sent ({error}). It is tried again.", flush=True)
+            self.trouble = str(error) or type(error).__name__
+            self._next_at = now + min(_RETRY_S * 2.0**self._tries, _LONGEST_RETRY_S)
+            self._tries = min(self._tries + 1, 30)
+            return
+        self.trouble, self._tries, self._lines = "", 0, []
+
+
+async def watch(
+    settings: Mapping[str, Any], value: Callable[[], Mapping[str, Any]], fallbacks: Fallbacks
+) -> None:
+    """Report until cancelled. A report that does not arrive is a fallback, and is tried again."""
+    reports, posts = Reports(settings["after_s"], settings["every_s"]), posts_of(settings)
     while True:
         await asyncio.sleep(_LOOK_S)
-        if lines := reports.look(value(), time.time()):
-            told = report(lines, value(), time.time())
-            try:
-                await asyncio.to_thread(send, settings, told)
-            except Exception as error:  # a server far away may answer with anything
-                print(f"A report could not be sent ({error}). The show goes on.", flush=True)
+        lines = reports.look(value(), time.time())
+        for post in posts:
+            post.add(lines)
+            await post.look(value(), time.monotonic())
+        note_unsent(fallbacks, [post.name for post in posts if post.trouble])
 
 
 def report(lines: Iterable[str], value: Mapping[str, Any], now: float) -> dict[str, Any]:
@@ -84,12 +125,11 @@ def report(lines: Iterable[str], value: Mapping[str, Any], now: float) -> dict[s
     }
 
 
-def send(settings: Mapping[str, Any], told: Mapping[str, Any]) -> None:
-    """Send a report, blocking, for 15 s at most each way. Raises OSError and what servers answer."""
-    if settings.get("webhook"):
-        _post(settings["webhook"], told)
-    if settings.get("mail"):
-        _mail(settings["mail"], told)
+def posts_of(settings: Mapping[str, Any]) -> list[Post]:
+    """The ways that the box file has; each blocks for 15 s at most, and raises OSError and what servers
+    answer."""
+    ways: dict[str, Callable[[Any, Mapping[str, Any]], None]] = {"webhook": _post, "mail": _mail}
+    return [Post(name, partial(way, settings[name])) for name, way in ways.items() if settings.get(name)]
 
 
 def settings_in(folder: Path) -> dict[str, Any] | None:
@@ -101,7 +141,8 @@ def settings_in(folder: Path) -> dict[str, Any] | None:
 
 
 def _active(value: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [one for one in value.get("fallbacks", ()) if one["active"]]
+    """Without the one of these reports themselves: who reads one has got it."""
+    return [one for one in value.get("fallbacks", ()) if one["active"] and one["name"] != UNSENT.name]
 
 
 def _post(address: str, told: Mapping[str, Any]) -> None:

@@ -43,7 +43,7 @@ from appliance.console.pose_map import PoseMap
 from appliance.console.prove import Prove
 from appliance.console.proving import Proving
 from appliance.console.rehearsed import FOLDER, ZIP, Rehearsed
-from appliance.console.report import send, settings_in, watch
+from appliance.console.report import settings_in, watch
 from appliance.console.rig import Rig
 from appliance.console.seen_stage import SeenStage
 from appliance.console.sensor_changes import SensorChanges
@@ -125,7 +125,7 @@ async def _serve(settings: Settings) -> int:
         asyncio.create_task(hands.watch()),
         asyncio.create_task(phones.watch()),
         asyncio.create_task(night.watch()),
-        *_reporting(folder, box),
+        *_reporting(folder, box, fallbacks),
         asyncio.create_task(stopped.wait()),
     ]
     ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -151,9 +151,9 @@ async def _serve(settings: Settings) -> int:
     return 0
 
 
-def _reporting(folder: Path, box: BoxView) -> list[asyncio.Task[None]]:
+def _reporting(folder: Path, box: BoxView, fallbacks: Fallbacks) -> list[asyncio.Task[None]]:
     wanted = settings_in(folder)
-    return [] if wanted is None else [asyncio.create_task(watch(wanted, lambda: box.value, send))]
+    return [] if wanted is None else [asyncio.create_task(watch(wanted, lambda: box.value, fallbacks))]
 
 
 def _https(settings: Settings) -> ssl.SSLContext:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +74,7 @@ class Dance:
         """Take the puppet's newest frame, which may be the same again; `generation`: the stage's."""
         tick = (generation, frame.tick)
         self._age_s = min(max(now - max(frame.left, frame.frame_time), 0.0), MOST_ON_S)
+        self.__dict__.pop("eyes", None)
         if tick == self._tick:
             if now - self._time > PAUSE_S:
                 self._settle(np.zeros_like(self.speeds), PAUSE_S)
@@ -102,9 +104,10 @@ class Dance:
         """Position of a joint (None: the root), (3,) metres."""
         return self._now(ROOT if joint is None else self.skeleton.index(joint))
 
-    @property
+    @cached_property
     def eyes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """The dancer's eyes, (3,) metres, and where they look, a unit vector; None: there is no head."""
+        """The dancer's eyes, (3,) metres, and where they look, a unit vector; None: there is no head. Computed
+        once a pass: `take_frame` begins one."""
         if self._head is None:
             return None
         turned = self.world[self._head]

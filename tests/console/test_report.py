@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import socketserver
@@ -13,7 +14,10 @@ from typing import Any
 
 import pytest
 
-from appliance.console.report import FILE, Reports, report, send, settings_in
+import appliance.console.report
+from appliance.box.fallback import Fallbacks
+from appliance.console.fallback import OF_THE_PAGE
+from appliance.console.report import FILE, Post, Reports, posts_of, settings_in, watch
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 
@@ -48,25 +52,84 @@ def test_a_moment_of_silence_is_never_told() -> None:
         assert reports.look(box({**SILENT, "active": False}, uptime_s=4000.0), now + 5.0) == []
 
 
+def sent(settings: dict[str, Any], lines: list[str], value: dict[str, Any]) -> None:
+    """One report by each way."""
+
+    async def posted() -> None:
+        for post in posts_of(settings):
+            post.add(lines)
+            await post.look(value, 0.0)
+            assert post.trouble == ""
+
+    asyncio.run(posted())
+
+
 def test_a_webhook_gets_json() -> None:
-    with _web_server() as (port, came):
-        send(
-            {"webhook": f"http://127.0.0.1:{port}/hook", "mail": None}, report(["Over: A."], box(SILENT), 7.0)
-        )
+    with _web_server() as (port, came, _):
+        sent({"webhook": f"http://127.0.0.1:{port}/hook", "mail": None}, ["Over: A."], box(SILENT))
     ((path, told),) = came
-    assert path == "/hook" and told["text"].endswith(": Over: A.") and told["time"] == 7.0
+    assert path == "/hook" and told["text"].endswith(": Over: A.")
     assert told["fallbacks"] == [{"name": "sensor-silent", "about": "left-wrist"}]
 
 
 def test_a_mail_arrives() -> None:
     with _mail_server() as (port, came):
         mail = {"host": "127.0.0.1", "port": port, "encryption": "none", "user": None, "password": None}
-        send(
-            {"webhook": None, "mail": mail | {"sender": "box@a.b", "to": ["me@c.d"]}},
-            report(["On."], box(), 7.0),
-        )
+        sent({"webhook": None, "mail": mail | {"sender": "box@a.b", "to": ["me@c.d"]}}, ["On."], box())
     assert "RCPT TO:<me@c.d>" in [line.upper().replace("ME@C.D", "me@c.d") for line in came]
     assert any(line.endswith(": On.") for line in came)
+
+
+def test_a_report_that_is_refused_is_a_fallback_until_it_arrives(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A real server answers 503 to the first two, then takes one with all that was to be told meanwhile."""
+    monkeypatch.setattr(appliance.console.report, "_LOOK_S", 0.01)
+    monkeypatch.setattr(appliance.console.report, "_RETRY_S", 0.02)
+    fallbacks, value, seen = Fallbacks(OF_THE_PAGE), box(), []
+
+    def unsent() -> list[tuple[str, bool]]:
+        return [(one.about, one.active) for one in fallbacks.happened(0.0) if one.name == "report-unsent"]
+
+    async def watched(port: int, came: list[Any], refusals: list[int]) -> None:
+        settings = {"webhook": f"http://127.0.0.1:{port}/hook", "mail": None, "after_s": 0.0, "every_s": 0.0}
+        task = asyncio.create_task(watch(settings, lambda: value, fallbacks))
+        while unsent() != [("webhook", True)]:
+            await asyncio.sleep(0.001)
+        value["fallbacks"] = [SILENT, {**SILENT, "name": "report-unsent", "about": "webhook"}]
+        seen.append(len(came))
+        refusals.append(0)
+        while unsent() != [("webhook", False)]:
+            await asyncio.sleep(0.001)
+        task.cancel()
+
+    with _web_server(refuses=True) as (port, came, refusals):
+        asyncio.run(asyncio.wait_for(watched(port, came, refusals), 60.0))
+    texts = [told["text"] for _, told in came]
+    assert seen == [0] and any("The box is on" in text for text in texts)
+    assert "tried again" not in "".join(texts), "a report about itself"
+    assert capfd.readouterr().out.count("could not be sent (HTTP Error 503") == 1
+
+
+def test_tries_come_ever_later_and_what_waits_is_bounded() -> None:
+    tries: list[int] = []
+
+    def refused(told: object) -> None:
+        tries.append(len(str(told)))
+        raise OSError("no route")
+
+    async def look() -> list[float]:
+        post, at = Post("mail", refused), []
+        for second in range(3000):
+            post.add([f"Fallback: {second}."] if second < 500 else [])
+            await post.look(box(), float(second))
+            at += [float(second)] * (len(tries) - len(at))
+        assert post.trouble == "no route"
+        return at
+
+    at = asyncio.run(look())
+    assert at[:7] == [0.0, 5.0, 15.0, 35.0, 75.0, 155.0, 315.0] and at[-1] - at[-2] == 300.0
+    assert tries[-1] == tries[-2] < 40 * 20 + 200
 
 
 def test_nothing_is_sent_unless_the_box_file_asks_for_it(tmp_path: Path) -> None:
@@ -92,20 +155,24 @@ def test_a_report_that_could_not_arrive_is_refused(tmp_path: Path, report_keys: 
 
 
 @contextlib.contextmanager
-def _web_server() -> Iterator[tuple[int, list[tuple[str, Any]]]]:
+def _web_server(refuses: bool = False) -> Iterator[tuple[int, list[tuple[str, Any]], list[int]]]:
+    """Its port, what came, and a list: it answers 503 until something is in it, if it refuses."""
     came: list[tuple[str, Any]] = []
+    accepts = [] if refuses else [1]
 
     class Hook(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
-            came.append((self.path, json.loads(self.rfile.read(int(self.headers["Content-Length"])))))
-            self.send_response(200)
+            told = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+            if accepts:
+                came.append((self.path, told))
+            self.send_response(200 if accepts else 503)
             self.end_headers()
 
         def log_message(self, *arguments: object) -> None:
             """Nothing."""
 
     with _serving(HTTPServer(("127.0.0.1", 0), Hook)) as port:
-        yield port, came
+        yield port, came, accepts
 
 
 @contextlib.contextmanager

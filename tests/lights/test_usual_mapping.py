@@ -141,3 +141,17 @@ def test_a_beam_from_the_front_passes_below_the_dancers_eyes(
     assert (aimed > 0.1) == is_lowered
     if is_lowered:
         assert passes > 0.2
+
+
+def test_the_dancers_eyes_are_found_once_a_pass() -> None:
+    """However many heads aim: each asks for them."""
+    skeleton = load_show(EMBEDDED_SHOW).skeleton
+    dance, puppet = Dance(skeleton), PuppetFrame.of(len(skeleton))
+    seen = []
+    for tick in range(3):
+        puppet.positions[:] = float(tick)
+        dance.take_frame(JointFrame((puppet,), tick, tick * 0.02), puppet, 1, tick * 0.02)
+        seen.append(dance.eyes)
+        assert dance.eyes is seen[-1]
+    heights = [eyes[0][1] for eyes in seen if eyes is not None]
+    assert len(heights) == 3 and np.all(np.diff(heights) > 0.5)
