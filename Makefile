@@ -25,6 +25,7 @@ DEBIAN_FOR_GL := libgl1-mesa-dri:/usr/lib/*/dri/swrast_dri.so libegl1:/usr/lib/*
     libgles2:/usr/lib/*/libGLESv2.so.2 libgbm1:/usr/lib/*/libgbm.so.1
 DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump iproute2:ip \
     ola:olad xvfb:Xvfb chromium-headless-shell:chromium-headless-shell libportaudio2:/usr/lib/*/libportaudio.so.2 \
+    libltc11:/usr/lib/*/libltc.so.11 \
     doctest-dev:/usr/include/doctest/doctest.h cppcheck:cppcheck clang-$(CLANG):clang++-$(CLANG) \
     libclang-rt-$(CLANG)-dev:/usr/lib/llvm-$(CLANG)/lib/clang/*/lib/linux/libclang_rt.fuzzer-* \
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \

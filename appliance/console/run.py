@@ -20,7 +20,7 @@ from appliance.box.notify import Notifier
 from appliance.box.open_files import open_more_files
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.realtime import give_way
-from appliance.box.runtime_folder import kept_file
+from appliance.box.runtime_folder import restored_file
 from appliance.box.served import addresses
 from appliance.box.show_state import ShowStateReader
 from appliance.console import certificate
@@ -68,7 +68,7 @@ def run_console(settings: Settings) -> int:
     give_way(_NICER)
     open_more_files()
     limit_log()
-    with kept_file(Path(settings.folder) / WHERE):
+    with restored_file(Path(settings.folder) / WHERE):
         return asyncio.run(_serve(settings))
 
 
@@ -77,7 +77,7 @@ async def _serve(settings: Settings) -> int:
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
     folder = Path(settings.folder)
-    devices, stage, watchers = Devices(Path(settings.kept)), StageView(folder), Watchers()
+    devices, stage, watchers = Devices(Path(settings.devices)), StageView(folder), Watchers()
     fallbacks = Fallbacks(OF_THE_PAGE)
     door, desk = Door(partial(note_crowd, fallbacks)), Desk(settings.control)
     guard = Guard(settings.viewers, settings.names, devices, door)
@@ -85,12 +85,12 @@ async def _serve(settings: Settings) -> int:
     box = BoxView(desk, stage, seen, ShowStateReader(folder))
     health, notifier = ProcessHealthWriter(folder, "console", fallbacks), Notifier()
     happened, about = Happened(guard, settings.journal), About(settings.box)
-    prove = Prove(guard, folder, Path(settings.kept).parent, settings.box, settings.is_installed)
+    prove = Prove(guard, folder, Path(settings.devices).parent, settings.box, settings.is_installed)
     logs = Logs(guard, folder, settings.is_installed)
-    rehearsed = Path(settings.kept).parent / FOLDER
-    venue = Venue(guard, folder, settings.box, settings.is_installed, Path(settings.kept).parent)
-    learn = Learn(guard, Path(settings.kept).parent, settings.journal, settings.box, settings.is_installed)
-    night = Night(stage, box, Path(settings.kept).parent)
+    rehearsed = Path(settings.devices).parent / FOLDER
+    venue = Venue(guard, folder, settings.box, settings.is_installed, Path(settings.devices).parent)
+    learn = Learn(guard, Path(settings.devices).parent, settings.journal, settings.box, settings.is_installed)
+    night = Night(stage, box, Path(settings.devices).parent, folder)
     helping = Help(guard, box, logs, folder, settings.journal, settings.box)
     hands, rig = Hands(guard, desk, folder), Rig(folder)
     phones = Phones(guard, door, settings.phones, folder, fallbacks)
@@ -98,11 +98,11 @@ async def _serve(settings: Settings) -> int:
     update = Update(guard, folder, settings.is_installed, Proving(folder).show_goes)
     others += Midi(guard, stage, box).routes()
     others += [*night.routes(), *helping.routes(), *update.routes()]
-    others += certificate.routes(Path(settings.kept).parent)
+    others += certificate.routes(Path(settings.devices).parent)
     named = ("--box", settings.box["box"]) if "box" in settings.box else ()
     others += SensorChanges(guard, stage, named).routes()
     if settings.rehearsal:
-        others += Rehearsed(guard, stage, box, Path(settings.kept).parent).routes()
+        others += Rehearsed(guard, stage, box, Path(settings.devices).parent).routes()
         others += [*hands.routes(), *PoseMap(stage).routes(), *learn.routes()]
     parts = (guard, devices, desk, stage, box, watchers, happened, about, fallbacks)
     told = {"rehearsal": settings.rehearsal, "installed": settings.is_installed}
@@ -160,7 +160,7 @@ def _https(settings: Settings) -> ssl.SSLContext:
     host = socket.gethostname()
     private = (one for _, one in addresses() if ipaddress.ip_address(one).is_private)
     names = (host, f"{host}.local", *private, *settings.names)
-    return https_context(certificate_in(Path(settings.kept).parent, names))
+    return https_context(certificate_in(Path(settings.devices).parent, names))
 
 
 async def _pulse(notifier: Notifier, health: ProcessHealthWriter) -> None:

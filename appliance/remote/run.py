@@ -96,7 +96,7 @@ class Senders:
     def __init__(self, config: TimecodeConfig) -> None:
         self._receivers = [
             (
-                BY_NAME[one.rate],
+                BY_NAME[f"{one.rate:g}"],
                 DatagramSender(f"timecode {one.host}", DatagramPath(one.host, one.port, None, one.broadcast)),
             )
             for one in config.send

@@ -21,6 +21,12 @@ def _timecode(text: str) -> str:
     return text
 
 
+def _rate(rate: float) -> float:
+    if rate not in (24.0, 25.0, 29.97, 30.0):
+        raise refusal(f"No timecode has {rate:g} frames a second.", "Write 24, 25, 29.97 or 30.")
+    return rate
+
+
 CueTime = Annotated[str, AfterValidator(_timecode)]
 
 
@@ -39,7 +45,7 @@ class TimecodeSendConfig(Section):
     host: Ipv4 = key("The receiver's IP address, or a broadcast address with `broadcast: true`.")
     port: int = key("UDP port.", 6454, within=(1, 65535))
     broadcast: bool = key("true: the address is a network's broadcast address.", False)
-    rate: Literal["24", "25", "29.97", "30"] = key("Frames a second.", "25")
+    rate: Annotated[float, AfterValidator(_rate)] = key("Frames a second: 24, 25, 29.97 or 30.", 25.0)
 
 
 class TimecodeConfig(Section):

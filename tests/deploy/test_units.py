@@ -164,7 +164,7 @@ def test_the_keeper_outlasts_an_orderly_end_of_all_others() -> None:
     """Whoever starts after the stage ends before it. An end that is not kept is taken for a power cut."""
     stops_s = {name: seconds(settings(name)["TimeoutStopSec"][0]) for name in LASTING}
     after_stage = [name for name in LASTING if "bunraku-stage.service" in settings(name).get("After", [])]
-    assert len(after_stage) == 6
+    assert len(after_stage) == 7
     longest_s = max(stops_s[name] for name in after_stage) + stops_s["bunraku-stage.service"]
     assert longest_s < END_S < stops_s["bunraku-keeper.service"]
 

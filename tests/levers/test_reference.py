@@ -21,7 +21,7 @@ def test_the_tables_of_the_page_are_not_stale() -> None:
 
 
 def test_each_key_of_a_cue_is_a_levers_within_its_bounds() -> None:
-    own = {"name", "motion", "fade_s"}
+    own = {"name", "at", "motion", "fade_s"}
     assert set(CueConfig.model_fields) == own | {lever.cue for lever in LEVERS if lever.cue}
     for lever in LEVERS:
         if lever.cue and lever.kind.numbers and not lever.kind.text and len(lever.kind.numbers) == 1:
