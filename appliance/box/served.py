@@ -81,7 +81,7 @@ def name_in_network() -> str:
         asking.connect(str(_AVAHI))
         asking.sendall(f"RESOLVE-ADDRESS {outward_host()}\n".encode())
         said = asking.recv(1024).decode(errors="replace").split()
-        return said[4] if len(said) == 5 and said[0] == "+" else ""
+        return said[3] if len(said) == 4 and said[0] == "+" else ""  # +, interface, protocol, name
     return ""
 
 

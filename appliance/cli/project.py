@@ -22,7 +22,7 @@ from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
 from appliance.projector.raw_stream import take_over_stdout
 from appliance.projector.run import Options, Run
 from appliance.projector.window import Kind, Size
-from appliance.release.choice import box_of
+from appliance.release.choice import Choice, box_of
 from appliance.show.box import load_box
 
 _LARGEST = 16384
@@ -65,7 +65,10 @@ def project(
             "For instance: bunraku project --offscreen 1280x720 --raw | ffmpeg ..."
         )
     pictures = take_over_stdout() if raw else None
-    return project_show(box_of(box, chosen), replace(options, stamps=stamp, raw=pictures, is_keyed=key), wait)
+    choice = None if chosen is None else Choice.read(chosen)
+    is_first = choice is not None and not choice.first.show_id
+    more = replace(options, stamps=stamp, raw=pictures, is_keyed=key, is_first=is_first)
+    return project_show(box_of(box, chosen), more, wait)
 
 
 def parse_options(

@@ -31,6 +31,7 @@ from appliance.projector.fallback import (
     about_resolution,
     about_software,
 )
+from appliance.projector.first_start import FirstStart
 from appliance.projector.info import Figures, Meter
 from appliance.projector.keys import press
 from appliance.projector.pacing import USUAL_RATE, Pacing
@@ -38,6 +39,7 @@ from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, NO_PLACE, ProjectorError
 from appliance.projector.raw_stream import RawStream
 from appliance.projector.resolution import Resolution
+from appliance.projector.seen_wall import SeenWall
 from appliance.projector.stamp import stamp
 from appliance.projector.stream.feed import Feed
 from appliance.projector.stream.keying import keyed
@@ -56,7 +58,8 @@ class Options:
 
     stamps: draw the held joint's rotation into each picture's corner; raw: a descriptor for raw pictures;
     is_keyed: pictures that are written have alpha, as much as they shine;
-    card: lines for the test card besides the projector's own figures, asked for once a second while it shows.
+    card: lines for the test card besides the projector's own figures, asked for once a second while it shows;
+    is_first: nobody gave this box a show, so at its first start the test card comes by itself.
     """
 
     kind: Kind | None = None
@@ -68,6 +71,7 @@ class Options:
     raw: int | None = None
     is_keyed: bool = False
     card: Callable[[], tuple[str, ...]] = tuple
+    is_first: bool = False
 
 
 class Run:
@@ -92,9 +96,15 @@ class Run:
             self._feed = None if config.stream is None else Feed(config.stream, say)
             if self._feed is not None:
                 opened.callback(self._feed.close)
+            self._seen_wall = SeenWall(folder)
+            opened.callback(self._seen_wall.close)
             self._file = AlignmentFile(alignment_folder(box), config, say)
             opened.callback(self._file.close)
             self._controls = Controls(self._file.alignment, self._file.keep, options.shows_info)
+            self._first: FirstStart | None = None
+            if options.is_first:
+                self._first = FirstStart(alignment_folder(box), (self._file.path, box.sensors.keys))
+                self._controls.shows_test_card = self._first.is_on
             self._inbox = _open_inbox(folder, opened, say)
             self.fallbacks = Fallbacks(OF_THE_PROJECTOR)
             self._health = ProcessHealthWriter(folder, "projector", self.fallbacks)
@@ -187,6 +197,8 @@ class Run:
             self._raw.offer(read(), size)
         if self._feed is not None:
             self._feed.offer(now, size, read)
+        if not (self._controls.shows_test_card or self._controls.shows_info):  # with the PIN in them
+            self._seen_wall.offer(now, size, read)
         self.context.finish()  # else the driver queues pictures, and each is older when shown
         drawn = time.monotonic()
         self._window.show()
@@ -244,6 +256,7 @@ class Run:
         width, height = self._window.size
         share = self._resolution.share
         self._publish_health(now, state, share)
+        self._end_first_start(now)
         has_lettering = self._controls.shows_info or self._controls.shows_test_card
         where = self._options.card() if has_lettering else ()
         drawn_at = "" if share == 1.0 else f" at {share:.0%}"
@@ -262,6 +275,13 @@ class Run:
         if not self._warned and figures.dances >= _JUDGED_AFTER:
             self._warned = True
             self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self.context.renderer))
+
+    def _end_first_start(self, now: float) -> None:
+        newest = self.reader.newest(now)
+        sequence = -1 if newest is None else newest.sensor_sequence
+        shown = self._show_state.read(), self._controls.shows_test_card
+        if self._first is not None and self._first.is_over(now, sequence, *shown):
+            self._say(self._controls.set_test_card(False))
 
     def _publish_health(self, now: float, stage: str, share: float) -> None:
         """Publish for the box's other processes; a stage that was never seen does not count as away."""
