@@ -26,7 +26,7 @@ class LogWriter:
         # Its put() takes no lock: the real-time thread would wait for one that another thread holds.
         self._lines: SimpleQueue[str | None] = SimpleQueue()
         self.dropped = self._reported = 0
-        self._kept: Path | None = None
+        self._file: Path | None = None
         self._last: deque[str] = deque(maxlen=MOST_SAID)
         self._since_whole = 0  # lines since the file was written as a whole
         self._thread = threading.Thread(target=self._speak, name="speaker", daemon=True)
@@ -36,7 +36,7 @@ class LogWriter:
         """Keep the last lines in a file too, each with its time (Unix seconds): the page shows them."""
         with contextlib.suppress(OSError):
             path.write_bytes(b"")
-        self._kept = path
+        self._file = path
 
     def say(self, line: str) -> None:
         """Hand over one line; never waits, not even for a lock."""
@@ -68,9 +68,9 @@ class LogWriter:
 
     def _keep(self, line: str) -> None:
         self._last.append(line)
-        if self._kept is None:
+        if self._file is None:
             return
         self._since_whole = (self._since_whole + 1) % MOST_SAID
         said, mode = (line, "ab") if self._since_whole else ("".join(self._last), "wb")
-        with contextlib.suppress(OSError), self._kept.open(mode) as stream:
+        with contextlib.suppress(OSError), self._file.open(mode) as stream:
             stream.write(said.encode(errors="backslashreplace"))

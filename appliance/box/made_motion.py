@@ -12,8 +12,8 @@ from appliance.pose.foreign_file import plain_json
 
 FOLDER = "material"  # in the runtime folder: what was made, as files
 FILE, KIND = "made_motion", "made_motion"
-KEPT_FILE, KEPT_KIND = "kept_motions", "kept_motions"
-_LARGEST, _LARGEST_KEPT = 16384, 8192
+NAMES_FILE, NAMES_KIND = "kept_motions", "kept_motions"
+_LARGEST, _LARGEST_NAMES = 16384, 8192
 
 
 class MadeMotion(NamedTuple):
@@ -64,11 +64,11 @@ class MadeMotionReader:
         self._block.close()
 
 
-class KeptNamesWriter:
+class SavedNamesWriter:
     """The generator's end. Raises OSError where the folder takes no file."""
 
     def __init__(self, folder: Path) -> None:
-        self._block = BlockWriter(folder / KEPT_FILE, KEPT_KIND, _LARGEST_KEPT, fresh=True)
+        self._block = BlockWriter(folder / NAMES_FILE, NAMES_KIND, _LARGEST_NAMES, fresh=True)
 
     def write(self, names: list[str]) -> None:
         """Publish the names of all motions that were kept."""
@@ -79,11 +79,11 @@ class KeptNamesWriter:
         self._block.close()
 
 
-class KeptNamesReader:
+class SavedNamesReader:
     """Show control's end: which motions can be called by name."""
 
     def __init__(self, folder: Path) -> None:
-        self._block = BlockReader(folder / KEPT_FILE, KEPT_KIND, writer="the generator")
+        self._block = BlockReader(folder / NAMES_FILE, NAMES_KIND, writer="the generator")
 
     def read(self) -> tuple[str, ...]:
         """Never waits, never raises."""
@@ -101,7 +101,7 @@ class KeptNamesReader:
 def forget_made_motion(folder: Path) -> None:
     """A show that ended as it should leaves nothing for the next one to take up."""
     shutil.rmtree(folder / FOLDER, ignore_errors=True)
-    for file in (*folder.glob(f"{FILE}*"), folder / KEPT_FILE):
+    for file in (*folder.glob(f"{FILE}*"), folder / NAMES_FILE):
         file.unlink(missing_ok=True)
 
 

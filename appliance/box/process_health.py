@@ -14,7 +14,7 @@ from appliance.box.block import BlockWriter
 from appliance.box.fallback import Fallback, Fallbacks, Fallen, fallen
 from appliance.box.record import Record
 from appliance.box.runtime_folder import renew_lost
-from appliance.pose.foreign_file import kept_json, plain_json
+from appliance.pose.foreign_file import plain_json, stored_json
 
 PROCESSES = ("control", "lights", "projector", "keeper", "console", "generator", "sound", "remote")
 BEAT_S, LATE_S = 1.0, 5.0
@@ -196,7 +196,7 @@ class ProcessHealth:
             changed = self._chosen.stat().st_mtime_ns
             if changed != self._chosen_at:
                 self._chosen_at = changed
-                values = kept_json(self._chosen)
+                values = stored_json(self._chosen)
                 self._of_choice = tuple(_of_choice(values["refused"], values["aside"]))
         except (OSError, ValueError, KeyError, TypeError):
             self._of_choice = ()
@@ -207,7 +207,9 @@ def _of_choice(refused: list[str], aside: list[list[str]]) -> list[Fallen]:
     """The preflight notes what it refused, the stage the pairs that it has put aside."""
     both = ((SHOW_REFUSED, refused), (SHOW_PUT_ASIDE, [message for _, message in aside]))
     return [
-        Fallen(one.name, len(message), True, " ".join(message), _files_in(message)) for one, message in both if message
+        Fallen(one.name, len(several), True, " ".join(several), _files_in(several))
+        for one, several in both
+        if several
     ]
 
 

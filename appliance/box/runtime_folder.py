@@ -124,16 +124,16 @@ def is_lost(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def kept_file(path: Path) -> Iterator[None]:
+def restored_file(path: Path) -> Iterator[None]:
     """Inside, a small file that nobody writes a second time is remembered, and put there again."""
-    one = _KeptFile(path)
+    one = _RestoredFile(path)
     with contextlib.suppress(OSError):
         one.renew()
     hold(one)
     yield
 
 
-class _KeptFile:
+class _RestoredFile:
     def __init__(self, path: Path) -> None:
         self._path, self._changed, self._content = path, -1, b""
 

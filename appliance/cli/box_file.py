@@ -123,11 +123,11 @@ def dance_again(chosen: Path, show: str) -> dict[str, Any]:
         raise StageError("The show that this box chose at power-on cannot be read. Run bunraku doctor.")
     places = Places(here.data, chosen.parent)
     with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
-        kept = read_choice(places.data)
-        pair = next((one for one in (*kept.pairs, *here.pairs) if one.id == show and one.is_there), None)
+        saved = read_choice(places.data)
+        pair = next((one for one in (*saved.pairs, *here.pairs) if one.id == show and one.is_there), None)
         if pair is None or not pair.id:
             raise StageError("This show is not kept on the box any more. Bring it on a stick.")
-        choice = kept.with_newest(pair)
+        choice = saved.with_newest(pair)
         choice._replace(data=places.data).write(places.data / CHOSEN)
         said: list[str] = []
         publish(places, Outcome(choice, True, ()), True, _AT_ONCE, said.append, restarts=False)

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
     from appliance.show.report import ReportConfig
 
-_KEPT = "console.json"
+_DEVICES = "console.json"
 _PATIENCE_S = 2.0
 _CARD_LETTERS, _CARD_LINES = 40, 5  # the test card's, for one fault
 
@@ -66,7 +66,7 @@ def serve(context: typer.Context, box: BoxFile = None, chosen: ChosenFile = None
     )
     os.set_inheritable(descriptor, True)
     command = console_command(
-        config, descriptor, kept_in(config), journal=config.journal.folder, chosen=chosen
+        config, descriptor, devices_file(config), journal=config.journal.folder, chosen=chosen
     )
     os.execv(command[0], command)  # a fresh process, which loads only what the page needs
 
@@ -161,13 +161,13 @@ def card_lines(box: BoxConfig) -> tuple[str, ...]:
     """For the projector's test card: address and PIN of the page that runs here, and a fault of the Wi-Fi."""
     wifi = wifi_lines(box)
     try:
-        kept, host, port, https = (runtime_of(box) / WHERE).read_text().splitlines()
+        devices, host, port, https = (runtime_of(box) / WHERE).read_text().splitlines()
         code = pending_code(runtime_of(box))
         update = (f"update code {code}",) if code else ()
         at = address(host, int(port), bool(https))
         name = "" if is_loopback(host) else name_in_network()
         named = (f"or {address(name, int(port), bool(https))}",) if name else ()
-        return f"page {at}", *named, f"pin {Devices(Path(kept)).pin}", *update, *wifi
+        return f"page {at}", *named, f"pin {Devices(Path(devices)).pin}", *update, *wifi
     except (OSError, ValueError, StageError):
         return wifi
 
@@ -186,7 +186,7 @@ def wifi_lines(box: BoxConfig) -> tuple[str, ...]:
 def console_command(
     box: BoxConfig,
     descriptor: int,
-    kept: Path,
+    devices: Path,
     control: tuple[str, int] | None = None,
     journal: Path | None = None,
     chosen: Path | None = None,
@@ -206,12 +206,12 @@ def console_command(
     folder = runtime_of(box)
     with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as opened:
         host, port = opened.getsockname()[:2]
-        (folder / WHERE).write_text(f"{kept}\n{host}\n{port}\n{'https' * console.https}\n")
+        (folder / WHERE).write_text(f"{devices}\n{host}\n{port}\n{'https' * console.https}\n")
     write_report_settings(folder, console.report)
     settings = Settings(
         folder=str(folder),
         descriptor=descriptor,
-        kept=str(kept),
+        devices=str(devices),
         control=control,
         viewers=tuple(console.viewers),
         names=tuple(console.names),
@@ -249,14 +249,14 @@ def page_companion(
     rehearsal: PIN and devices are not the venue's; they stay until the machine is off.
     """
     heard_on = None if control is None else control.getsockname()
-    kept = runtime_of(box) / _KEPT if rehearsal else kept_in(box)
-    command = console_command(box, page.fileno(), kept, heard_on, journal)
+    devices = runtime_of(box) / _DEVICES if rehearsal else devices_file(box)
+    command = console_command(box, page.fileno(), devices, heard_on, journal)
     try:
         https = box.console is not None and box.console.https
         origin = address_of(page.fileno(), https)
-        say(f"The page: {origin}, PIN {Devices(kept).pin}.")
+        say(f"The page: {origin}, PIN {Devices(devices).pin}.")
     except OSError as error:
-        say(f"{kept}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
+        say(f"{devices}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
     else:
         if names := phone_names(box):
             option = "" if box.path is None else f" --box {box.path}"
@@ -272,9 +272,9 @@ def page_companion(
     )
 
 
-def kept_in(box: BoxConfig) -> Path:
+def devices_file(box: BoxConfig) -> Path:
     """The file with PIN and devices: where the box keeps what it learns, else until the machine is off."""
-    return (box.state_folder or runtime_of(box)) / _KEPT
+    return (box.state_folder or runtime_of(box)) / _DEVICES
 
 
 def _named(box: BoxConfig, chosen: Path | None) -> dict[str, str]:
@@ -288,7 +288,7 @@ def _devices(box: Path | None) -> Devices:
     from appliance.release.installed_box import box_here
     from appliance.show.box import load_box
 
-    path = kept_here(load_box(box_here(box)))
+    path = devices_file_made(load_box(box_here(box)))
     try:
         return Devices(path)
     except OSError as error:
@@ -298,9 +298,9 @@ def _devices(box: Path | None) -> Devices:
         ) from error
 
 
-def kept_here(box: BoxConfig) -> Path:
+def devices_file_made(box: BoxConfig) -> Path:
     """The same as the page that runs here says: in a rehearsal it keeps them elsewhere."""
-    path = kept_in(box)
+    path = devices_file(box)
     with contextlib.suppress(OSError, StageError):  # root does not meet the box's processes
         told = Path((runtime_of(box) / WHERE).read_text().partition("\n")[0])
         path = told if told.is_file() else path

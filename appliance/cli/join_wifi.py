@@ -34,7 +34,7 @@ class Places(NamedTuple):
     where messages are left; profiles: NetworkManager's own folder in memory."""
 
     arrivals: tuple[Path, ...] = (Path("/media/bunraku"), Path("/boot"), Path("/boot/firmware"))
-    kept: Path = Path("/data/network")
+    saved: Path = Path("/data/network")
     run: Path = RUN
     profiles: Path = Path("/run/NetworkManager/system-connections")
     cards: Path = Path("/sys/class/net")
@@ -62,8 +62,8 @@ def join_wifi(places: Places, run: Run, wait: Wait, name_box: NameBox) -> int:
 def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
     """The fault as a message; empty if all is well or no Wi-Fi is asked for."""
     arrived = next((path for path in (one / NAME for one in places.arrivals) if _asks(path)), None)
-    kept = places.kept / NAME
-    path = arrived or kept
+    saved = places.saved / NAME
+    path = arrived or saved
     if not _asks(path):
         return ""
     try:
@@ -72,13 +72,13 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
         message = str(error).replace(f"{path.parent}/", "")  # the wall has room for little
         return f"{message}\nThe box keeps the network from before."
     name_box(wifi.hostname)
-    is_new = not kept.is_file() or kept.read_bytes() != path.read_bytes()
+    is_new = not saved.is_file() or saved.read_bytes() != path.read_bytes()
     try:
         if is_new:
-            write_whole(places.kept / "country", f"COUNTRY={wifi.country}\n".encode())
+            write_whole(places.saved / "country", f"COUNTRY={wifi.country}\n".encode())
     except OSError as error:
         return (
-            f"{places.kept} cannot be written ({error.strerror}): the box is in no Wi-Fi. Look at its disk."
+            f"{places.saved} cannot be written ({error.strerror}): the box is in no Wi-Fi. Look at its disk."
         )
     card = _card(places.cards, wait)
     if not card:
@@ -88,7 +88,7 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
         _made(places, wifi, card, is_new, run) if wifi.access_point else _joined(places, wifi, is_new, run)
     )
     if is_new and not (message and wifi.access_point):
-        write_whole(kept, path.read_bytes(), private=True)
+        write_whole(saved, path.read_bytes(), private=True)
     return message
 
 
@@ -111,9 +111,9 @@ def _joined(places: Places, wifi: WifiFile, is_new: bool, run: Run) -> str:
     text = profile(wifi).encode()
     if is_new:
         with contextlib.suppress(FileNotFoundError):
-            (places.kept / _ACCESS_POINT_PROFILE).unlink()
+            (places.saved / _ACCESS_POINT_PROFILE).unlink()
             (places.profiles / _ACCESS_POINT_PROFILE).unlink()
-        write_whole(places.kept / PROFILE, text, private=True)
+        write_whole(places.saved / PROFILE, text, private=True)
     places.profiles.mkdir(parents=True, exist_ok=True)
     write_whole(places.profiles / PROFILE, text, private=True)
     run(("nmcli", "connection", "reload"))
@@ -130,7 +130,7 @@ def _joined(places: Places, wifi: WifiFile, is_new: bool, run: Run) -> str:
 def _made(places: Places, wifi: WifiFile, card: str, is_new: bool, run: Run) -> str:
     if not is_new:
         return ""  # NetworkManager has started it
-    for folder in (places.kept, places.profiles):
+    for folder in (places.saved, places.profiles):
         (folder / PROFILE).unlink(missing_ok=True)
     given = {"card": card, "country": wifi.country, "name": wifi.name, "password": wifi.password}
     options = [word for option, value in given.items() for word in (f"--{option}", value)]

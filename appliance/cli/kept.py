@@ -10,7 +10,7 @@ import typer
 from appliance.cli.options import BoxFile, ShowFolder
 from appliance.dancer.material.material_file import SUFFIX, parsed_recipe, read_material
 from appliance.dancer.phrase import FPS, X, Z
-from appliance.generator.kept_motions import FOLDER
+from appliance.generator.saved_motions import FOLDER
 from appliance.options.idle_options import refuse_idle
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton

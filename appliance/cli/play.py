@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from appliance.box.leftovers import forget_run
 from appliance.box.log_writer import SAID, LogWriter
 from appliance.box.own_command import BUNRAKU
-from appliance.box.runtime_folder import kept_file
+from appliance.box.runtime_folder import restored_file
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.readings import readings_line
 from appliance.sensor.memory import forget_memory
@@ -86,7 +86,7 @@ def play_show(
         speaker = LogWriter()
         opened.callback(speaker.close)
         if chosen is not None:
-            opened.enter_context(kept_file(chosen))
+            opened.enter_context(restored_file(chosen))
         shown = rehearse is not None and _has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
         if cue is not None:
@@ -261,10 +261,10 @@ def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Comp
     from appliance.cli.companions import Companion
 
     named = () if box_file is None else ("--box", str(box_file))
-    kept = () if journal is None else ("--journal", str(journal), "--minutes", str(minutes))
+    recording = () if journal is None else ("--journal", str(journal), "--minutes", str(minutes))
     return Companion(
         "The keeper",
-        (*BUNRAKU, "keep", *named, *kept),
+        (*BUNRAKU, "keep", *named, *recording),
         "Meanwhile the journal waits in memory.",
         watchdog_s=WATCHDOG_S["keeper"],
     )

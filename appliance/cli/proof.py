@@ -39,7 +39,7 @@ _ENDED = "It was ended before its end. Nothing was kept."
 
 def main(given: Sequence[str]) -> int:
     """Prove what the page of a box wants; the arguments name the box: `--box FILE` or `--chosen FILE`."""
-    from appliance.cli.console import kept_here, runtime_of
+    from appliance.cli.console import devices_file_made, runtime_of
 
     end_with_parent()
     named = {name: Path(path) for name, path in zip(given[::2], given[1::2], strict=True)}
@@ -47,7 +47,7 @@ def main(given: Sequence[str]) -> int:
     try:
         path = box_of(named.get("--box"), chosen)
         config = load_box(path)
-        return prove(runtime_of(config), Proofs(kept_here(config).parent / FOLDER), path, chosen)
+        return prove(runtime_of(config), Proofs(devices_file_made(config).parent / FOLDER), path, chosen)
     except Exception as error:
         from appliance.cli.app import refuse
 
@@ -66,7 +66,7 @@ def prove(runtime: Path, proofs: Proofs, box: Path | None, chosen: Path | None) 
         about = {"kind": wanted.kind, "made": time.time(), "host": socket.gethostname()}
         about |= {"machine": machine(), "software": software()}
         about |= {"show": {"name": name, "checksum": checksum(show)}, "box_file": about_file(box)}
-        proving.tell(kept=proofs.add(about | document))
+        proving.tell(saved=proofs.add(about | document))
     except (_NotProvenError, OSError) as error:
         proving.tell(trouble=str(error))
         return 1

@@ -72,8 +72,8 @@ class Devices:
     def remember(self, name: str) -> str:
         """Remember one more device; its token. A disk that does not take it shuts nobody out."""
         token = secrets.token_hex(32)
-        kept = self.devices[-(MOST_DEVICES - 1) :]
-        self._keep(self._pin, (*kept, Device(secrets.token_hex(4), name, _digest(token), time.time())))
+        others = self.devices[-(MOST_DEVICES - 1) :]
+        self._keep(self._pin, (*others, Device(secrets.token_hex(4), name, _digest(token), time.time())))
         return token
 
     def known(self, token: str) -> Device | None:
@@ -83,10 +83,10 @@ class Devices:
 
     def revoke(self, device_id: str) -> bool:
         """Whether there was such a device; it needs the PIN again."""
-        kept = tuple(one for one in self.devices if one.id != device_id)
-        if len(kept) == len(self._devices):
+        others = tuple(one for one in self.devices if one.id != device_id)
+        if len(others) == len(self._devices):
             return False
-        self._keep(self._pin, kept)
+        self._keep(self._pin, others)
         return True
 
     def _keep(self, pin: str, devices: tuple[Device, ...]) -> None:

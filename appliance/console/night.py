@@ -20,7 +20,7 @@ from appliance.outputs.frame_layout import BROWSER_HEAD, GHOST
 
 FOLDER = "night"  # beside PIN and devices
 EVERY_S = 60.0
-KEPT_S = 14 * 3600.0  # a night; 840 pictures of 3 kB
+KEEP_S = 14 * 3600.0  # a night; 840 pictures of 3 kB
 _WIDTH, _HEIGHT, _FLOOR, _SCALE = 640, 420, 390.0, 170.0  # pixels; pixels a metre
 _LINES = 5
 
@@ -28,8 +28,8 @@ _LINES = 5
 class Night:
     """Draws, keeps and serves the pictures. kept: where the box keeps what it learns."""
 
-    def __init__(self, stage: StageView, box: BoxView, kept: Path) -> None:
-        self._stage, self._box, self._folder = stage, box, kept / FOLDER
+    def __init__(self, stage: StageView, box: BoxView, state: Path) -> None:
+        self._stage, self._box, self._folder = stage, box, state / FOLDER
 
     def routes(self) -> list[web.RouteDef]:
         """For the server."""
@@ -51,7 +51,7 @@ class Night:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(self._folder / f"{now:.0f}.svg", self.picture(now).encode())
         for at in self.times():
-            if not now - KEPT_S <= at <= now + EVERY_S:  # or of a clock that was wrong
+            if not now - KEEP_S <= at <= now + EVERY_S:  # or of a clock that was wrong
                 (self._folder / f"{at}.svg").unlink(missing_ok=True)
 
     def times(self) -> list[int]:

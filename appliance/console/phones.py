@@ -223,9 +223,9 @@ class Phones:
         if owner == "code":
             token, owner = self._use_code(request, place.name, values.get("code"), now), "pass"
         self._know(request)
-        kept = token if owner == "pass" and isinstance(token, str) else ""
-        session = place.give(owner, kept, FRONTS[where], now)
-        return web.json_response({"session": session, "pass": kept})
+        own = token if owner == "pass" and isinstance(token, str) else ""
+        session = place.give(owner, own, FRONTS[where], now)
+        return web.json_response({"session": session, "pass": own})
 
     def _is_allowed(self, place: _Place) -> bool:
         """Whether the phone that is this sensor may still be it."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from appliance.box.durable import write_whole
-from appliance.pose.foreign_file import kept_json
+from appliance.pose.foreign_file import stored_json
 
 FOLDER = "proofs"
 MOST = 50  # two of a touring month; some 60 kB each
@@ -55,7 +55,7 @@ class Proofs:
 
     def _summary(self, name: str) -> dict[str, Any] | None:
         try:
-            document = kept_json(self._folder / f"{name}.json")
+            document = stored_json(self._folder / f"{name}.json")
             return {"id": name} | {key: document[key] for key in ("kind", "made", "holds")}
         except (OSError, ValueError, TypeError, KeyError):
             return None

@@ -28,10 +28,10 @@ class Prove:
     """
 
     def __init__(
-        self, guard: Guard, runtime: Path, kept: Path, box: dict[str, str], is_installed: bool
+        self, guard: Guard, runtime: Path, state: Path, box: dict[str, str], is_installed: bool
     ) -> None:
         self._guard, self._box, self._is_installed = guard, box, is_installed
-        self._proving, self._proofs = Proving(runtime), Proofs(kept / FOLDER)
+        self._proving, self._proofs = Proving(runtime), Proofs(state / FOLDER)
         self._child: asyncio.subprocess.Process | None = None
         self._waiting: set[asyncio.Task[int]] = set()
         self._proving.end()  # what a page before this one began ended with it, or ends now

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from appliance.box.show_state import ShowStateReader
 from appliance.console.stage_view import StageView
-from appliance.pose.foreign_file import kept_json
+from appliance.pose.foreign_file import stored_json
 
 FOLDER = "prove"
 KINDS = ("latency", "doctor")
@@ -45,7 +45,7 @@ class Proving:
     def wanted(self) -> Wanted | None:
         """The current request; None: nothing, or nothing that can be read."""
         try:
-            said = kept_json(self._wanted)
+            said = stored_json(self._wanted)
             kind, seconds = said["kind"], said["seconds"]
         except (OSError, ValueError, TypeError, KeyError):
             return None

@@ -24,9 +24,9 @@ FOLDER, ZIP = "rehearsed", "show.zip"
 class Rehearsed:
     """kept: the folder in which the page keeps things."""
 
-    def __init__(self, guard: Guard, stage: StageView, box: BoxView, kept: Path) -> None:
+    def __init__(self, guard: Guard, stage: StageView, box: BoxView, state: Path) -> None:
         self._guard, self._stage, self._box = guard, stage, box
-        self._folder = kept / FOLDER
+        self._folder = state / FOLDER
         self._writing = asyncio.Lock()
 
     def routes(self) -> list[web.RouteDef]:

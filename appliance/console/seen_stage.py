@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from appliance.box.fallback import Fallen, fallen
-from appliance.box.made_motion import KeptNamesReader
+from appliance.box.made_motion import SavedNamesReader
 from appliance.box.process_health import Member, ProcessHealth
 from appliance.console.stage_view import StageView
 from appliance.show_control.status_messages import SeenFacts, StageState
@@ -17,7 +17,7 @@ class SeenStage:
     """The stage and the other processes of a runtime folder; never waits, never raises."""
 
     def __init__(self, folder: Path, view: StageView) -> None:
-        self._view, self._processes, self._kept = view, ProcessHealth(folder), KeptNamesReader(folder)
+        self._view, self._processes, self._saved = view, ProcessHealth(folder), SavedNamesReader(folder)
 
     @property
     def facts(self) -> SeenFacts | None:
@@ -35,9 +35,9 @@ class SeenStage:
         """The stage's last report; empty before the first."""
         return self._view.health()
 
-    def kept(self) -> tuple[str, ...]:
+    def saved(self) -> tuple[str, ...]:
         """Names of motions that were kept."""
-        return self._kept.read()
+        return self._saved.read()
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
         """Process and fallback, of all processes of the box, as far as they ever happened."""
@@ -55,4 +55,4 @@ class SeenStage:
     def close(self) -> None:
         """Let go of the files."""
         self._processes.close()
-        self._kept.close()
+        self._saved.close()

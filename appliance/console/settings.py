@@ -14,13 +14,13 @@ class Settings:
 
     journal: its folder; None: none is kept. box: the path of its box file as `box`, or of what the preflight
     chose as `chosen`, or neither. is_installed: systemd starts what the page wants done. folder: where the
-    box's processes meet. kept: the file with PIN and remembered devices. viewers, names, rehearsal, https: as
-    in the box file. phones: the sensors that phones may be.
+    box's processes meet. devices: the file with PIN and remembered devices. viewers, names, rehearsal,
+    https: as in the box file. phones: the sensors that phones may be.
     """
 
     folder: str
     descriptor: int
-    kept: str
+    devices: str
     control: tuple[str, int] | None = None
     viewers: tuple[str, ...] = ()
     names: tuple[str, ...] = ()

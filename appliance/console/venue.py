@@ -28,15 +28,15 @@ _SHOW = re.compile(r"[0-9a-f]{0,64}\+[0-9a-f]{0,64}")
 class Venue:
     """Each in a separate process, one at a time.
 
-    runtime: where the box's processes meet; box: as in Settings; kept: where the copy of the show with its
+    runtime: where the box's processes meet; box: as in Settings; state: where the copy of the show with its
     new cues lies, and what was learned.
     """
 
     def __init__(
-        self, guard: Guard, runtime: Path, box: dict[str, str], is_installed: bool, kept: Path
+        self, guard: Guard, runtime: Path, box: dict[str, str], is_installed: bool, state: Path
     ) -> None:
         self._guard, self._box, self._is_installed = guard, box, is_installed
-        self._kept = kept
+        self._state = state
         self._anew = runtime / ANEW
         self._busy = asyncio.Lock()
 
@@ -77,9 +77,9 @@ class Venue:
         await said(request)
         if not self._is_installed:
             raise web.HTTPBadRequest(text="This box keeps no shows: give bunraku play the copy, with --show.")
-        if folder == LEARNING and Learning(self._kept / folder).told().get("state") != "learned":
+        if folder == LEARNING and Learning(self._state / folder).told().get("state") != "learned":
             raise web.HTTPConflict(text="No show was learned that reaches the bar.")
-        return await self._done("adopt_show", folder=str(self._kept / folder), source=source)
+        return await self._done("adopt_show", folder=str(self._state / folder), source=source)
 
     async def _done(self, function: str, **keywords: Any) -> web.Response:
         if self._busy.locked():

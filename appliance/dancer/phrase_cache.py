@@ -54,7 +54,7 @@ class PhraseCache:
         name = _name(path, grounded)
         self._used.add(name)
         for folder in self._looked_in:
-            found = _kept(folder / name, skeleton)
+            found = _cached(folder / name, skeleton)
             if found is not None:
                 return found
         phrase = read_bvh(path)
@@ -117,7 +117,7 @@ def _keep(path: Path, phrase: Recording, floor: Floor | None) -> None:
     write_whole(path, b"".join((_HEAD.pack(_MAGIC, len(facts), check), *parts)))
 
 
-def _kept(path: Path, skeleton: Skeleton) -> tuple[Recording, Floor | None] | None:
+def _cached(path: Path, skeleton: Skeleton) -> tuple[Recording, Floor | None] | None:
     """The cached phrase, not copied; None without one that is valid for this skeleton."""
     try:
         with opened(path) as stream:

@@ -18,7 +18,7 @@ from appliance.pose.recording import Recording
 from appliance.show.config_error import did_you_mean
 
 FIRST_MADE = 1000  # numbers of loops that were made ahead; phrases have lower ones
-_MADE_KEPT = 6  # the newest ones: a crossfade and the window know four at most
+_MOST_MADE = 6  # the newest ones: a crossfade and the window know four at most
 
 
 class Made(NamedTuple):
@@ -94,7 +94,7 @@ class Repertoire:
         if loop.track.shape[1] != self._phrases[MAIN][1].track.shape[1] or number < FIRST_MADE:
             raise ValueError("It was made for another floor, or another show.")
         made = self._made[number] = Made(recipe, name, phrase, number, loop, after)
-        for old in [*self._made][:-_MADE_KEPT]:
+        for old in [*self._made][:-_MOST_MADE]:
             del self._made[old]
         return made
 

@@ -9,7 +9,7 @@ import numpy as np
 from appliance.dancer.material.steps import HOP, MIDDLE, ROOT, WINDOW, Coder
 from appliance.dancer.slerp import FloatArray
 
-KEPT = 44  # steps, 3.5 s: as late as an answer may be, and what it sees before that
+CAPACITY = 44  # steps, 3.5 s: as late as an answer may be, and what it sees before that
 AGE = WINDOW - MIDDLE  # ticks from a step's middle to the first tick that knows the step
 
 
@@ -28,7 +28,7 @@ class StepMemory:
         self._poses = np.zeros((WINDOW, len(places), 4), np.float32)
         self._poses[..., 0] = 1.0
         self._roots = np.zeros((WINDOW, 3), np.float32)
-        self.steps = np.zeros((KEPT, coder.latent + ROOT), np.float32)
+        self.steps = np.zeros((CAPACITY, coder.latent + ROOT), np.float32)
         self._ticks, self.known = phase - HOP, 0
         self.place = np.zeros(3)
 
@@ -56,9 +56,9 @@ class StepMemory:
         turn = math.remainder(heading - before, math.tau)
         self.steps[-1, -ROOT:] = cosine * dx - sine * dz, cosine * dz + sine * dx, turn, height
         self.place[:] = x, z, heading
-        self.known = min(self.known + 1, KEPT)
+        self.known = min(self.known + 1, CAPACITY)
 
     def recent(self, count: int, ago: int = 0) -> FloatArray | None:
         """Steps (count, F) that ended so many steps ago; None: not all of them are danced."""
-        end = KEPT - ago
+        end = CAPACITY - ago
         return self.steps[end - count : end] if count + ago < self.known else None

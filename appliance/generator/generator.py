@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from appliance.box.fallback import Fallbacks
-from appliance.box.made_motion import FOLDER, KeptNamesWriter, MadeMotion, MadeMotionWriter
+from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionWriter, SavedNamesWriter
 from appliance.box.mounts import disk_of
 from appliance.box.orders import Order
 from appliance.box.show_state import ShowStateReader
@@ -31,10 +31,10 @@ from appliance.dancer.material.motion_network import MotionNetworkError
 from appliance.dancer.material.prompt import end_of, prompt_of
 from appliance.dancer.phrase import FPS, NUMBER, Phrase, PhraseError
 from appliance.dancer.phrase_cache import MEMORY, PhraseCache
-from appliance.generator.fallback import NOT_KEPT, NOT_MADE
-from appliance.generator.kept_motions import KeptMotions
+from appliance.generator.fallback import NOT_MADE, NOT_SAVED
 from appliance.generator.pointing import Pointing
 from appliance.generator.request import AGAIN_SEEDS, Request, Requests
+from appliance.generator.saved_motions import SavedMotions
 from appliance.levers.show_state import ShowState
 from appliance.levers.sources import IMPROVISE, KEPT, MAIN
 from appliance.outputs.frame_reader import FrameReader
@@ -81,7 +81,7 @@ class Generator:
         grounded = config.motion.grounded
         self._maker = Maker(show.skeleton, show.motion_networks, self._loop_of, grounded)
         taken = tuple(name for name in config.motion.sources if name not in config.motion.kept)
-        self.kept = KeptMotions(folder, box.state_folder, show.skeleton.names, taken)
+        self.saved = SavedMotions(folder, box.state_folder, show.skeleton.names, taken)
         hand = (
             config.hands[0].joint
             if config.motion.path and config.motion.path.by_hand and config.hands
@@ -90,20 +90,20 @@ class Generator:
         self._pointing = Pointing(show.skeleton, hand) if hand else None
         self._pointed: list[float] = []
         self._state, self._disk = box.state_folder, ""
-        self._kept_names = KeptNamesWriter(folder)
+        self._saved_names = SavedNamesWriter(folder)
         self._published_names: list[str] | None = None
         self._ahead = [_Ahead(puppet, MadeMotionWriter(folder, puppet.number)) for puppet in config.cast]
         self._number = 1000 + int(time.time()) % _MOST_NUMBERS
 
     def look(self, state_reader: ShowStateReader, now: float) -> bool:
         """Make what is wanted next, if anything is; whether it did."""
-        if (names := sorted(self.kept.recipes)) != self._published_names:
+        if (names := sorted(self.saved.recipes)) != self._published_names:
             self._published_names = names
-            self._kept_names.write(names)
-        if self.kept.complaint and self._state is not None and not self._disk:
+            self._saved_names.write(names)
+        if self.saved.complaint and self._state is not None and not self._disk:
             self._disk = disk_of(self._state)
-            self._fallbacks.concern(NOT_KEPT.name, filter(None, [self._disk]))
-        self._fallbacks.set(NOT_KEPT.name, self.kept.complaint)
+            self._fallbacks.concern(NOT_SAVED.name, filter(None, [self._disk]))
+        self._fallbacks.set(NOT_SAVED.name, self.saved.complaint)
         state = state_reader.read()
         if self._pointing is not None:
             frame, facts = self._stage.newest(now), self._stage.facts
@@ -120,13 +120,13 @@ class Generator:
             if not danced:
                 raise ValueError("The motion that dances now was not made ahead: there is nothing to keep.")
             number = parsed_recipe(danced)["number"]
-            return True, self.kept.keep(order.text, self._file(number))
+            return True, self.saved.keep(order.text, self._file(number))
         except (ValueError, LookupError) as error:
             return False, str(error)
 
     def close(self) -> None:
         """Release the files; what was made stays."""
-        self._kept_names.close()
+        self._saved_names.close()
         for one in self._ahead:
             one.writer.close()
 
@@ -135,7 +135,7 @@ class Generator:
         reported, danced = self._reported(ahead.puppet), self._danced(ahead.puppet)
         base, wanted = str(reported.get("base", MAIN)), str(reported.get("wanted", ""))
         request = self._requests.request(
-            state, base, self.kept.recipes, now, wanted, ahead.puppet, self._pointed
+            state, base, self.saved.recipes, now, wanted, ahead.puppet, self._pointed
         )
         if request is None:
             ahead.request = None
@@ -220,7 +220,7 @@ class Generator:
 
     def _numbered(self, name: str) -> Loop:
         """A kept motion under the number of now."""
-        loop = self.kept.material(name).loop
+        loop = self.saved.material(name).loop
         track = loop.track.copy()
         track[:, NUMBER] = self._number
         return Loop.made(loop.poses, track, loop.step, loop.start_s)

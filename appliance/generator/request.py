@@ -43,7 +43,7 @@ class Requests:
         self,
         state: ShowState,
         base: str,
-        kept: Mapping[str, dict[str, Any]],
+        saved: Mapping[str, dict[str, Any]],
         now: float,
         wanted: str = "",
         puppet: PuppetStart | None = None,
@@ -51,7 +51,7 @@ class Requests:
     ) -> Request | None:
         """A puppet's open request; None: phrases or a live dancer. base: the phrase that it danced last.
 
-        kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the puppet that cues lead
+        saved: recipes of kept motions by name. now: monotonic seconds. wanted: what the puppet that cues lead
         waits for while nothing is declared, after a power cut. puppet: None: that one. pointed: x, y of the
         map at which a hand points.
         """
@@ -61,8 +61,8 @@ class Requests:
         name = puppet.source
         if puppet.is_led:
             name = state[PHRASE].value if PHRASE in state else wanted or name
-        if name in kept:
-            return Request(name, {"source": KEPT, "name": name, "of": kept[name]})
+        if name in saved:
+            return Request(name, {"source": KEPT, "name": name, "of": saved[name]})
         if name not in MADE or name not in self._sections:
             return None
         recipe: dict[str, Any] = {"source": name}

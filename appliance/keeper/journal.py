@@ -13,7 +13,7 @@ from appliance.keeper.mirror import RETRY_S
 from appliance.keeper.run_memory import Piece, RunMemory
 from appliance.recorder import chunks, log
 from appliance.recorder.environment import environment, fingerprints
-from appliance.recorder.reading import last_kept
+from appliance.recorder.reading import last_saved
 from appliance.recorder.segments import Segments
 from appliance.show.bundle import default_show_path
 from appliance.stage.recorder import FILE
@@ -49,7 +49,7 @@ class MirroredJournal:
                 self._segments.finish()
             self._memory = RunMemory.at(self._memory_file)
             if self._memory is not None:
-                self._memory.entries, self._memory.keyframe = last_kept(
+                self._memory.entries, self._memory.keyframe = last_saved(
                     self.folder, self._memory.facts["run"]
                 )
                 self._append_pieces(self._memory)

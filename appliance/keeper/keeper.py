@@ -15,7 +15,7 @@ from appliance.box.fallback import Fallbacks
 from appliance.box.mounts import disk_of, memory_of
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, RuntimeFolderError
-from appliance.keeper.fallback import KEPT_IN_MEMORY, OF_THE_KEEPER
+from appliance.keeper.fallback import OF_THE_KEEPER, SAVED_IN_MEMORY
 from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.mirror import LOOK_S, Mirror, Mirrored
 from appliance.keeper.mirror_process import MirrorProcess
@@ -38,8 +38,8 @@ class KeeperHealth:
         self._fallbacks, self._named = Fallbacks(OF_THE_KEEPER), set[str]()
         self._health = ProcessHealthWriter(runtime, "keeper", self._fallbacks)
         if lasting is not None and (memory := memory_of(lasting)):
-            self._fallbacks.concern(KEPT_IN_MEMORY.name, [memory])
-            self._fallbacks.set(KEPT_IN_MEMORY.name, True)
+            self._fallbacks.concern(SAVED_IN_MEMORY.name, [memory])
+            self._fallbacks.set(SAVED_IN_MEMORY.name, True)
 
     def report(self, mirrors: Iterable[Mirror | MirrorProcess], now: float) -> None:
         """Call it often; monotonic seconds."""

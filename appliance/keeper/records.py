@@ -10,7 +10,7 @@ from appliance.box.block import BlockReader
 from appliance.box.checkpoint import PLACE, unpacked
 from appliance.box.fallback import Fallback
 from appliance.box.record import SlotFile, WholeFile
-from appliance.keeper.fallback import PLACE_NOT_KEPT, SENSORS_NOT_KEPT
+from appliance.keeper.fallback import PLACE_NOT_SAVED, SENSORS_NOT_SAVED
 from appliance.keeper.mirror import reason_of
 from appliance.sensor.memory import memory_file, memory_record
 
@@ -85,7 +85,7 @@ def mirrored_checkpoint(runtime: Path, state: Path) -> MirroredRecord:
     )
     file = SlotFile(state / PLACE.name)
     name = "The place of the dance"
-    return MirroredRecord(name, PLACE_NOT_KEPT, PLACE.reader(runtime), state, file, meaning, message)
+    return MirroredRecord(name, PLACE_NOT_SAVED, PLACE.reader(runtime), state, file, meaning, message)
 
 
 def mirrored_sensor_memory(runtime: Path, state: Path) -> MirroredRecord:
@@ -96,4 +96,4 @@ def mirrored_sensor_memory(runtime: Path, state: Path) -> MirroredRecord:
         "as `state:` in the box file."
     )
     block, file = memory_record(state).reader(runtime), memory_file(state)
-    return MirroredRecord("The sensors' memory", SENSORS_NOT_KEPT, block, state, file, bytes, message)
+    return MirroredRecord("The sensors' memory", SENSORS_NOT_SAVED, block, state, file, bytes, message)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-FILE, KIND, FORMAT, WRITER = "frame", "frame", 4, "the stage (bunraku play)"
+FILE, KIND, FORMAT, WRITER = "frame", "frame", 5, "the stage (bunraku play)"
 FACTS, HEALTH, FRAMES = range(3)  # the file's rings
 FRAME_SLOTS = 64  # a reader has 1.28 s to copy the newest frame
 HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
@@ -19,11 +19,13 @@ BROWSER_HEAD = struct.Struct("<dII")
 
 class FrameLayout:
     """Offsets of the arrays of J joints in a frame's payload: all float32, little-endian, in this order.
-    Those of the next puppet follow, `stride` bytes after those of the one before.
+    Those of the next puppet follow, `stride` bytes after those of the one before; then the hands' orientations
+    and a live dancer's positions.
     """
 
-    def __init__(self, joints: int, puppets: int = 1) -> None:
-        self.joints, self.puppets = joints, puppets
+    def __init__(self, joints: int, puppets: int = 1, hands: int = 0, live: int = 0) -> None:
+        """hands: of all puppets; live: joints of a live dancer, 0 in a show that takes none."""
+        self.joints, self.puppets, self.hands, self.live = joints, puppets, hands, live
         self.root_at = FRAME_HEAD.size
         self.pose_at = self.root_at + 12
         self.source_at = self.pose_at + 16 * joints
@@ -31,4 +33,6 @@ class FrameLayout:
         self.positions_at = self.world_at + 16 * joints
         self.holds_at = self.positions_at + 12 * joints
         self.stride = self.holds_at + 4 * joints - self.root_at
-        self.bytes = self.root_at + puppets * self.stride
+        self.hands_at = self.root_at + puppets * self.stride
+        self.live_at = self.hands_at + 16 * hands
+        self.bytes = self.live_at + 12 * live

@@ -24,7 +24,7 @@ from appliance.outputs.frame_layout import (
     FrameLayout,
 )
 from appliance.outputs.joint_frame import JointFrame
-from appliance.outputs.shared_frame import Facts, puppets_in
+from appliance.outputs.shared_frame import Facts, others_in, puppets_in
 from appliance.pose.foreign_file import plain_json
 
 State = Literal["absent", "fresh", "stale"]
@@ -137,4 +137,5 @@ class FrameReader:
         if is_ahead or not np.isfinite(numbers).all():
             return None
         puppets = puppets_in(payload, layout)
-        return JointFrame(puppets, tick, frame_time, bool(flags & LATE), sequence, arrival, left)
+        others = others_in(payload, layout)
+        return JointFrame(puppets, tick, frame_time, bool(flags & LATE), sequence, arrival, left, *others)

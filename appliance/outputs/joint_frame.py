@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,12 @@ class PuppetFrame:
 
 @dataclass(slots=True)
 class JointFrame:
-    """The poses of all puppets at one tick, in the show's order. One that was read has read-only arrays."""
+    """The poses of all puppets at one tick, in the show's order. One that was read has read-only arrays.
+
+    hands (H, 4): where the hands of all puppets point their joints, w, x, y, z, whether they hold them or not;
+    zeros: a hand that gives no single orientation. live (J, 3): joints of the live dancer, metres, where the
+    stream has them; zeros: nobody is there. (0, 3) in a show that takes none.
+    """
 
     SNAPSHOT = ("sensor_sequence", "sensor_arrival")
     TIMES = ("sensor_arrival",)
@@ -49,3 +54,5 @@ class JointFrame:
     sensor_sequence: int = -1  # the primary sensor's newest reading in this frame; -1 without one
     sensor_arrival: float = 0.0  # when that reading came in, seconds on the monotonic clock
     left: float = 0.0  # when it left the stage, the same clock; for readers of the shared frame
+    hands: Floats = field(default_factory=lambda: np.zeros((0, 4), np.float32))
+    live: Floats = field(default_factory=lambda: np.zeros((0, 3), np.float32))

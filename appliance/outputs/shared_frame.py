@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from appliance.box.ring_file import RingFileWriter
+from appliance.levers.sources import LIVE
 from appliance.outputs.frame_layout import (
     FACTS,
     FILE,
@@ -26,7 +27,7 @@ from appliance.outputs.frame_layout import (
     LATE,
     FrameLayout,
 )
-from appliance.outputs.joint_frame import JointFrame, PuppetFrame
+from appliance.outputs.joint_frame import Floats, JointFrame, PuppetFrame
 from appliance.outputs.puppet_facts import PuppetFacts, led_by, unpacked
 from appliance.pose.foreign_file import plain_json
 from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
@@ -63,7 +64,8 @@ class Facts:
     @property
     def layout(self) -> FrameLayout:
         """How its frames lie."""
-        return FrameLayout(len(self.skeleton), len(self.puppets))
+        joints, hands = len(self.skeleton), sum(len(one.hands) for one in self.puppets)
+        return FrameLayout(joints, len(self.puppets), hands, joints if LIVE in self.phrases else 0)
 
     @property
     def led(self) -> PuppetFacts:
@@ -131,6 +133,7 @@ class FrameWriter:
         self._payload = payload = self._ring.payload
         self._joints = layout.joints
         self._puppets = puppets_in(payload, layout)
+        self._hands, self._live = others_in(payload, layout)
         self._file.publish()
 
     def write(self, frame: JointFrame) -> None:
@@ -153,6 +156,8 @@ class FrameWriter:
             out.world[...] = puppet.world
             out.positions[...] = puppet.positions
             out.holds[...] = puppet.holds
+        self._hands[: len(frame.hands)] = frame.hands
+        self._live[: len(frame.live)] = frame.live
         self._ring.publish()
 
     def write_health(self, health: Mapping[str, Any]) -> None:
@@ -168,6 +173,12 @@ class FrameWriter:
     def close(self) -> None:
         """Remove the file: readers find no stage."""
         self._file.close(remove=True)
+
+
+def others_in(payload: bytes | memoryview, layout: FrameLayout) -> tuple[Floats, Floats]:
+    """The hands (H, 4) and the live dancer (J, 3) in a frame's payload, as writable as that is."""
+    hands = np.frombuffer(payload, "<f4", 4 * layout.hands, layout.hands_at).reshape(-1, 4)
+    return hands, np.frombuffer(payload, "<f4", 3 * layout.live, layout.live_at).reshape(-1, 3)
 
 
 def puppets_in(payload: bytes | memoryview, layout: FrameLayout) -> tuple[PuppetFrame, ...]:

@@ -12,7 +12,7 @@ from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import Any
 
-_LARGEST_KEPT = 1 << 22
+_LARGEST_STORED = 1 << 22
 _SAMPLE = 1 << 18  # bytes at the start of a text that tell its encoding; they hold a skeleton's names
 _JAPANESE = re.compile("[\u3040-\u30ff\u4e00-\u9fff]{2,}")  # kana or kanji side by side
 
@@ -73,9 +73,9 @@ def require_inside(path: Path, folder: Path) -> None:
         raise OSError(errno.EXDEV, "a link leads out of the folder: put the file itself there", str(path))
 
 
-def kept_json(path: Path) -> Any:
+def stored_json(path: Path) -> Any:
     """The values in a small file that this box wrote. Raises OSError, or ValueError for a spoilt one."""
-    return plain_json(content(path, _LARGEST_KEPT))
+    return plain_json(content(path, _LARGEST_STORED))
 
 
 def plain_json(text: str | bytes) -> Any:

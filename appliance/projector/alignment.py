@@ -62,7 +62,7 @@ class AlignmentFile:
     def __init__(self, folder: Path, config: ProjectorConfig, say: Callable[[str], None]) -> None:
         self.path = folder / file_name(config)
         self._from_box, self._say = Alignment(WHOLE, config.mirror, config.brightness), say
-        self._kept = self._wanted = self._load()
+        self._saved = self._wanted = self._load()
         self._is_wanted = threading.Event()
         self._closing = False
         self._thread = threading.Thread(target=self._write_changes, name="alignment", daemon=True)
@@ -110,8 +110,8 @@ class AlignmentFile:
             self._is_wanted.wait()
             self._is_wanted.clear()
             is_last, wanted = self._closing, self._wanted
-            if wanted != self._kept and self._write(wanted):
-                self._kept = wanted
+            if wanted != self._saved and self._write(wanted):
+                self._saved = wanted
             if is_last:
                 return
 

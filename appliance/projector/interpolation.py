@@ -14,7 +14,7 @@ from appliance.projector.moment import TRAIL_S, Moment, PuppetMoment
 from appliance.projector.prediction import SPAN, Figure, Prediction
 
 TICK_S = 0.02
-_KEPT = 64  # frames: the ring of the shared frame, a little more than the trail
+_CAPACITY = 64  # frames: the ring of the shared frame, a little more than the trail
 _READ_AT_ONCE = 3  # a display of 25 Hz or more misses none; after a gap all of them are read
 _LONGEST_GAP_S = 0.1  # a longer one is not bridged: the later pose simply follows
 _SLEW = 0.1  # how much faster or slower the dance may seem while the delay is corrected
@@ -39,7 +39,7 @@ class Interpolation:
     def __init__(self, reader: FrameReader, prediction_s: float = 0.0) -> None:
         self._reader, self._prediction_s = reader, prediction_s
         self._predict: Prediction | None = None
-        self._seen: deque[_Seen] = deque(maxlen=_KEPT)
+        self._seen: deque[_Seen] = deque(maxlen=_CAPACITY)
         self._tick = -1
         self._latency_s: float | None = None  # from a frame's time to its leaving the stage
         self._before = 0.0
@@ -51,9 +51,9 @@ class Interpolation:
 
     def take(self, now: float) -> None:
         """Read the frames that the stage has written since the last call."""
-        frames = self._reader.frames(_READ_AT_ONCE if self._seen else _KEPT, now)
+        frames = self._reader.frames(_READ_AT_ONCE if self._seen else _CAPACITY, now)
         if self._seen and frames and frames[0].tick > self._tick + 1:
-            frames = self._reader.frames(_KEPT, now)
+            frames = self._reader.frames(_CAPACITY, now)
         for frame in frames:
             self._note(frame)
         self._follow_latency(now)

@@ -51,7 +51,7 @@ class Pieces:
     """Puts long events together, whichever segments hold their pieces."""
 
     def __init__(self) -> None:
-        self._kept: dict[int, bytes] = {}
+        self._pieces: dict[int, bytes] = {}
 
     def whole(self, piece: Entry) -> bytes | None:
         """The event that ends with this piece; None before its last one, or if one is lost.
@@ -59,8 +59,8 @@ class Pieces:
         Raises struct.error or LookupError for what is no piece.
         """
         place, count = _PIECE.unpack_from(piece.data)
-        self._kept[piece.number] = piece.data[_PIECE.size :]
+        self._pieces[piece.number] = piece.data[_PIECE.size :]
         numbers = range(piece.number - place, piece.number - place + count)
-        if numbers[-1] != piece.number or not all(number in self._kept for number in numbers):
+        if numbers[-1] != piece.number or not all(number in self._pieces for number in numbers):
             return None
-        return b"".join(self._kept.pop(number) for number in numbers)
+        return b"".join(self._pieces.pop(number) for number in numbers)

@@ -152,7 +152,7 @@ def header_of(data: bytes) -> dict[str, Any] | None:
     return header
 
 
-def last_kept(folder: Path, run: str) -> tuple[int, int]:
+def last_saved(folder: Path, run: str) -> tuple[int, int]:
     """Number of the last entry and position of the last keyframe of a run that are on the disk: 0 and -1 for
     none. The run is the newest one that was kept. Raises OSError.
     """

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from appliance.box.durable import write_whole
-from appliance.pose.foreign_file import kept_json
+from appliance.pose.foreign_file import stored_json
 from appliance.release.arrivals import Arrival
 from appliance.release.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, Pair, appliance_box
 
@@ -207,10 +207,10 @@ def _is_new(arrival: Arrival, seen: dict[str, Any], lost: set[str]) -> bool:
 
 def _lost(data: Path, seen: dict[str, Any]) -> set[str]:
     """Ids of installed bundles that are missing on disk. Bundles pruned for newer ones do not count."""
-    kept = Choice.read(data / CHOSEN)
-    if kept is None:
+    saved = Choice.read(data / CHOSEN)
+    if saved is None:
         return {one["taken"] for one in seen.values() if one["taken"]}
-    return {one.id for one in kept.pairs if one.id and not one.here().is_there}
+    return {one.id for one in saved.pairs if one.id and not one.here().is_there}
 
 
 def _seen(arrival: Arrival, refused: list[str], taken: str) -> dict[str, Any]:
@@ -219,7 +219,7 @@ def _seen(arrival: Arrival, refused: list[str], taken: str) -> dict[str, Any]:
 
 def _read_seen(data: Path) -> dict[str, Any]:
     try:
-        seen = kept_json(data / SEEN)
+        seen = stored_json(data / SEEN)
         return {
             str(source): {
                 "listing": one["listing"],

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from appliance.box.durable import write_whole
-from appliance.pose.foreign_file import kept_json
+from appliance.pose.foreign_file import stored_json
 
 _SHOWS = Path(__file__).resolve().parents[1] / "show"
 APPLIANCE_BOX, EMBEDDED_SHOW = _SHOWS / "appliance_box.yaml", _SHOWS / "default_show"
@@ -85,7 +85,7 @@ class Choice(NamedTuple):
     def read(path: Path) -> Choice | None:
         """As written; None where there is none, no whole one, or an empty one."""
         try:
-            choice = Choice.of(kept_json(path))
+            choice = Choice.of(stored_json(path))
         except (OSError, ValueError):
             return None
         return choice if choice.pairs else None

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from appliance.box.durable import alone_in, write_whole
-from appliance.keeper.fallback import CHOICE_NOT_KEPT
+from appliance.keeper.fallback import CHOICE_NOT_SAVED
 from appliance.keeper.mirror import reason_of
 from appliance.outputs.frame_reader import FrameReader
-from appliance.pose.foreign_file import kept_json
+from appliance.pose.foreign_file import stored_json
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 
 TRIES, ANEW = "tries", "anew"
@@ -65,7 +65,7 @@ def ended_well(chosen: Path) -> None:
 class MirroredProof:
     """After PROVEN_S of dancing: the pair that dances is good, and those that did not dance are let go."""
 
-    name, fallback = "That a show has danced", CHOICE_NOT_KEPT
+    name, fallback = "That a show has danced", CHOICE_NOT_SAVED
     recovered = "That the show has danced is kept now."
 
     def __init__(self, runtime: Path, chosen: Path) -> None:
@@ -114,9 +114,9 @@ class MirroredProof:
                     return False
                 choice.with_good(identity).write(self._chosen)
             with alone_in(choice.data):
-                kept = Choice.read(choice.data / CHOSEN)
-                noted = None if kept is None else kept.with_good(identity).without(choice)
-                if noted is not None and noted != kept:
+                saved = Choice.read(choice.data / CHOSEN)
+                noted = None if saved is None else saved.with_good(identity).without(choice)
+                if noted is not None and noted != saved:
                     noted.write(choice.data / CHOSEN)
         except BlockingIOError:
             return False
@@ -126,7 +126,7 @@ class MirroredProof:
 def _read_tries(folder: Path, pair: Pair, now: float) -> Tries | None:
     """The result of the starts before this one; None while another process still dances."""
     try:
-        tries = Tries(*kept_json(folder / TRIES))
+        tries = Tries(*stored_json(folder / TRIES))
     except (OSError, ValueError, TypeError):
         return Tries(pair.id)
     if tries.pid != os.getpid() and Path(f"/proc/{tries.pid}").exists():

@@ -20,13 +20,13 @@ LONGEST_NAME = 100
 class Command:
     """One message in a valid form. `text`: what it is about, a joint also by number; "": left out.
 
-    kept: names of motions that were kept, which /phrase may call as well.
+    saved: names of motions that were kept, which /phrase may call as well.
     """
 
     address: str
     values: tuple[float, ...] = ()
     text: str | int = ""
-    kept: tuple[str, ...] = ()
+    saved: tuple[str, ...] = ()
 
 
 def command(address: str, arguments: Sequence[object]) -> Command:

@@ -190,7 +190,7 @@ class CommandHandler:
         address, observer = command.address, self._observer
         before = of_this_show(self.show_state, observer.facts)
         if address in ("/phrase", "/cue"):
-            command = replace(command, kept=observer.kept())
+            command = replace(command, saved=observer.saved())
         show_state, message = declare(before, command, observer.facts, now)
         if address == "/go" and before.going and observer.state(now) == "stopped":
             show_state = show_state.to(RATE, None, now)

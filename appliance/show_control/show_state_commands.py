@@ -60,8 +60,8 @@ def _require(lever: Lever[Any], value: Any, command: Command, facts: Facts | Non
             raise ValueError(need.cure)
     if lever.names != ("", "") and value:
         names, what = lever.names
-        kept = command.kept if lever is PHRASE else ()
-        known(what, value, (*getattr(facts, names), *kept) if facts else None)
+        saved = command.saved if lever is PHRASE else ()
+        known(what, value, (*getattr(facts, names), *saved) if facts else None)
 
 
 def _go(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from appliance.box.fallback import Fallbacks, Fallen, fallen
-from appliance.box.made_motion import KeptNamesReader
+from appliance.box.made_motion import SavedNamesReader
 from appliance.box.process_health import COMMANDS_DROPPED, STAGE_HUNG, ProcessHealth
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
@@ -21,7 +21,7 @@ class StageObserver:
     def __init__(self, folder: Path) -> None:
         self._reader = FrameReader(folder)
         self._process_health = ProcessHealth(folder)
-        self._kept = KeptNamesReader(folder)
+        self._saved = SavedNamesReader(folder)
         self.own = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED, *OF_CONTROL))
 
     def state(self, now: float) -> StageState:
@@ -46,9 +46,9 @@ class StageObserver:
         generation, message = self.health().get("applied", (0, ""))
         return int(generation), str(message)
 
-    def kept(self) -> tuple[str, ...]:
+    def saved(self) -> tuple[str, ...]:
         """Names of motions that were kept: /phrase calls them."""
-        return self._kept.read()
+        return self._saved.read()
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
         """Process and fallback, of all processes of the box, as far as they ever happened."""
@@ -77,4 +77,4 @@ class StageObserver:
         """Let go of the shared frame."""
         self._reader.close()
         self._process_health.close()
-        self._kept.close()
+        self._saved.close()

@@ -53,8 +53,8 @@ class SensorFit:
         self._wearers = {name: _binding(parts, name) for name in parts.worn}
         for wearer in self._wearers.values():
             for hand in wearer.hands:
-                kept = memory.neutral(wearer.name, hand.joint.joint)
-                hand.wear(kept or hand.mounting.assumed_pose)
+                saved = memory.neutral(wearer.name, hand.joint.joint)
+                hand.wear(saved or hand.mounting.assumed_pose)
 
     def hear(self, reading: SensorReading) -> None:
         """Take a reading before its joints do; it takes part in the tick, so it says nothing."""
@@ -229,8 +229,8 @@ class SensorFit:
 
     def _keep_corrected(self, wearer: SensorBinding) -> None:
         """Keep a corrected heading for the next start, once it has moved far enough."""
-        kept = self._memory.neutral(wearer.name, wearer.hands[0].joint.joint)
-        off = wearer.hands[0].pose.heading - (kept.heading if kept is not None else 0.0)
+        saved = self._memory.neutral(wearer.name, wearer.hands[0].joint.joint)
+        off = wearer.hands[0].pose.heading - (saved.heading if saved is not None else 0.0)
         if abs(math.remainder(off, math.tau)) > math.radians(_KEPT_DEGREES):
             self._memory.keep_neutral(wearer.name, {hand.joint.joint: hand.pose for hand in wearer.hands})
 

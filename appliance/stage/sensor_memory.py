@@ -112,12 +112,12 @@ class SensorMemory:
 
     def _set_aside(self, path: Path) -> None:
         broken = path.with_name(path.name + ".broken")
-        kept = f"It is kept as {broken.name}"
+        remark = f"It is kept as {broken.name}"
         try:
             path.replace(broken)
         except OSError as error:
-            kept = f"It could not be set aside ({error.strerror})"
+            remark = f"It could not be set aside ({error.strerror})"
         self._say(
-            f"{path}: what was remembered of the sensors is damaged. {kept}; "
+            f"{path}: what was remembered of the sensors is damaged. {remark}; "
             "the show goes on, and sensors need a moment of stillness tonight."
         )

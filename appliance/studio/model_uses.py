@@ -16,7 +16,7 @@ USES = {
 REMOVED = ("conv", "lstm-autoregressive", "lstm256")  # networks of version 0.1.0
 
 
-def require_kept(architecture: str, path: Path) -> None:
+def require_supported(architecture: str, path: Path) -> None:
     """Raises StudioError for a file whose architecture was removed after version 0.1.0."""
     if architecture in REMOVED:
         raise StudioError(

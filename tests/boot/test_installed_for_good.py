@@ -14,7 +14,7 @@ from tests.boot.hall import Hall
 from tests.boot.root import release
 from tests.boot.trial import changed_release
 
-KEPT = "/data/bunraku-releases"
+RELEASES = "/data/bunraku-releases"
 _STAGE = "appliance/stage/run.py"
 _FAILS_WHEN_TOLD = (
     "import os\nif os.path.exists('/boot/bunraku/fail'):\n    raise ImportError('it fails today')\n"
@@ -66,7 +66,7 @@ def test_it_dances_after_a_power_cut_and_goes_back_for_good(installed: Box, figu
     assert box.machine.show("bunraku-console", "TasksMax") == "47", "systemd has read this release's units"
     box.machine.await_that(lambda: _watch_is_over(box), "the watch does not end: it dances")
     assert box.machine.show(_WATCH, "Result") == "success"
-    assert not box.machine.path(f"{KEPT}/tries").exists()
+    assert not box.machine.path(f"{RELEASES}/tries").exists()
     assert box.machine.run("systemctl", "--failed", "--plain", "--no-legend") == ""
     assert box.machine.show(STAGE, "NRestarts") == "0"
     _the_services_cannot_touch_it(box)
@@ -128,7 +128,8 @@ def _the_services_cannot_touch_it(box: Box) -> None:
         box.await_unit(f"bunraku-{unit}")  # before that its mounts may not be made
         pid = box.machine.show(f"bunraku-{unit}", "MainPID")
         tried = _bash(
-            box, f"nsenter --target {pid} --mount sh -c 'touch {KEPT}/x {KEPT}/9.9.4/x /data/x' 2>&1; true"
+            box,
+            f"nsenter -t {pid} --mount sh -c 'touch {RELEASES}/x {RELEASES}/9.9.4/x /data/x' 2>&1; true",
         )
         assert tried.count("Read-only file system") == 3, (unit, tried)
 

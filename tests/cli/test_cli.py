@@ -197,7 +197,7 @@ def test_a_filmstrip_of_a_recording_and_of_a_journal(tmp_path: Path, bunraku: Co
     show = write_show(tmp_path / "show")
     night = Night(show, tmp_path / "runtime")
     night.dance(100)
-    folder = night.kept(tmp_path / "night.journal")
+    folder = night.saved(tmp_path / "night.journal")
     exported = export(folder, tmp_path / "night.bunraku")
     for source in (show / "phrase.bvh", exported):
         picture = tmp_path / "picture.png"

@@ -28,7 +28,7 @@ def recorded(tmp_path: Path) -> Path:
     night.order("rate", 0.5)
     night.recorder.event("said", 1000.5, message="The network gives poses again.")
     night.dance(20, late_s=0.012)
-    return night.kept(tmp_path / "journal")
+    return night.saved(tmp_path / "journal")
 
 
 @pytest.fixture
@@ -78,22 +78,22 @@ def test_of_several_puppets_the_one_that_is_written_is_named_and_may_be_chosen(
 ) -> None:
     night = Night(write_puppets(tmp_path / "show"), tmp_path / "runtime")
     night.dance(60)
-    kept = night.kept(tmp_path / "journal")
-    export = ("journal", "export", "--journal", kept, "--bvh", tmp_path / "one.bvh")
+    journal = night.saved(tmp_path / "journal")
+    export = ("journal", "export", "--journal", journal, "--bvh", tmp_path / "one.bvh")
     assert "by left of left, right, late, slow (--puppet)" in bunraku(*export).out
     assert "by slow of left" in bunraku(*export, "--puppet", "slow").out
-    danced = read_journal(kept).ticks["root"][:, 3]
+    danced = read_journal(journal).ticks["root"][:, 3]
     np.testing.assert_allclose(read_as_told(tmp_path / "one.bvh")[0].roots, danced, atol=1e-5)
     assert "no puppet 'nobody' danced" in bunraku(*export, "--puppet", "nobody", status=2).err
-    alone = ("journal", "export", tmp_path / "out", "--journal", kept, "--puppet", "slow")
+    alone = ("journal", "export", tmp_path / "out", "--journal", journal, "--puppet", "slow")
     assert "--puppet does nothing without --bvh or --glb" in bunraku(*alone, status=2).err
     drawn: list[Any] = []
     monkeypatch.setattr(pictures, "draw_strips", lambda *given: drawn.extend(given) or given[0])
-    bunraku("filmstrip", kept, "--out", tmp_path / "all.png", "--seconds", "0.5", "--start", "0.6")
+    bunraku("filmstrip", journal, "--out", tmp_path / "all.png", "--seconds", "0.5", "--start", "0.6")
     _, _, strips, *_, start_s = drawn
     assert [strip.label for strip in strips] == ["left", "right", "late", "slow"] and start_s == 0.6
     assert strips[0].holds is not None and np.array_equal(strips[3].roots, danced[30:55])
-    message = bunraku("filmstrip", kept, "--show", tmp_path / "show", "--up", "z", status=2).err
+    message = bunraku("filmstrip", journal, "--show", tmp_path / "show", "--up", "z", status=2).err
     assert "--show does nothing without --look" in message
 
 

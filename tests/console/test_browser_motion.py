@@ -70,11 +70,11 @@ def test_variations_and_places_on_the_map(browser: Browser, studio: tuple[Box, P
     wait_until(lambda: _danced(page) == "vary", "no variation is danced")
     tab.fill("#motion-keep-name", "anna")
 
-    def is_kept() -> bool:
+    def is_saved() -> bool:
         press(tab, "#motion-keep-form button")
         return any(one["name"] == "anna" for one in page.status()["phrases"])
 
-    wait_until(is_kept, lambda: tab.inner_text("#said"))
+    wait_until(is_saved, lambda: tab.inner_text("#said"))
     with tab.expect_response("**/api/map") as ground_plan:
         press(tab, "#phrases >> text=Map")
     assert len(ground_plan.value.json()["figures"]) == 25

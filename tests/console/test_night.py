@@ -8,7 +8,7 @@ from typing import Any, cast
 from xml.etree import ElementTree
 
 from appliance.console.box_view import BoxView
-from appliance.console.night import KEPT_S, Night
+from appliance.console.night import KEEP_S, Night
 from appliance.console.stage_view import StageView
 from appliance.outputs.frame_layout import BROWSER_HEAD
 
@@ -54,7 +54,7 @@ def test_without_a_frame_there_are_only_words(tmp_path: Path) -> None:
 
 
 def test_pictures_of_a_night_are_kept_and_older_ones_go(tmp_path: Path) -> None:
-    kept = night(tmp_path, frame())
-    for now in (1000.0, 1060.0, 1000.0 + KEPT_S + 30.0):
-        kept.keep(now)
-    assert kept.times() == [1060, int(1030 + KEPT_S)]
+    pictures = night(tmp_path, frame())
+    for now in (1000.0, 1060.0, 1000.0 + KEEP_S + 30.0):
+        pictures.keep(now)
+    assert pictures.times() == [1060, int(1030 + KEEP_S)]

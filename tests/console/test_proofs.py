@@ -18,11 +18,11 @@ def test_the_newest_are_kept_and_a_spoilt_one_is_left_out(tmp_path: Path) -> Non
     numbers = [proofs.add({"kind": "doctor", "made": float(n), "holds": True}) for n in range(MOST + 3)]
     assert [one["id"] for one in Proofs(tmp_path / "proofs").listed()] == numbers[:2:-1]
     (tmp_path / "proofs" / f"{numbers[-1]}.json").write_text('{"kind": ')
-    kept = Proofs(tmp_path / "proofs")
-    assert [one["id"] for one in kept.listed()] == numbers[-2:2:-1]
-    assert kept.content(numbers[-2]) and kept.content(numbers[0]) is None
-    assert kept.content("../console") is None
-    assert kept.add({"kind": "doctor", "made": 0.0, "holds": True}) > numbers[-1]
+    proofs = Proofs(tmp_path / "proofs")
+    assert [one["id"] for one in proofs.listed()] == numbers[-2:2:-1]
+    assert proofs.content(numbers[-2]) and proofs.content(numbers[0]) is None
+    assert proofs.content("../console") is None
+    assert proofs.add({"kind": "doctor", "made": 0.0, "holds": True}) > numbers[-1]
 
 
 @pytest.mark.parametrize(

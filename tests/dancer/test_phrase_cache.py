@@ -21,7 +21,7 @@ def bundle(tmp_path: Path) -> Path:
     return write_show(tmp_path / "show")
 
 
-def kept_in(folder: Path) -> list[Path]:
+def cached_in(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"*{SUFFIX}")) if folder.exists() else []
 
 
@@ -39,7 +39,7 @@ def test_what_was_kept_dances_the_same_to_the_bit(bundle: Path, tmp_path: Path) 
             motion.advance()
         windows.append((motion.window().tobytes(), motion.roots().tobytes(), motion.lift, motion.position_s))
     assert windows[0] == windows[1] == windows[2]
-    assert len(kept_in(tmp_path / "memory")) == 1
+    assert len(cached_in(tmp_path / "memory")) == 1
 
 
 def test_the_floor_is_the_one_that_a_survey_finds(bundle: Path, tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_another_phrase_under_the_same_name_is_another_one(bundle: Path, tmp_pat
         assert found is not None
         lengths.append(len(found[0]))
         preparations.forget_others()
-        assert len(kept_in(memory)) == 1  # memory holds one show's
+        assert len(cached_in(memory)) == 1  # memory holds one show's
     assert lengths == [150, 200]
 
 
@@ -79,7 +79,7 @@ def test_whatever_is_damaged_is_read_anew(bundle: Path, tmp_path: Path) -> None:
     path, memory = bundle / "phrase.bvh", tmp_path / "memory"
     first = PhraseCache(bundle, memory).phrase(path, FIGURE, grounded=True)
     assert first is not None
-    [kept] = kept_in(memory)
+    [kept] = cached_in(memory)
     whole = kept.read_bytes()
     damaged = [whole[:size] for size in (0, 1, 20, 40, len(whole) // 2, len(whole) - 1)]
     flipped = range(0, len(whole), max(1, len(whole) // 60))
@@ -102,14 +102,14 @@ def test_a_phrase_that_is_too_long_for_memory_is_not_kept(
 ) -> None:
     monkeypatch.setattr(prepared, "LARGEST", 1000)
     assert PhraseCache(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None
-    assert kept_in(tmp_path / "memory") == []
+    assert cached_in(tmp_path / "memory") == []
 
 
 def test_a_bundle_can_be_prepared_beforehand(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     prepare([bundle / "phrase.bvh"], bundle, FIGURE, grounded=True)
-    assert len(kept_in(bundle / FOLDER)) == 1
+    assert len(cached_in(bundle / FOLDER)) == 1
     monkeypatch.setattr(prepared, "read_bvh", lambda path: pytest.fail("it was read once more"))
     assert PhraseCache(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None
 

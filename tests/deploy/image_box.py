@@ -20,13 +20,13 @@ class ImageBox(BoxRoot):
         return self.path / "data"
 
     @property
-    def kept(self) -> Path:
+    def releases(self) -> Path:
         return self.written / "bunraku-releases"
 
     @property
     def next_choice(self) -> str | None:
         """What the data partition says is to dance at the next power-on; None: what came with the image."""
-        link = self.kept / "current"
+        link = self.releases / "current"
         return link.readlink().name if link.is_symlink() else None
 
     def switch_on(self) -> None:
@@ -45,7 +45,7 @@ class ImageBox(BoxRoot):
         run("mount", "-t", "overlay", "-o", above, "overlay", str(self.path))
         self.written.mkdir(exist_ok=True)
         run("mount", "-o", "loop,noatime,nosuid,nodev", str(self.disk), str(self.written))
-        if (self.kept / "current").is_symlink():
+        if (self.releases / "current").is_symlink():
             done = self.release("at-power-on")
             assert done.returncode == 0, done.stderr
 

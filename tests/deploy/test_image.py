@@ -87,7 +87,7 @@ def test_what_was_installed_dances_after_each_power_on(fresh: ImageBox, second: 
         assert fresh.check_disk() in (0, 1)
         fresh.switch_on()
     assert not (fresh.path / "opt/bunraku/releases/1.0.0").is_symlink(), "what came with the image stays"
-    assert [path.name for path in fresh.kept.iterdir() if path.is_dir() and not path.is_symlink()] == [
+    assert [path.name for path in fresh.releases.iterdir() if path.is_dir() and not path.is_symlink()] == [
         "2.0.0"
     ]
 
@@ -107,7 +107,7 @@ def test_what_came_with_the_image_is_never_taken_away(box: ImageBox, make_releas
     for version in ("3.0.0", "4.0.0", "5.0.0"):
         assert box.release("install", make_release(version)).returncode == 0
     assert box.release("list").stdout == "  1.0.0\n  3.0.0\n  4.0.0\n* 5.0.0\n"
-    assert not (box.kept / "2.0.0").exists()
+    assert not (box.releases / "2.0.0").exists()
     again(box)
     assert box.release("list").stdout == "  1.0.0\n  3.0.0\n  4.0.0\n* 5.0.0\n"
 
@@ -159,13 +159,13 @@ def _all_may_write(name: str) -> Callable[[Path], None]:
 def test_a_damaged_release_gives_way_to_the_one_that_came_with_the_image(
     box: ImageBox, second: Path, harm: Callable[[Path], None], message: str
 ) -> None:
-    place, modes = box.kept / "2.0.0", [path.stat() for path in (box.written, box.kept)]
+    place, modes = box.releases / "2.0.0", [path.stat() for path in (box.written, box.releases)]
     harm(place)
     again(box)
     dances(box, "1.0.0")
     assert box.next_choice is None, "it is not tried again at each power-on"
     assert f"2.0.0  put aside: {message}" in box.release("list").stdout or message == "it is not whole"
-    for path, stat in zip((box.written, box.kept), modes, strict=True):
+    for path, stat in zip((box.written, box.releases), modes, strict=True):
         path.chmod(stat.st_mode & 0o777)
         os.chown(path, stat.st_uid, stat.st_gid)
     if message != "others than root may write there":
@@ -181,7 +181,7 @@ def test_a_damaged_release_gives_way_to_the_one_that_came_with_the_image(
 )
 def test_a_release_for_another_machine_gives_way(box: ImageBox, fact: str, message: str) -> None:
     """As on a disk that came from another box; all its sums are right."""
-    place = box.kept / "2.0.0"
+    place = box.releases / "2.0.0"
     facts = (place / "release").read_text().splitlines()
     name = fact.split()[0]
     (place / "release").write_text(
@@ -212,7 +212,7 @@ def test_where_others_than_root_may_write_nothing_is_installed(fresh: ImageBox, 
     done = fresh.release("install", second)
     assert done.returncode == 1
     assert "what lies there would be started as root" in done.stderr
-    assert list(fresh.kept.iterdir()) == []
+    assert list(fresh.releases.iterdir()) == []
 
 
 def test_a_data_partition_that_cannot_be_written_is_said(fresh: ImageBox, second: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 from appliance.box.made_motion import MadeMotion, MadeMotionReader
 from appliance.box.orders import Order
 from appliance.generator import request as requests
-from appliance.generator.fallback import NOT_KEPT, NOT_MADE
+from appliance.generator.fallback import NOT_MADE, NOT_SAVED
 from appliance.generator.pointing import Pointing
 from appliance.levers.show_state import ShowState
 from appliance.outputs.joint_frame import PuppetFrame
@@ -201,21 +201,21 @@ def test_a_kept_motion_outlives_the_power_and_is_written_as_a_file(
     keep = Order("keep", text="anna")
     assert one.generator.obey(keep)[0] is False, "a phrase is kept already"
     one.declare(phrase=("vary", NO_FADE))
-    kept = one.recipe()
+    saved = one.recipe()
     one.dance()
     for name, why in {"main": "already", "../up": "letters", "vary": "already"}.items():
         done, message = one.generator.obey(Order("keep", text=name))
         assert not done and why in message
     assert one.generator.obey(keep)[0]
-    one.generator.kept.wait()
+    one.generator.saved.wait()
     for file in [*(one.folder / "kept").iterdir()]:  # the power is cut
         file.unlink()
     one.close()
     other = bench(show)
-    wait_until(lambda: "anna" in other.generator.kept.recipes, "what was kept is not read")
+    wait_until(lambda: "anna" in other.generator.saved.recipes, "what was kept is not read")
     other.declare(phrase=("anna", NO_FADE))
     recipe = other.recipe()
-    assert recipe["source"] == "kept" and recipe["of"] == kept
+    assert recipe["source"] == "kept" and recipe["of"] == saved
     assert other.dance()["number"] == recipe["number"], "it loops"
     settings = tmp_path / "box.yaml"
     settings.write_text("state: state\n")
@@ -223,7 +223,7 @@ def test_a_kept_motion_outlives_the_power_and_is_written_as_a_file(
     assert "anna: 3.0 s of vary (phrase main, seed 1, sigma 1.0)" in bunraku("kept", *here).out
     bunraku("kept", "anna", "--out", tmp_path / "anna.bvh", *here)
     written = read_bvh(tmp_path / "anna.bvh")
-    danced = other.generator.kept.material("anna").loop
+    danced = other.generator.saved.material("anna").loop
     turned = quaternion.angle_between(written.poses, danced.poses[:-1])
     assert len(written) == danced.length and np.degrees(turned).max() < 0.1
     assert np.abs(written.roots - danced.track[:-1, :3]).max() < 1e-4
@@ -238,9 +238,9 @@ def test_a_disk_that_takes_nothing_is_told(bench: Benches, tmp_path: Path) -> No
     one.recipe()
     one.dance()
     assert one.generator.obey(Order("keep", text="anna"))[0], "it can be called until the box is switched off"
-    one.generator.kept.wait()
+    one.generator.saved.wait()
     one.recipe()
-    assert active(one, NOT_KEPT.name) and "anna" in one.generator.kept.recipes
+    assert active(one, NOT_SAVED.name) and "anna" in one.generator.saved.recipes
 
 
 def test_a_network_that_gives_nothing_sound_is_told(bench: Benches, tmp_path: Path) -> None:
@@ -258,5 +258,5 @@ def test_what_was_kept_is_not_lost_with_a_strange_file_beside_it(bench: Benches,
     folder.mkdir(parents=True)
     (folder / "strange.material").write_bytes(b"strange")
     one = bench(write_show_with_sources(tmp_path / "show"))
-    wait_until(lambda: one.generator.kept.complaint, "nothing is said of it")
-    assert one.generator.kept.recipes == {}
+    wait_until(lambda: one.generator.saved.complaint, "nothing is said of it")
+    assert one.generator.saved.recipes == {}

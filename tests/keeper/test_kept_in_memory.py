@@ -10,7 +10,7 @@ from appliance.box import mounts
 from appliance.box.mounts import memory_of
 from appliance.box.process_health import ProcessHealth
 from appliance.cli.sensors.box_keys import forgotten
-from appliance.keeper.fallback import KEPT_IN_MEMORY
+from appliance.keeper.fallback import SAVED_IN_MEMORY
 from appliance.keeper.keeper import KeeperHealth
 
 OVERLAY = (
@@ -37,7 +37,7 @@ def test_a_box_that_keeps_everything_in_memory_says_so(
     keeper.report([], 10.0)
     told = [one for _, one in ProcessHealth(tmp_path).fallbacks(10.0)]
     assert [(one.name, one.active, one.about) for one in told] == (
-        [(KEPT_IN_MEMORY.name, True, memory)] if memory else []
+        [(SAVED_IN_MEMORY.name, True, memory)] if memory else []
     )
     assert bool(memory) == ("gone at power-off" in forgotten(Path("/data/bunraku/keys/sensors.keys")))
     keeper.end(11.0)

@@ -16,13 +16,13 @@ SIZE = (1000, 500)
 
 
 @pytest.fixture
-def kept() -> list[Alignment]:
+def saved() -> list[Alignment]:
     return []
 
 
 @pytest.fixture
-def controls(kept: list[Alignment]) -> Controls:
-    return Controls(Alignment(), kept.append)
+def controls(saved: list[Alignment]) -> Controls:
+    return Controls(Alignment(), saved.append)
 
 
 def strike(controls: Controls, *names: str, shift: bool = False) -> str:
@@ -33,19 +33,19 @@ def strike(controls: Controls, *names: str, shift: bool = False) -> str:
     return message
 
 
-def test_arrows_move_the_chosen_corner_by_pixels(controls: Controls, kept: list[Alignment]) -> None:
+def test_arrows_move_the_chosen_corner_by_pixels(controls: Controls, saved: list[Alignment]) -> None:
     strike(controls, "C", "3", "Left", "Up")
     strike(controls, "Right", "Down", "Down", shift=True)
     x, y = controls.alignment.corners[2]
     assert (x * SIZE[0], y * SIZE[1]) == pytest.approx((1000 - 1 + 10, 500 - 1 + 20))
     assert controls.alignment.corners[:2] == WHOLE[:2]
-    assert kept[-1] == controls.alignment
+    assert saved[-1] == controls.alignment
 
 
-def test_arrows_do_nothing_outside_of_corner_mode(controls: Controls, kept: list[Alignment]) -> None:
-    assert strike(controls, "Left", "R", "1") == "" and not kept
+def test_arrows_do_nothing_outside_of_corner_mode(controls: Controls, saved: list[Alignment]) -> None:
+    assert strike(controls, "Left", "R", "1") == "" and not saved
     strike(controls, "C", "Escape", "Left")
-    assert not kept and controls.corner is None
+    assert not saved and controls.corner is None
 
 
 def test_tab_cycles_through_the_corners_and_the_grid_is_shown(controls: Controls) -> None:
@@ -83,8 +83,8 @@ def test_mirror_brightness_info_help_and_quit(controls: Controls) -> None:
     assert controls.is_over
 
 
-def test_unknown_keys_do_nothing(controls: Controls, kept: list[Alignment]) -> None:
-    assert strike(controls, "X", "F5", "", "Escape", "5") == "" and not kept
+def test_unknown_keys_do_nothing(controls: Controls, saved: list[Alignment]) -> None:
+    assert strike(controls, "X", "F5", "", "Escape", "5") == "" and not saved
 
 
 def test_reset_fills_the_display(controls: Controls) -> None:
@@ -111,11 +111,11 @@ def test_commands_can_do_what_keys_can() -> None:
     assert FORMS["/projector/brightness"].numbers[0].most == MOST_BRIGHT
 
 
-def test_a_nudge_says_where_the_corner_is_now(controls: Controls, kept: list[Alignment]) -> None:
+def test_a_nudge_says_where_the_corner_is_now(controls: Controls, saved: list[Alignment]) -> None:
     done, message = controls.carry_out(Order("nudge", (2, -0.125, 0.25)))
     assert (done, message) == (True, "The top right corner is at (0.8750, 0.2500).")
     assert controls.carry_out(Order("nudge", (2, 0.0625, 0.0)))[1].endswith("(0.9375, 0.2500).")
-    assert kept[-1].corners[1] == (0.9375, 0.25)
+    assert saved[-1].corners[1] == (0.9375, 0.25)
     done, message = controls.carry_out(Order("nudge", (2, -1, 1)))
     assert not done and "fold" in message and message.endswith("(0.9375, 0.2500).")
 
@@ -134,7 +134,7 @@ def test_a_nudge_says_where_the_corner_is_now(controls: Controls, kept: list[Ali
         Order("dance", (1,)),
     ],
 )
-def test_refused_orders_change_nothing(controls: Controls, kept: list[Alignment], order: Order) -> None:
+def test_refused_orders_change_nothing(controls: Controls, saved: list[Alignment], order: Order) -> None:
     done, message = controls.carry_out(order)
-    assert not done and message.endswith(".") and not kept
+    assert not done and message.endswith(".") and not saved
     assert controls.alignment == Alignment()

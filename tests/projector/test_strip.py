@@ -43,7 +43,7 @@ def write_journal(path: Path, ticks: int = 100) -> Path:
     """A journal of a sway, as `play` leaves it."""
     night = Night(write_show(path.parent / "danced"), path.parent / "runtime")
     night.dance(ticks)
-    return night.kept(path)
+    return night.saved(path)
 
 
 @pytest.mark.parametrize("look", ["plaster", "lines"])

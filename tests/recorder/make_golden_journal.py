@@ -40,10 +40,10 @@ def record(scratch: Path) -> Path:
     night.dance(LATE.start - FAILED.stop, reading(RAISED, boot_nonce=2))
     night.dance(len(LATE), reading(RAISED, boot_nonce=2), late_s=0.015)
     night.dance(BEFORE - LATE.stop, reading(RAISED, boot_nonce=2))
-    journal = night.kept(scratch / "journal")
+    journal = night.saved(scratch / "journal")
     again = Night(show, runtime, begins_at=2000.0)
     again.dance(AFTER, reading(RAISED, boot_nonce=2))
-    return again.kept(journal)
+    return again.saved(journal)
 
 
 def main() -> None:

@@ -85,7 +85,7 @@ class Night:
         """Keeps this night in a folder."""
         return Mirror(MirroredJournal(self.runtime, folder, minutes, lambda: 1.8e9), self.said.append)
 
-    def kept(self, folder: Path) -> Path:
+    def saved(self, folder: Path) -> Path:
         """The folder, once all that was noted is in it."""
         self.mirror(folder).last_turn(0.0)
         return folder

@@ -20,7 +20,7 @@ from appliance.recorder import chunks, log
 from appliance.recorder.environment import fingerprints
 from appliance.recorder.export import export
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import last_kept, read_journal
+from appliance.recorder.reading import last_saved, read_journal
 from appliance.recorder.record import EVENT, TICK
 from appliance.recorder.segments import segment_paths
 from appliance.show.show import load_show
@@ -52,7 +52,7 @@ def whole(show: Path, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     night.dance(20)
     night.order("rate", 0.5)
     night.dance(5)
-    (segment,) = segment_paths(night.kept(folder / "journal"))
+    (segment,) = segment_paths(night.saved(folder / "journal"))
     return segment.read_bytes()
 
 
@@ -76,7 +76,7 @@ def test_facts_of_something_else_are_refused_in_words(
             all_that_reads(path, tmp_path)
         except JournalError:
             refused += 1
-        last_kept(tmp_path, "another run")  # a keeper that finds it in its folder
+        last_saved(tmp_path, "another run")  # a keeper that finds it in its folder
     assert refused > 50
     assert "Traceback" not in capsys.readouterr().err
 
@@ -187,7 +187,7 @@ def test_a_fifo_or_a_device_holds_nothing_up(whole: bytes, tmp_path: Path, place
     for make in (os.mkfifo, lambda path: path.symlink_to("/dev/zero")):
         make(path)
         assert "no regular file" in listed_in_bounds(journal) or "no journal is" in listed_in_bounds(journal)
-        run_with_timeout(PATIENCE_S, lambda: str(last_kept(path.parent, "another run")).encode())
+        run_with_timeout(PATIENCE_S, lambda: str(last_saved(path.parent, "another run")).encode())
         path.unlink()
 
 
@@ -196,12 +196,12 @@ def test_a_keeper_passes_by_what_is_no_segment(show: Path, tmp_path: Path) -> No
     folder.mkdir()
     os.mkfifo(folder / "00000007.segment")
 
-    def kept() -> bytes:
+    def saved() -> bytes:
         night = Night(show, tmp_path / "runtime")
         night.dance(20)
-        return str(len(read_journal(night.kept(folder)).ticks)).encode()
+        return str(len(read_journal(night.saved(folder)).ticks)).encode()
 
-    assert run_with_timeout(PATIENCE_S, kept) == b"20"
+    assert run_with_timeout(PATIENCE_S, saved) == b"20"
 
 
 def test_a_segment_that_goes_while_it_is_exported_is_no_fault(
@@ -211,7 +211,7 @@ def test_a_segment_that_goes_while_it_is_exported_is_no_fault(
     night, folder = Night(show, tmp_path / "runtime"), tmp_path / "journal"
     for _ in range(3):
         night.dance(20)
-        night.kept(folder)
+        night.saved(folder)
     oldest, *_ = segment_paths(folder)
     exported = export(
         folder, tmp_path / "night.bunraku", progress=lambda written, of: oldest.unlink(missing_ok=True)

@@ -39,7 +39,7 @@ def night(show: Path, tmp_path: Path) -> Night:
 def test_every_tick_the_readings_and_the_figure_are_read_back(night: Night, tmp_path: Path) -> None:
     night.dance(70, reading(TURNED))
     night.dance(30)
-    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    (run,) = read_journal(night.saved(tmp_path / "journal")).runs
     assert run.ticks["tick"].tolist() == list(range(100))
     np.testing.assert_array_equal(run.ticks["pose"][-1, 0], night.tick.frame.puppets[0].pose)
     np.testing.assert_array_equal(run.ticks["reading_here"][:, 0], [1] * 70 + [0] * 30)
@@ -54,7 +54,7 @@ def test_events_are_kept_in_their_place_and_the_longest_lose_their_end(night: Ni
     night.recorder.event("said", 12.5, message="x" * 5 * LONGEST_EVENT, count=3)
     night.dance(2)
     night.recorder.event("odd", 13.0, what=object())
-    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    (run,) = read_journal(night.saved(tmp_path / "journal")).runs
     ((number, event),) = run.events
     assert (event["kind"], event["now"], event["count"]) == ("said", 12.5, 3)
     assert LONGEST_EVENT / 3 < len(event["message"]) < LONGEST_EVENT
@@ -67,7 +67,7 @@ def test_a_long_event_is_whole(night: Night, tmp_path: Path) -> None:
     night.dance(2)
     night.recorder.event("order", 12.5, order={"text": recipe})
     night.dance(1)
-    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    (run,) = read_journal(night.saved(tmp_path / "journal")).runs
     ((number, event),) = run.events
     assert event["order"]["text"] == recipe
     assert run.tick_numbers.tolist() == [1, 2, number + 1]
@@ -87,7 +87,7 @@ def test_what_a_keeper_missed_is_fetched_by_the_next_one_and_nothing_comes_twice
 ) -> None:
     for count in (40, 700, 1):
         night.dance(count)
-        night.kept(tmp_path / "journal")
+        night.saved(tmp_path / "journal")
     (run,) = read_journal(tmp_path / "journal").runs
     assert run.ticks["tick"].tolist() == list(range(741))
     assert len(run.keyframes) == 2
@@ -96,9 +96,9 @@ def test_what_a_keeper_missed_is_fetched_by_the_next_one_and_nothing_comes_twice
 
 def test_the_memory_holds_more_than_a_minute_and_what_is_older_is_a_gap(night: Night, tmp_path: Path) -> None:
     night.dance(10)
-    night.kept(tmp_path / "journal")
+    night.saved(tmp_path / "journal")
     night.dance(LOG_SLOTS + 20)
-    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    (run,) = read_journal(night.saved(tmp_path / "journal")).runs
     assert LOG_SLOTS * TICK_S > 60.0
     assert run.ticks["tick"].tolist() == [*range(10), *range(30, LOG_SLOTS + 30)]
 
@@ -156,7 +156,7 @@ def test_a_torn_end_costs_that_piece_alone(night: Night, tmp_path: Path) -> None
 
 def test_an_export_is_one_file_that_reads_as_the_folder_does(night: Night, tmp_path: Path) -> None:
     night.dance(120, reading(TURNED))
-    folder = night.kept(tmp_path / "journal")
+    folder = night.saved(tmp_path / "journal")
     stick = tmp_path / "stick"
     stick.mkdir()
     exported = export(folder, stick, lambda: 0.0)
@@ -170,7 +170,7 @@ def test_an_export_is_one_file_that_reads_as_the_folder_does(night: Night, tmp_p
 
 def test_an_export_that_does_not_fit_leaves_nothing_behind(night: Night, tmp_path: Path) -> None:
     night.dance(10)
-    folder = night.kept(tmp_path / "journal")
+    folder = night.saved(tmp_path / "journal")
     with pytest.raises(JournalError, match=r"cannot be written there.*stays on the box"):
         export(folder, tmp_path / "absent" / "night.bunraku")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -207,13 +207,13 @@ def test_an_absent_and_an_empty_journal_are_refused_in_words(tmp_path: Path) -> 
 
 def test_only_its_owner_reads_what_is_in_memory_and_on_the_disk(night: Night, tmp_path: Path) -> None:
     night.dance(5)
-    folder = night.kept(tmp_path / "journal")
+    folder = night.saved(tmp_path / "journal")
     for path in (tmp_path / "runtime" / FILE, folder, *segment_paths(folder)):
         assert path.stat().st_mode & 0o077 == 0
 
 
 def test_silence_costs_little_room(night: Night, tmp_path: Path) -> None:
     night.dance(500)
-    (segment,) = segment_paths(night.kept(tmp_path / "journal"))
+    (segment,) = segment_paths(night.saved(tmp_path / "journal"))
     raw = sum(len(one.data) for one in chunks.chunks(segment.read_bytes()))
     assert segment.stat().st_size < raw / 2

@@ -28,7 +28,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     night.dance(110)
     night.dance(10, late_s=0.012)
     night.dance(180)
-    return read_journal(night.kept(folder / "journal")).runs[-1]
+    return read_journal(night.saved(folder / "journal")).runs[-1]
 
 
 def test_what_was_late_stands_where_it_was(run: Run) -> None:
@@ -77,7 +77,7 @@ def test_after_the_end_nothing_was_danced(run: Run) -> None:
 def test_the_command_shows_it_by_minutes(bunraku: Command, tmp_path: Path) -> None:
     night = Night(write_show(tmp_path / "show"), tmp_path / "runtime")
     night.dance(60)
-    journal = night.kept(tmp_path / "journal")
+    journal = night.saved(tmp_path / "journal")
     said = bunraku("journal", "timeline", "--journal", journal).out
     assert "1 s" in said and "0.0 min  slowest tick" in said
     (run,) = json.loads(bunraku("journal", "timeline", "--json", "--journal", journal).out)
@@ -89,10 +89,10 @@ def test_a_stretch_of_the_journal_has_the_segments_it_lies_in(tmp_path: Path) ->
     show, journal = write_show(tmp_path / "show"), tmp_path / "journal"
     night = Night(show, tmp_path / "first")
     night.dance(SEGMENT_TICKS + 200)
-    night.kept(journal)
+    night.saved(journal)
     later = Night(show, tmp_path / "second", begins_at=5000.0)
     later.dance(60)
-    later.kept(journal)
+    later.saved(journal)
     first = read_journal(journal).runs[0]
     lasts_s = 0.02 * len(first.ticks)
     for start_s, has in ((0.0, 1), (lasts_s - 1.0, 1), (lasts_s - 10.0, 2)):

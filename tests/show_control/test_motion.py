@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import pytest
 
-from appliance.box.made_motion import KeptNamesWriter
+from appliance.box.made_motion import SavedNamesWriter
 from appliance.levers.show_state import ShowState
 from appliance.levers.sources import MOST_POINTS, PARAMETERS
 from appliance.levers.status import Status
@@ -82,10 +82,10 @@ def test_a_cue_declares_the_parameters_that_it_names_with_its_fade() -> None:
 
 
 def test_kept_motions_are_known_by_name(tmp_path: Path) -> None:
-    with closing(KeptNamesWriter(tmp_path)) as writer, closing(StageObserver(tmp_path)) as observer:
-        assert observer.kept() == ()
+    with closing(SavedNamesWriter(tmp_path)) as writer, closing(StageObserver(tmp_path)) as observer:
+        assert observer.saved() == ()
         writer.write(["anna", "bert"])
-        assert observer.kept() == ("anna", "bert")
+        assert observer.saved() == ("anna", "bert")
 
 
 def test_the_status_tells_what_is_danced_and_every_parameter() -> None:

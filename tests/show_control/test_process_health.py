@@ -7,7 +7,7 @@ from pathlib import Path
 
 from appliance.box.fallback import Fallback, Fallbacks
 from appliance.box.process_health import LATE_S, ProcessHealth, ProcessHealthWriter
-from appliance.keeper.fallback import CHOICE_NOT_KEPT, JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT
+from appliance.keeper.fallback import CHOICE_NOT_SAVED, JOURNAL_STOPPED, PLACE_NOT_SAVED, SENSORS_NOT_SAVED
 from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.keeper import KeeperHealth
 from appliance.keeper.mirror import Mirror, Mirrored
@@ -101,7 +101,7 @@ def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
     chosen.complaint = place.complaint = sensors.complaint = "The disk is read-only."
     keeper = KeeperHealth(folder)
     keeper.report([chosen, place, sensors], 10.0)
-    rows = {PLACE_NOT_KEPT.name, SENSORS_NOT_KEPT.name, CHOICE_NOT_KEPT.name}
+    rows = {PLACE_NOT_SAVED.name, SENSORS_NOT_SAVED.name, CHOICE_NOT_SAVED.name}
     assert set(told(ProcessHealth(folder), 10.0)) == rows
     chosen.complaint = place.complaint = sensors.complaint = ""
     keeper.report([chosen, place, sensors], 12.0)

@@ -85,7 +85,7 @@ def test_their_journal_dances_again_bit_for_bit(tmp_path: Path) -> None:
     night.command("/partner/delay", 0.8)
     night.dance(500)
     for from_s in (0.0, 11.0):
-        run = read_journal(night.kept(tmp_path / "kept")).runs[0]
+        run = read_journal(night.saved(tmp_path / "kept")).runs[0]
         assert danced(run, tmp_path / "show", from_s)[1].first is None
 
 
@@ -134,7 +134,7 @@ def test_after_a_guest_stands_still_the_puppet_goes_on_until_the_guest_moves(tmp
     assert night.parts.led.continued == 0.0
     night.dance(200)  # the stream falls silent
     assert night.parts.led.continued == 1.0
-    run = read_journal(night.kept(tmp_path / "kept")).runs[0]
+    run = read_journal(night.saved(tmp_path / "kept")).runs[0]
     assert danced(run, tmp_path / "show")[1].first is None
 
 

@@ -78,7 +78,7 @@ def test_one_joint_goes_to_a_place_with_a_hands_orientation(tmp_path: Path) -> N
     assert night.parts.led.hands.targets[0, arm] == pytest.approx([0.8, 0.6, 0, 0], abs=1e-5)
     night.recorder.close()
     night.parts.close()
-    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    (run,) = read_journal(night.saved(tmp_path / "journal")).runs
     placed, held = run.ticks["targets"][-1]
     assert placed[1:] == pytest.approx(row.places[arm]) and held == pytest.approx([0.8, 0.6, 0, 0], abs=1e-5)
 
@@ -137,7 +137,7 @@ def test_a_night_with_places_dances_again_bit_for_bit(night: Night, tmp_path: Pa
     night.order("hand", 0.0, text="Hips")
     night.order("hand", 1.0, text=ARM)
     night.dance(100)
-    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    (run,) = read_journal(night.saved(tmp_path / "journal")).runs
     hands = run.header["hands"]
     assert [hand["by"] for hand in hands] == ["position", "position", "orientation"]
     places = run.ticks["targets"][:, 0]

@@ -93,7 +93,7 @@ def with_a_guest(night: Night) -> None:
 def test_a_night_with_a_guest_dances_again_bit_for_bit(show: Path, tmp_path: Path) -> None:
     night = Night(show, tmp_path / "runtime")
     with_a_guest(night)
-    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    (run,) = read_journal(night.saved(tmp_path / "journal")).runs
     assert np.isfinite(run.ticks["live_arrival"]).sum() == 40 + 60 + 40 + 400
     for from_s in (0.0, 11.0):
         replay, comparison = danced(run, show, from_s)
@@ -104,7 +104,7 @@ def test_a_night_with_a_guest_dances_again_bit_for_bit(show: Path, tmp_path: Pat
 def test_a_show_without_a_guest_notes_none(tmp_path: Path) -> None:
     night = Night(write_show(tmp_path / "plain"), tmp_path / "runtime")
     night.dance(5)
-    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    (run,) = read_journal(night.saved(tmp_path / "journal")).runs
     assert run.ticks["live_pose"].nbytes == run.ticks["live_arrival"].nbytes == 0
 
 

@@ -116,7 +116,7 @@ def test_their_journal_dances_again_bit_for_bit(night: Night, tmp_path: Path) ->
     night.command("/phrase", text="slow")
     night.dance(200, reading(TURNED))
     night.dance(420)
-    run = read_journal(night.kept(tmp_path / "kept")).runs[0]
+    run = read_journal(night.saved(tmp_path / "kept")).runs[0]
     for from_s in (0.0, 11.0):  # from the start, and from a later keyframe
         comparison = Comparison(float(run.ticks["frame_time"][0]), 0.0)
         danced = sum(1 for _ in Replay(run, load_show(tmp_path / "show")).dance(comparison, from_s))

@@ -216,7 +216,7 @@ def test_another_show_is_refused_in_words(run: Run, tmp_path: Path) -> None:
         Replay(run, load_show(other))
     night = Night(write_eventful_show(tmp_path / "show"), tmp_path / "runtime")
     night.dance(20)
-    night.kept(tmp_path / "journal")
+    night.saved(tmp_path / "journal")
     (tmp_path / "show").rename(tmp_path / "elsewhere")
     with pytest.raises(JournalError, match=r"is not where it was.*--show"):
         replay_journal(tmp_path / "journal", None, 0.0, None)
@@ -227,7 +227,7 @@ def test_after_an_order_that_takes_several_entries_it_dances_on(show: Path, tmp_
     night.dance(20)
     assert not night.order("phrase", text="nobody's " * 400)[0]
     night.dance(20)
-    run = read_journal(night.kept(tmp_path / "kept")).runs[0]
+    run = read_journal(night.saved(tmp_path / "kept")).runs[0]
     assert len(run.pieces) > 2
     replay = Replay(run, load_show(show))
     comparison = Comparison(float(run.ticks["frame_time"][0]), 0.0)
@@ -243,7 +243,7 @@ def test_an_order_that_nobody_heard_and_a_stop_dance_again_as_they_did(show: Pat
     night.slot.tick += 60  # the machine was held up
     night.slot.deadline += 60 * TICK_S
     night.dance(400, reading(TURNED))
-    [run] = read_journal(night.kept(tmp_path / "journal")).runs
+    [run] = read_journal(night.saved(tmp_path / "journal")).runs
     _, comparison = danced(run, show)
     assert comparison.first is None
     assert comparison.ticks == len(run.ticks) == 570
@@ -254,7 +254,7 @@ def test_two_starts_of_the_stage_are_two_runs(show: Path, tmp_path: Path) -> Non
     for _ in range(2):
         night = Night(show, tmp_path / "runtime")
         night.dance(60, reading(TURNED))
-        night.kept(journal)
+        night.saved(journal)
     recording = read_journal(journal)
     assert [len(run.ticks) for run in recording.runs] == [60, 60]
     assert len(recording.ticks) == 120

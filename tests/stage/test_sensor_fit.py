@@ -56,12 +56,12 @@ def test_the_pose_is_remembered_by_sensor_and_joint(evening: Evening, memory: Se
 def test_the_poses_of_all_joints_of_a_sensor_are_kept_in_one_write(
     evening: Evening, memory: SensorMemory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept: list[dict[str, NeutralPose]] = []
-    monkeypatch.setattr(memory, "keep_neutral", lambda sensor, poses: kept.append(poses))
+    saved: list[dict[str, NeutralPose]] = []
+    monkeypatch.setattr(memory, "keep_neutral", lambda sensor, poses: saved.append(poses))
     stage = evening([HAND, {"sensor": SENSOR, "joint": "lForeArm"}])
     stage.stand(2.5, about_up(40.0))
     pose = NeutralPose(about_up(40.0), 0.0, BOOT)
-    assert kept == [{"lShldr": pose, "lForeArm": pose}]
+    assert saved == [{"lShldr": pose, "lForeArm": pose}]
 
 
 def test_an_arrow_that_points_down_is_complained_of_and_the_lid_tells_the_front(evening: Evening) -> None:

@@ -96,8 +96,8 @@ def test_the_heading_alone_is_reset(evening: Evening, memory: SensorMemory, aske
     stage.stand(0.6, drifted)
     assert holds(stage.target(), HANGING)
     assert stage.said[-1] == f"Sensor {SENSOR}: this is the front now. Dance."
-    kept = memory.neutral(SENSOR, "lShldr")
-    assert kept is not None and kept.heading == pytest.approx(math.radians(25.0))
+    saved = memory.neutral(SENSOR, "lShldr")
+    assert saved is not None and saved.heading == pytest.approx(math.radians(25.0))
     assert stage.taken() == 1 and not stage.wants
 
 

@@ -25,8 +25,8 @@ def test_drift_is_taken_out_and_told_and_remembered(evening: Evening, memory: Se
     stage = evening()
     assert lie(stage, 240.0) < 4.0
     assert stage.wearing.corrected_of(SENSOR) > 8.0
-    kept = memory.neutral(SENSOR, "lShldr")
-    assert kept is not None and np.degrees(kept.heading) > 7.0
+    saved = memory.neutral(SENSOR, "lShldr")
+    assert saved is not None and np.degrees(saved.heading) > 7.0
     assert stage.wearing.reset_heading(None, stage.now)
     assert stage.wearing.corrected_of(SENSOR) == 0.0
 

@@ -15,7 +15,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.studio.autoencoder.models import settings_for
 from appliance.studio.data.dataset import Dataset, load_dataset
-from appliance.studio.improviser.pose_mixtures import kept_of
+from appliance.studio.improviser.pose_mixtures import components_of
 from appliance.studio.improviser.pose_mixtures_training import (
     PoseMixturesSettings,
     PoseMixturesTraining,
@@ -75,7 +75,7 @@ def test_steps_do_not_know_where_the_dancer_stands_and_faces() -> None:
 
 def test_components_keep_the_variance_that_is_asked_for() -> None:
     numbers = torch.randn(4000, 5) * torch.tensor([10.0, 3.0, 1.0, 0.1, 0.1])
-    assert [kept_of(numbers, share) for share in (0.5, 0.95, 0.999, 1.0)] == [1, 2, 3, 5]
+    assert [components_of(numbers, share) for share in (0.5, 0.95, 0.999, 1.0)] == [1, 2, 3, 5]
 
 
 def test_the_published_values_are_the_preset() -> None:

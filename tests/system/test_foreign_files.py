@@ -47,9 +47,9 @@ def memory(path: Path) -> None:
 
 
 def alignment(path: Path) -> None:
-    kept = AlignmentFile(path.parent, ProjectorConfig(), print)
-    path.rename(kept.path)
-    kept.close()
+    saved = AlignmentFile(path.parent, ProjectorConfig(), print)
+    path.rename(saved.path)
+    saved.close()
     AlignmentFile(path.parent, ProjectorConfig(), print).close()
 
 
@@ -198,10 +198,10 @@ def forged(facts: object, arrays: bytes) -> bytes:
 def test_a_prepared_phrase_of_something_else_is_read_again(tmp_path: Path, shapes: object) -> None:
     show = write_show(tmp_path / "show")
     prepare([show / "phrase.bvh"], show, FIGURE, grounded=True)
-    (kept,) = (show / FOLDER).glob(f"*{SUFFIX}")
+    (saved,) = (show / FOLDER).glob(f"*{SUFFIX}")
     names = {"joints": FIGURE.names, "parents": [int(parent) for parent in FIGURE.parents]}
     facts = shapes if isinstance(shapes, bytes) else names | {"shapes": shapes}
-    kept.write_bytes(forged(facts, np.zeros(1000, np.float32).tobytes()))
+    saved.write_bytes(forged(facts, np.zeros(1000, np.float32).tobytes()))
     found = PhraseCache(show, None).phrase(show / "phrase.bvh", FIGURE, grounded=True)
     assert found is not None and len(found[0]) == 150
 
@@ -212,9 +212,9 @@ def test_a_prepared_phrase_that_is_no_file_is_read_again(
 ) -> None:
     show = write_show(tmp_path / "show")
     prepare([show / "phrase.bvh"], show, FIGURE, grounded=True)
-    (kept,) = (show / FOLDER).glob(f"*{SUFFIX}")
-    kept.unlink()
-    made(kept)
+    (saved,) = (show / FOLDER).glob(f"*{SUFFIX}")
+    saved.unlink()
+    made(saved)
 
     def read() -> bytes:
         found = PhraseCache(show, None).phrase(show / "phrase.bvh", FIGURE, grounded=True)

@@ -43,12 +43,12 @@ def output_of(*arguments: str | Path) -> str:
 def await_runs(journal: Path, runs: int = 1) -> None:
     """Wait until the journal on the disk has this many starts of the stage."""
 
-    def are_kept() -> bool:
+    def are_saved() -> bool:
         with contextlib.suppress(JournalError):
             return len(read_journal(journal).runs) >= runs
         return False
 
-    wait_until(are_kept, f"there are not {runs} runs")
+    wait_until(are_saved, f"there are not {runs} runs")
 
 
 def disturb(box: Box) -> None:

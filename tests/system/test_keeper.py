@@ -17,7 +17,7 @@ import yaml
 from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, Standing, read_checkpoint
 from appliance.box.process_health import ProcessHealth
 from appliance.box.ring_file import RingFileWriter
-from appliance.keeper.fallback import JOURNAL_STOPPED, SENSORS_NOT_KEPT
+from appliance.keeper.fallback import JOURNAL_STOPPED, SENSORS_NOT_SAVED
 from appliance.keeper.keeper import keep_rest
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import read_journal
@@ -51,15 +51,15 @@ class Keeper(Process):
     def journal(self) -> Path:
         return self.folder / "disk" / "journal"
 
-    def kept_ticks(self) -> int:
+    def saved_ticks(self) -> int:
         with contextlib.suppress(JournalError):
             return len(read_journal(self.journal).ticks)
         return 0
 
-    def dance(self, ticks: int, kept: int) -> None:
+    def dance(self, ticks: int, saved: int) -> None:
         """Dance more ticks, and wait until the disk has `kept` in all."""
         self.night.dance(ticks)
-        wait_until(lambda: self.kept_ticks() == kept, lambda: self.output)
+        wait_until(lambda: self.saved_ticks() == saved, lambda: self.output)
 
     def follow_place(self, ended: bool = False) -> None:
         """Move the checkpoint on, and wait until the disk has it."""
@@ -67,10 +67,10 @@ class Keeper(Process):
         place = Checkpoint("A show", (Standing("main", self.position_s, (0.0, 30.0)),))
         self.place.write(replace(place, ended=ended))
         wait_until(
-            lambda: self.kept_place() == self.position_s, lambda: f"the disk stays behind: {self.output}"
+            lambda: self.saved_place() == self.position_s, lambda: f"the disk stays behind: {self.output}"
         )
 
-    def kept_place(self) -> float | None:
+    def saved_place(self) -> float | None:
         place = read_checkpoint(self.folder / "state" / FILE)
         return None if place is None else place.puppets[0].position_s
 
@@ -98,7 +98,7 @@ def disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Path, keeper: Keeper) -> None:
-    keeper.dance(50, kept=50)
+    keeper.dance(50, saved=50)
     keeper.follow_place()
     with disks.frozen(disk):
         keeper.night.dance(50)
@@ -112,7 +112,7 @@ def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Pat
         keeper.start()  # the process that still hangs holds nothing that this one needs
         keeper.follow_place()
         keeper.follow_place(ended=True)
-    wait_until(lambda: keeper.kept_ticks() == 100, lambda: keeper.output)
+    wait_until(lambda: keeper.saved_ticks() == 100, lambda: keeper.output)
     wait_until(lambda: not keeper.fallbacks(), lambda: keeper.output)
     assert keeper.end() == 0
     (run,) = read_journal(keeper.journal).runs
@@ -127,7 +127,7 @@ def test_the_rest_that_a_keeper_left_does_not_wait_for_a_disk_that_hangs(disk: P
     said: list[str] = []
     with disks.frozen(disk):
         keep_rest(load_box(keeper.box_file), keeper.runtime, keeper.journal, 1.0, said.append)
-        assert keeper.kept_place() == 7.5
+        assert keeper.saved_place() == 7.5
     assert any("The journal: the disk does not answer" in message for message in said)
 
 
@@ -141,8 +141,8 @@ def test_a_file_that_does_not_answer_holds_up_its_own_mirror_alone(tmp_path: Pat
         memory.write(MEMORY)
         with Keeper(tmp_path) as keeper:
             keeper.follow_place()
-            keeper.dance(20, kept=20)
-            wait_until(lambda: keeper.fallbacks() == {SENSORS_NOT_KEPT.name}, "the fallback is not reported")
+            keeper.dance(20, saved=20)
+            wait_until(lambda: keeper.fallbacks() == {SENSORS_NOT_SAVED.name}, "the fallback is not reported")
             keeper.follow_place(ended=True)
             assert keeper.end() == 0
 
@@ -160,11 +160,11 @@ def test_a_journal_of_another_release_costs_neither_place_nor_keeper(keeper: Kee
 
 def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper) -> None:
     keeper.follow_place()
-    keeper.dance(20, kept=20)
+    keeper.dance(20, saved=20)
     for process in children(keeper.process.pid):
         os.kill(process, signal.SIGKILL)
     keeper.follow_place()
-    keeper.dance(20, kept=40)
+    keeper.dance(20, saved=40)
     assert "has died" in keeper.output
     wait_until(lambda: "carried to the disk again" in keeper.output, lambda: keeper.output)
     assert keeper.end() == 0

@@ -12,7 +12,7 @@ import pytest
 
 from appliance.box.block import BlockReader, BlockWriter
 from appliance.box.orders import Order, OrderInbox, OrderSender
-from appliance.box.runtime_folder import AlreadyHereError, Claim, kept_file, renew_lost
+from appliance.box.runtime_folder import AlreadyHereError, Claim, renew_lost, restored_file
 from appliance.recorder.reading import read_journal
 from tests.bundles import write_show
 from tests.console.page import box_with_page
@@ -32,7 +32,7 @@ def test_everything_of_a_process_is_there_again(folder: Path) -> None:
     claim, inbox, sender = Claim(folder, "stage"), OrderInbox(folder, "stage"), OrderSender(folder)
     (folder / "chosen.json").write_text("{}")
     number = inbox.fileno()
-    with kept_file(folder / "chosen.json"):
+    with restored_file(folder / "chosen.json"):
         assert renew_lost() is None, "nothing was lost"
         (folder / "chosen.json").write_text("{1}")
         assert renew_lost() is None

@@ -79,7 +79,7 @@ class Evening:
         return choice_in(self.run)
 
     @property
-    def kept(self) -> Choice:
+    def saved(self) -> Choice:
         return choice_in(self.data)
 
 
@@ -156,10 +156,10 @@ def test_a_show_that_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(
     proof = proof_of(evening)
     evening.dance(seconds=9.0)
     proof.turn(time.monotonic())
-    assert not evening.kept.first.good
+    assert not evening.saved.first.good
     evening.dance(seconds=10.5)
     proof.turn(time.monotonic() + 1.0)
-    assert evening.kept.first.good
+    assert evening.saved.first.good
     assert evening.choice.first.good
     assert proof.complaint == ""
     proof.last_turn(time.monotonic())
@@ -172,7 +172,7 @@ def test_a_keeper_that_starts_while_the_show_dances_keeps_the_proof(evening: Eve
     )
     try:
         process.supervise(time.monotonic())
-        wait_until(lambda: evening.kept.first.good)
+        wait_until(lambda: evening.saved.first.good)
     finally:
         process.request_end()
         while not process.has_ended:
@@ -184,7 +184,7 @@ def test_a_rehearsal_proves_nothing(evening: Evening) -> None:
     proof = proof_of(evening)
     evening.dance(seconds=10.5, rehearsal=True)
     proof.turn(time.monotonic())
-    assert not evening.kept.first.good
+    assert not evening.saved.first.good
     proof.last_turn(time.monotonic())
 
 
@@ -194,9 +194,9 @@ def test_a_show_put_aside_is_dropped_once_another_one_has_danced(evening: Evenin
     proof = proof_of(evening)
     evening.dance(seconds=10.5)
     proof.turn(time.monotonic())
-    assert [pair.id for pair in evening.kept.pairs] == [BEFORE]
-    assert evening.kept.aside == evening.choice.aside
-    assert [put_aside for put_aside, _ in evening.kept.aside] == [NEW]
+    assert [pair.id for pair in evening.saved.pairs] == [BEFORE]
+    assert evening.saved.aside == evening.choice.aside
+    assert [put_aside for put_aside, _ in evening.saved.aside] == [NEW]
     proof.last_turn(time.monotonic())
 
 
@@ -206,9 +206,9 @@ def test_a_preflight_that_reads_a_stick_does_not_block_the_keeper(evening: Eveni
     now = time.monotonic()
     with alone_in(evening.data), alone_in(evening.run):
         proof.turn(now)
-    assert (proof.complaint, evening.kept.first.good) == ("", False)
+    assert (proof.complaint, evening.saved.first.good) == ("", False)
     proof.turn(now + 11.0)
-    assert evening.kept.first.good
+    assert evening.saved.first.good
     proof.last_turn(time.monotonic())
 
 
@@ -232,9 +232,9 @@ def test_a_proof_that_cannot_be_kept_is_reported_and_tried_again(evening: Evenin
     assert "cannot be kept" in proof.complaint
     temporary.rmdir()
     proof.turn(now + 5.0)
-    assert not evening.kept.first.good
+    assert not evening.saved.first.good
     proof.turn(now + 11.0)
-    assert evening.kept.first.good
+    assert evening.saved.first.good
     assert proof.complaint == ""
     proof.last_turn(time.monotonic())
 

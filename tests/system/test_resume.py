@@ -18,7 +18,7 @@ from tests.system.processes import wait_until
 
 PLAY = (sys.executable, "-m", "appliance.start", "play")
 PHRASE_S, TICK_S = 3.0, 0.02
-KEPT = {"journal": {"folder": "journal"}}
+WITH_JOURNAL = {"journal": {"folder": "journal"}}
 NO_REALTIME: dict[str, Any] = {"realtime": {"enabled": False}, "control": None, "state": "state"}
 
 
@@ -36,7 +36,7 @@ def checkpoint_of(box: Box) -> Checkpoint:
     return place
 
 
-def await_kept_checkpoint(box: Box) -> None:
+def await_saved_checkpoint(box: Box) -> None:
     """Wait until the keeper has written another checkpoint to the disk."""
     path = box.box_file.with_name("state") / FILE
     before = read_checkpoint(path)
@@ -115,8 +115,8 @@ def test_a_show_that_was_ended_begins_at_the_beginning(show: Path, tmp_path: Pat
 
 
 def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Path) -> None:
-    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME | KEPT) as box:
-        await_kept_checkpoint(box)
+    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME | WITH_JOURNAL) as box:
+        await_saved_checkpoint(box)
         assert box.end() == 0
         place = read_checkpoint(tmp_path / "state" / FILE)
         assert place is not None and place.ended
@@ -129,10 +129,10 @@ def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Pa
 
 def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path) -> None:
     """The whole box with its keeper. A power cut takes the memory: the runtime folder and the boot id."""
-    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME | KEPT) as box:
-        await_kept_checkpoint(box)
+    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME | WITH_JOURNAL) as box:
+        await_saved_checkpoint(box)
         box.frames(60)
-        await_kept_checkpoint(box)
+        await_saved_checkpoint(box)
         on_disk = cut_power(box, tmp_path / "state" / FILE)
         assert not on_disk.ended and on_disk.tick > 0
         box.start()
@@ -144,7 +144,7 @@ def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path)
 
 def test_a_box_without_a_journal_keeps_its_place_on_the_disk_too(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME) as box:
-        await_kept_checkpoint(box)
+        await_saved_checkpoint(box)
         assert box.end() == 0
         place = read_checkpoint(tmp_path / "state" / FILE)
         assert place is not None and place.ended

@@ -21,7 +21,7 @@ RELEASES = Path("/data/bunraku-releases")  # folder of a box made from the image
 WORN = 8  # used, of ten steps of an eMMC's life
 _WITHOUT_JOURNAL = ("vfat", "msdos", "exfat", "ext2", "fuseblk", "ntfs3")
 _LOST = "sensors' keys, neutral poses, shows from sticks and the journal"
-_KEPT = "the journal, the place of the dance, what the box knows about sensors"
+_SAVED = "the journal, the place of the dance, what the box knows about sensors"
 
 
 def data_folders(host: HostView) -> Iterator[Finding]:
@@ -52,7 +52,7 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
     except OSError as error:
         return wrong(
             what,
-            f"{folder} cannot be read ({error.strerror}): {_KEPT} are lost at a power cut.",
+            f"{folder} cannot be read ({error.strerror}): {_SAVED} are lost at a power cut.",
             "`dmesg | tail` says why; often the card or its contact.",
         )
     disk = mount_of(folder.resolve() if host.is_here else folder, mounted)
@@ -69,7 +69,7 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
     if room.f_flag & os.ST_RDONLY:
         return wrong(
             what,
-            f"{folder} cannot be written: {_KEPT} are lost at a power cut. The audience sees nothing.",
+            f"{folder} cannot be written: {_SAVED} are lost at a power cut. The audience sees nothing.",
             "After an error Linux writes no more: `dmesg | tail`, then a new card or disk.",
         )
     if not os.access(there, os.W_OK):
@@ -78,16 +78,16 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
             f"This user may not write in {folder}.",
             f"`sudo chown -R bunraku {folder}`, or run me as that user.",
         )
-    if (why := _why_not_kept(there)) is not None:
+    if (why := _why_not_saved(there)) is not None:
         return wrong(
             what,
-            f"{folder} does not keep what is written there ({why}): {_KEPT} are lost at a power cut.",
+            f"{folder} does not keep what is written there ({why}): {_SAVED} are lost at a power cut.",
             "`dmesg | tail` says why; then a new card or disk.",
         )
     if disk is not None and disk.kind in _WITHOUT_JOURNAL:
         return better(
             what,
-            f"{message} It is on {disk.kind}, which a power cut can damage: {_KEPT} may be lost with it.",
+            f"{message} It is on {disk.kind}, which a power cut can damage: {_SAVED} may be lost with it.",
             "`sudo mkfs.ext4 -L data /dev/sdX1` on an empty one, `sudo bunraku release data /dev/sdX1`.",
         )
     if free < min(LEAST_FREE_BYTES, LEAST_FREE_SHARE * whole):
@@ -99,7 +99,7 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
     return ok(what, f"{message} What is written there lasts{f' ({disk.kind})' if disk is not None else ''}.")
 
 
-def _why_not_kept(folder: Path) -> str | None:
+def _why_not_saved(folder: Path) -> str | None:
     """Write a file, have it leave the cache, and read it from the disk; None where it came back whole."""
     written, name = os.urandom(4096), None
     try:
@@ -128,7 +128,7 @@ def media(host: HostView) -> Iterator[Finding]:
     if where in named and where not in mounted:
         yield wrong(
             "data partition",
-            f"It is not there: {_KEPT} are lost at a power cut. The audience sees nothing.",
+            f"It is not there: {_SAVED} are lost at a power cut. The audience sees nothing.",
             "`lsblk -f` and `dmesg | tail` say why; the disk's contact, or a new disk.",
         )
     elif where in mounted:

@@ -95,7 +95,7 @@ function take(told) {
     measured.at.push(...told.at_s);
     measured.ms.push(...told.transport_ms);
   }
-  if (told.kept) measured.kept = told.kept;
+  if (told.saved) measured.saved = told.saved;
   if (told.trouble) measured.trouble = told.trouble;
 }
 

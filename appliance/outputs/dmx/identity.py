@@ -21,9 +21,9 @@ def component_identifier(state: Path | None) -> UUID:
     fresh = uuid4()
     if state is None:
         return fresh
-    kept = _read(state / FILE)
-    if kept is not None:
-        return kept
+    saved = _read(state / FILE)
+    if saved is not None:
+        return saved
     with contextlib.suppress(OSError):
         state.mkdir(parents=True, exist_ok=True)
         write_whole(state / FILE, f"{fresh}\n".encode())

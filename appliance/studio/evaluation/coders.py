@@ -15,7 +15,7 @@ from appliance.pose.foreign_file import opened
 from appliance.show.network import WINDOW, latent_size, resting_feed
 from appliance.show.show import load_show
 from appliance.studio.autoencoder.held_joints import HeldJoints
-from appliance.studio.model_uses import IMPROVISER, USES, require_kept
+from appliance.studio.model_uses import IMPROVISER, USES, require_supported
 from appliance.studio.studio_error import StudioError
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def load_state(path: Path) -> dict[str, Any]:
     with _from_training(path):
         state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
         state["settings"]["seed"]
-    require_kept(state["settings"].get("network", ""), path)
+    require_supported(state["settings"].get("network", ""), path)
     return state
 
 

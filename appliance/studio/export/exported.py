@@ -23,7 +23,7 @@ from appliance.studio.autoencoder.coupled import Coupled
 from appliance.studio.autoencoder.networks import Mlp, Residual
 from appliance.studio.autoencoder.rotation import Bones
 from appliance.studio.evaluation.coders import TorchCoder
-from appliance.studio.model_uses import require_kept
+from appliance.studio.model_uses import require_supported
 from appliance.studio.studio_error import StudioError
 
 READABLE = ("coupled", "mlp")  # architectures that come back; the others' layers are emitted in parts
@@ -46,7 +46,7 @@ def read_exported(path: Path) -> TorchCoder:
         raise StudioError(
             f"{path} is not a puppet that bunraku exported, or it is damaged. No training can go on from it."
         ) from error
-    require_kept(architecture, path)
+    require_supported(architecture, path)
     raise StudioError(
         f"{path} is a network of the kind '{architecture}'; a training goes on from shows with "
         f"{' and '.join(READABLE)}. Give its checkpoint.pt."

@@ -68,7 +68,7 @@ class PoseMixtures(nn.Module):
         return self.scale.features(torch.cat(danced, 1)[:, :steps])
 
 
-def kept_of(poses: Tensor, share: float) -> int:
+def components_of(poses: Tensor, share: float) -> int:
     """How many principal components of poses (N, D) keep this share of their variance."""
     variances = torch.linalg.eigvalsh(torch.cov(poses.T.double())).flip(0).clamp_min(0)
     kept = int((variances.cumsum(0) < share * variances.sum()).sum()) + 1
@@ -113,4 +113,4 @@ class PoseImproviser:
 def shape_for(poses: Tensor, variance: float, sizes: dict[str, int]) -> PoseMixturesShape:
     """For a network with features (N, M * 4 + 4)."""
     latent = poses.shape[1] - ROOT
-    return PoseMixturesShape(latent, kept_of(poses[:, :latent], variance), ROOT, **sizes)
+    return PoseMixturesShape(latent, components_of(poses[:, :latent], variance), ROOT, **sizes)

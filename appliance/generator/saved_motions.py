@@ -23,7 +23,7 @@ MOST = 16
 _NAME = re.compile(r"[\w][\w .-]{0,63}")
 
 
-class KeptMotions:
+class SavedMotions:
     """Motions in memory by name, and on disk: a separate thread writes, because a disk may hang.
 
     complaint: why the disk does not take one; "".
