@@ -1,8 +1,9 @@
-"""A picture a minute of the night, for a technician far away: the figure and the state of the box, as SVG."""
+"""A picture a minute of the night, for a technician far away: the wall and the state of the box, as SVG."""
 
 from __future__ import annotations
 
 import asyncio
+import base64
 import contextlib
 import struct
 import time
@@ -14,22 +15,25 @@ from typing import Any
 from aiohttp import web
 
 from appliance.box.durable import write_whole
+from appliance.box.wall_file import wall_picture
 from appliance.console.box_view import BoxView
 from appliance.console.stage_view import StageView
 from appliance.outputs.frame_layout import BROWSER_HEAD, GHOST
 
 FOLDER = "night"  # beside PIN and devices
 EVERY_S = 60.0
-KEEP_S = 14 * 3600.0  # a night; 840 pictures of 3 kB
+KEEP_S = 14 * 3600.0  # a night: 840 pictures of 15 to 35 kB
+MOST_BYTES = 40_000_000  # of all of them: then the oldest go
 _WIDTH, _HEIGHT, _FLOOR, _SCALE = 640, 420, 390.0, 170.0  # pixels; pixels a metre
 _LINES = 5
 
 
 class Night:
-    """Draws, keeps and serves the pictures. kept: where the box keeps what it learns."""
+    """Draws, keeps and serves the pictures. kept: where the box keeps what it learns; runtime: where the
+    projector leaves the wall's picture."""
 
-    def __init__(self, stage: StageView, box: BoxView, state: Path) -> None:
-        self._stage, self._box, self._folder = stage, box, state / FOLDER
+    def __init__(self, stage: StageView, box: BoxView, state: Path, runtime: Path) -> None:
+        self._stage, self._box, self._folder, self._runtime = stage, box, state / FOLDER, runtime
 
     def routes(self) -> list[web.RouteDef]:
         """For the server."""
@@ -50,9 +54,12 @@ class Night:
         """One picture, and none older than a night. now: Unix seconds. Raises OSError."""
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(self._folder / f"{now:.0f}.svg", self.picture(now).encode())
-        for at in self.times():
-            if not now - KEEP_S <= at <= now + EVERY_S:  # or of a clock that was wrong
-                (self._folder / f"{at}.svg").unlink(missing_ok=True)
+        room = MOST_BYTES
+        for at in reversed(self.times()):
+            path = self._folder / f"{at}.svg"
+            room -= path.stat().st_size
+            if room < 0 or not now - KEEP_S <= at <= now + EVERY_S:  # or of a clock that was wrong
+                path.unlink(missing_ok=True)
 
     def times(self) -> list[int]:
         """When pictures were kept: Unix seconds, the newest last."""
@@ -61,8 +68,9 @@ class Night:
         return []
 
     def picture(self, now: float) -> str:
-        """The figure from the audience, and in words what the page tells."""
-        figure = _figure(self._stage.with_ghost, self._stage.facts.get("parents", ()))
+        """The wall, or without a projector the figure from the audience; and in words what the page tells."""
+        wall = wall_picture(self._runtime, now)
+        shown = _wall(wall) if wall else _figure(self._stage.with_ghost, self._stage.facts.get("parents", ()))
         lines = [
             f'<text x="12" y="{24 + 19 * place}">{escape(line)}</text>'
             for place, line in enumerate(_said(self._box.value, now))
@@ -70,8 +78,7 @@ class Night:
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}">'
             f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="#0d0f11"/>'
-            f'<path d="M0 {_FLOOR}H{_WIDTH}" stroke="#3d434b"/>'
-            f'<g stroke="#eee2ce" stroke-width="9" stroke-linecap="round">{figure}</g>'
+            f"{shown}"
             f'<g fill="#f3ece0" font-family="sans-serif" font-size="14">{"".join(lines)}</g></svg>'
         )
 
@@ -108,8 +115,14 @@ def _said(value: dict[str, Any], now: float) -> list[str]:
     return lines + [f"{one['name']} {one['about']}" for one in active[:_LINES]]
 
 
+def _wall(picture: bytes) -> str:
+    data = base64.b64encode(picture).decode()
+    below = 24 + 19 * 3  # the first lines of the words are above it
+    return f'<image y="{below}" width="{_WIDTH}" height="{_HEIGHT - below}" href="data:image/jpeg;base64,{data}"/>'
+
+
 def _figure(frame: bytes, parents: Any) -> str:
-    """Lines for the bones of each puppet, x to the right and y up; "" before the first frame."""
+    """The floor, and lines for the bones of each puppet, x to the right and y up; "" before a frame."""
     try:
         _, flags, joints = BROWSER_HEAD.unpack_from(frame)
         numbers = array("f", frame[BROWSER_HEAD.size :])
@@ -124,11 +137,15 @@ def _figure(frame: bytes, parents: Any) -> str:
         for puppet in range(puppets)
     ]
     middle = sum(one[0][0] for one in places) / max(puppets, 1)
-    return "".join(
+    bones = "".join(
         f'<path d="M{_at(one[joint], middle)}L{_at(one[parent], middle)}"/>'
         for one in places
         for joint, parent in enumerate(parents)
         if parent >= 0
+    )
+    return (
+        f'<path d="M0 {_FLOOR}H{_WIDTH}" stroke="#3d434b"/>'
+        f'<g stroke="#eee2ce" stroke-width="9" stroke-linecap="round">{bones}</g>'
     )
 
 

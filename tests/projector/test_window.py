@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from appliance.box.wall_file import WALL
 from appliance.projector import context as context_module
 from appliance.projector.context import GlContext, offscreen
 from appliance.projector.fallback import STAGE_UNSEEN
@@ -227,6 +228,25 @@ def test_the_test_card_has_lines_of_the_box_and_the_picture_of_a_show_does_not(
         finally:
             run.close()
         assert any("pin 123456" in lines for lines in drawn) == shows_info
+
+
+def test_the_page_gets_a_picture_of_the_wall_but_none_with_the_pin(tmp_path: Path) -> None:
+    for shows_info in (True, False):
+        box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
+        run = Run(box, Options("offscreen", (64, 36), seconds=30, shows_info=shows_info), print)
+        wall, pictures = tmp_path / "run" / WALL, 0
+
+        def is_enough() -> bool:
+            nonlocal pictures
+            pictures += 1
+            return pictures > 30 if shows_info else wall.exists()  # noqa: B023
+
+        try:
+            run.project(is_enough)
+            assert wall.exists() != shows_info
+        finally:
+            run.close()
+        assert not wall.exists()
 
 
 def test_a_pause_of_the_whole_machine_is_not_reported_as_a_black_picture(tmp_path: Path) -> None:
