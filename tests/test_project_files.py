@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import shlex
+import subprocess
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,8 +18,6 @@ import yaml
 ROOT = Path(__file__).resolve().parents[1]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 TEMPLATES = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.md"))
-TARGETS = set(re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-SETTING = re.compile(r"[A-Z_]+=")
 
 
 def steps(workflow: Path) -> Iterator[dict[str, Any]]:
@@ -24,15 +25,16 @@ def steps(workflow: Path) -> Iterator[dict[str, Any]]:
         yield from job["steps"]
 
 
-def make_targets(command: str) -> list[str]:
-    """Targets that a shell command asks make for."""
-    found = []
-    for line in command.splitlines():
-        words = line.split()
-        if "make" in words and "apt-get" not in words:
-            after = words[words.index("make") + 1 :]
-            found += [word for word in after if not SETTING.match(word) and not word.startswith("-")]
-    return found
+def make_lines(command: str) -> list[str]:
+    """Lines of a shell command that call make."""
+    return [line.strip() for line in command.splitlines() if line.strip().startswith("make ")]
+
+
+def run(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """In the repository."""
+    return subprocess.run(
+        words, cwd=ROOT, env={**os.environ, **environment}, capture_output=True, text=True, check=False
+    )
 
 
 def test_there_are_workflows_for_each_push_each_night_and_each_tag() -> None:
@@ -61,20 +63,77 @@ def test_a_workflow_has_few_rights_a_limit_and_pinned_actions(workflow: Path) ->
 
 
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
-def test_every_target_and_script_of_a_workflow_exists(workflow: Path) -> None:
-    commands = [step["run"] for step in steps(workflow) if "run" in step]
-    asked = [target for command in commands for target in make_targets(command)]
-    assert set(asked) <= TARGETS, set(asked) - TARGETS
-    scripts = [command for command in commands if re.fullmatch(r"[\w./-]+", command)]
-    assert asked or scripts
-    for script in scripts:
-        assert (ROOT / script).is_file(), script
-        assert (ROOT / script).stat().st_mode & 0o111, script
+def test_make_and_the_shell_understand_every_step(workflow: Path) -> None:
+    asked = 0
+    for command in (step["run"] for step in steps(workflow) if "run" in step):
+        assert run("bash", "-n", "-c", command).stderr == ""
+        if re.fullmatch(r"[\w./-]+", command):
+            assert (ROOT / command).stat().st_mode & 0o111, command
+            asked += 1
+        for line in make_lines(command):
+            asked += 1
+            done = run("make", "--dry-run", "--no-print-directory", *shlex.split(line)[1:])
+            assert done.returncode == 0, done.stderr
+            assert "warning" not in done.stderr
+    assert asked
 
 
-def test_an_unknown_target_is_found() -> None:
-    assert make_targets("make test-quick PYTHON=python\nmake --jobs=2 nonsense") == ["test-quick", "nonsense"]
-    assert "test-quick" in TARGETS and "nonsense" not in TARGETS
+def test_make_says_what_is_no_target() -> None:
+    assert make_lines("apt-get install make\nmake test-quick PYTHON=python\nsha256sum x >first\n") == [
+        "make test-quick PYTHON=python"
+    ]
+    assert run("make", "--dry-run", "nonsense").returncode == 2
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
+def test_a_job_takes_what_jobs_before_it_have_made(workflow: Path) -> None:
+    """Artifacts by their names and jobs; what is uploaded is what a step of the job writes."""
+    jobs = yaml.safe_load(workflow.read_text())["jobs"]
+    uploaded: dict[str, tuple[str, str]] = {}
+    for name, job in jobs.items():
+        made = ""
+        for number, step in enumerate(job["steps"]):
+            for line in make_lines(step.get("run", "")):
+                made += run("make", "--dry-run", "--no-print-directory", *shlex.split(line)[1:]).stdout
+            kind, given = step.get("uses", "").split("@")[0], step.get("with", {})
+            if kind == "actions/upload-artifact" and given["if-no-files-found"] == "error":
+                folder = given["path"].rpartition("/")[0]
+                assert f"{folder}/" in made or ("pack-downloads" in made and folder == "out/downloads"), given
+                uploaded[given["name"]] = name, folder
+            if kind == "actions/download-artifact":
+                from_job, folder = uploaded[given["name"]]
+                assert from_job in job["needs"], given  # a name, or a list of names
+                is_used = f"{given['path']}/*" in str(job["steps"][number + 1 :])
+                assert is_used or given["path"] == folder, given
+
+
+def test_the_expressions_of_a_workflow_name_what_there_is() -> None:
+    known = r"secrets\.BUNRAKU_RELEASE_KEY|vars\.ESP32_INDEX|github\.(token|repository|ref)|matrix\.python"
+    for workflow in WORKFLOWS:
+        for expression in re.findall(r"\$\{\{ *(.*?) *\}\}", workflow.read_text()):
+            assert re.fullmatch(known, expression), expression
+
+
+def test_the_small_steps_of_a_release_do_what_they_say(tmp_path: Path) -> None:
+    """Tag and key; the large ones are make's."""
+    jobs = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())["jobs"]
+    named = {step["name"]: step["run"] for job in jobs.values() for step in job["steps"] if "name" in step}
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    tag = named["The tag names the version of pyproject.toml"]
+    assert run("bash", "-ec", tag, GITHUB_REF_NAME=f"v{version}").returncode == 0
+    assert run("bash", "-ec", tag, GITHUB_REF_NAME=f"v{version}1").returncode == 1
+    key = named["The key that signs this release"]
+    done = run("bash", "-ec", key, RUNNER_TEMP=str(tmp_path), SIGNING_KEY="")
+    assert done.returncode == 1 and "has no secret" in done.stderr
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", tmp_path / "made"], check=True)
+    made = (tmp_path / "made").read_text().strip()  # as a secret's field keeps it
+    assert run("bash", "-ec", key, RUNNER_TEMP=str(tmp_path), SIGNING_KEY=made).returncode == 0
+    assert (tmp_path / "key").stat().st_mode & 0o777 == 0o600
+    public = run("ssh-keygen", "-y", "-f", str(tmp_path / "key")).stdout
+    assert public.split()[1] == (tmp_path / "made.pub").read_text().split()[1]
+    end = next(step["run"] for step in jobs["box"]["steps"] if step.get("if") == "always()")
+    assert run("bash", "-ec", end, RUNNER_TEMP=str(tmp_path)).returncode == 0
+    assert not (tmp_path / "key").exists()
 
 
 def test_the_quick_workflow_runs_on_each_python_of_the_project() -> None:
