@@ -116,9 +116,9 @@ def _said(value: dict[str, Any], now: float) -> list[str]:
 
 
 def _wall(picture: bytes) -> str:
-    data = base64.b64encode(picture).decode()
     below = 24 + 19 * 3  # the first lines of the words are above it
-    return f'<image y="{below}" width="{_WIDTH}" height="{_HEIGHT - below}" href="data:image/jpeg;base64,{data}"/>'
+    size = f'y="{below}" width="{_WIDTH}" height="{_HEIGHT - below}"'
+    return f'<image {size} href="data:image/jpeg;base64,{base64.b64encode(picture).decode()}"/>'
 
 
 def _figure(frame: bytes, parents: Any) -> str:

@@ -24,4 +24,12 @@ def test_the_box_s_sentences_are_translated(language: str) -> None:
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_translation_fills_in_what_the_sentence_has(language: str) -> None:
     for sentence, own in translated(language).items():
-        assert set(re.findall(r"\{\d\}", own)) == set(re.findall(r"\{\d\}", sentence)), sentence
+        assert sorted(re.findall(r"\{\w+\}", own)) == sorted(re.findall(r"\{\w+\}", sentence)), sentence
+
+
+def test_each_language_of_the_page_has_the_same_sentences() -> None:
+    """But English, in which the box speaks; so that no page is half in another language."""
+    pages = {path.stem for path in SENTENCES.parent.glob("*.json")} - {"en"}
+    assert set(LANGUAGES) == pages
+    first, *others = (translated(language) for language in LANGUAGES)
+    assert all(first.keys() == other.keys() for other in others)
