@@ -1,0 +1,289 @@
+"""`bunraku learn`: from recordings to a show that was checked, unattended; the page begins it too.
+
+It trains, pauses while a show dances, continues after a power cut, checks, and compares with a bar. The show
+that dances is never touched: what was learned is only offered.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from appliance.box.child import end_child, start_child
+from appliance.box.own_command import BUNRAKU
+from appliance.box.parent_death import end_with_parent
+from appliance.box.realtime import give_way
+from appliance.box.stop_signals import stop_signals
+from appliance.cli.learned import figures_of, sentence_of
+from appliance.cli.options import BoxFile
+from appliance.console.learning import (
+    FOLDER,
+    LONGEST_MIN,
+    SHORTEST_MIN,
+    STUDIO_MISSING,
+    USUAL_MIN,
+    Learning,
+    Wanted,
+)
+from appliance.console.proving import Proving
+from appliance.pose.foreign_file import stored_json
+from appliance.release.choice import box_of
+from appliance.show.box import load_box
+from appliance.stage.stage_error import StageError
+
+NICE = 19
+TRAINING_SHARE = 0.75  # the rest is for reading, export, measuring the answer and the check
+_LOOK_S = 0.5
+_ENDS_WITHIN_S = 120.0  # a step and a checkpoint, while something else has the processor
+_INTERRUPTED = 130  # exit status of bunraku train when it was stopped and can go on
+_STOPPED = "Stopped. Nothing is lost: the same command continues."
+
+
+class NotLearnedError(Exception):
+    """What came in between; the message is for the user."""
+
+
+def learn(
+    recordings: Annotated[Path, typer.Option(help="Folder with the dancer's recordings.")],
+    out: Annotated[Path, typer.Option(help="Folder for the learning; the show will be in OUT/show.")],
+    minutes: Annotated[
+        float, typer.Option(min=SHORTEST_MIN, max=LONGEST_MIN, help="For all of it, to the check.")
+    ] = USUAL_MIN,
+    box: BoxFile = None,
+    nice: Annotated[int, typer.Option(min=0, max=19, help="How far it gives way to others.")] = NICE,
+    train: Annotated[
+        list[str] | None, typer.Argument(help="After --: further options of bunraku train.")
+    ] = None,
+) -> int:
+    """Make a checked show from recordings, unattended: learn tonight, dance tomorrow."""
+    from appliance.cli.console import runtime_of
+
+    give_way(nice)
+    learning = Learning(out)
+    wanted = Wanted(str(recordings.resolve()), minutes)
+    if learning.wanted() not in (None, wanted):
+        raise StageError(f"{out}: other recordings are being learned there. Give another --out.")
+    if learning.wanted() is None:
+        begin(learning, wanted)
+    with contextlib.suppress(StageError):
+        proving = Proving(runtime_of(load_box(box)))
+        return Learner(learning, proving.show_goes, box, train or (), _print).run()
+    return Learner(learning, lambda: False, box, train or (), _print).run()
+
+
+def begin(learning: Learning, wanted: Wanted) -> None:
+    """What was learned before gives way. Raises OSError."""
+    shutil.rmtree(learning.show, ignore_errors=True)
+    learning.want(wanted)
+
+
+def main(given: Sequence[str]) -> int:
+    """Learn what the page of a box wants; the arguments name the box: `--box FILE` or `--chosen FILE`."""
+    from appliance.cli.console import devices_file_made, runtime_of
+
+    end_with_parent()
+    give_way(NICE)
+    named = {name: Path(path) for name, path in zip(given[::2], given[1::2], strict=True)}
+    path = box_of(named.get("--box"), named.get("--chosen"))
+    config = load_box(path)
+    learning = Learning(devices_file_made(config).parent / FOLDER)
+    if learning.wanted() is None:
+        return 0
+    try:
+        return Learner(learning, Proving(runtime_of(config)).show_goes, path).run()
+    except Exception as error:
+        from appliance.cli.app import refuse
+
+        learning.end()  # else systemd would begin it again and again
+        learning.tell(state="failed", message=str(error))
+        refuse(error)
+
+
+class Learner:
+    """Works on what is wanted. show_goes: whether a dance is on, during which nothing is trained.
+
+    box: what the show is checked on; train: further options of `bunraku train`.
+    """
+
+    def __init__(
+        self,
+        learning: Learning,
+        show_goes: Callable[[], bool],
+        box: Path | None = None,
+        train: Sequence[str] = (),
+        say: Callable[[str], None] = lambda message: None,
+    ) -> None:
+        self._learning, self._show_goes, self._box = learning, show_goes, box
+        self._train, self._say = tuple(train), say
+        self._is_stopped: Callable[[], bool] = lambda: False
+        self._state: dict[str, Any] = {}
+
+    def run(self) -> int:
+        """0: a show is offered; 1: there is none, and why is told; 2: stopped, and the same goes on later."""
+        with stop_signals() as self._is_stopped:
+            try:
+                require_studio()
+                while not self._trained():
+                    self._await_rest()
+                result = self._checked()
+            except _StoppedError:
+                self._say(_STOPPED)
+                return 2
+            except (NotLearnedError, OSError) as error:
+                self._learning.end()
+                self._tell(state="failed", message=str(error))
+                self._say(f"{error} The show that danced before stays.")
+                return 1
+            self._learning.end()
+            self._tell(state="learned" if result["passed"] else "worse", **result)
+        self._say_result(result)
+        return 0 if result["passed"] else 1
+
+    def _trained(self) -> bool:
+        """Whether the training reached its end; False: it was stopped for a show."""
+        wanted = self._learning.wanted()
+        if wanted is None:
+            raise _StoppedError
+        self._await_rest()
+        out = self._learning.show
+        command = ["train", "--out", str(out), "--threads", str(max(1, (os.cpu_count() or 1) - 1))]
+        if (out / "checkpoint.pt").exists():
+            command += ["--resume"]
+        else:
+            shutil.rmtree(out, ignore_errors=True)
+            command += ["--recordings", wanted.recordings, *self._train]
+            if not {"--steps", "--minutes"} & set(self._train):
+                command += ["--minutes", f"{TRAINING_SHARE * wanted.minutes:g}"]
+        status, said = self._run(command, "training", pauses=True)
+        if status not in (0, _INTERRUPTED):
+            raise NotLearnedError(f"The training ended early: {_last(said)}")
+        return status == 0
+
+    def _checked(self) -> dict[str, Any]:
+        """The figures beside their bar, and whether the show can be offered."""
+        named = () if self._box is None else ("--box", str(self._box))
+        status, said = self._run(["check", str(self._learning.show), *named], "checking", pauses=False)
+        if status:
+            raise NotLearnedError(f"The show that was learned does not pass its check: {_last(said)}")
+        try:
+            report = stored_json(self._learning.show / "report.json")
+            figures = figures_of(report)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise NotLearnedError(f"The training wrote no figures ({error}).") from None
+        passed = all(one["holds"] for one in figures)
+        verdict = str(report["puppetry"].get("verdict") or report["puppetry"].get("not_measured", ""))
+        advice = "" if passed else str(report["puppetry"].get("advice", ""))
+        return {
+            "passed": passed,
+            "message": sentence_of(figures),
+            "verdict": verdict,
+            "advice": advice,
+            "figures": figures,
+            "check": said.strip().splitlines()[-4:],
+        }
+
+    def _run(self, command: Sequence[str], state: str, pauses: bool) -> tuple[int, str]:
+        """Exit status and output of one of our commands. pauses: it is stopped while a show dances.
+
+        Raises _StoppedError where it is no longer wanted.
+        """
+        with tempfile.TemporaryFile() as out:
+            child = start_child((*BUNRAKU, *command), stdout=out, stderr=subprocess.STDOUT)
+            try:
+                while child.poll() is None:
+                    if self._is_over() or (pauses and self._show_goes()):
+                        end_child(child, _ENDS_WITHIN_S)
+                        break
+                    self._tell(state=state, **self._share())
+                    with contextlib.suppress(subprocess.TimeoutExpired):
+                        child.wait(_LOOK_S)
+            finally:
+                if child.poll() is None:
+                    end_child(child, _ENDS_WITHIN_S)
+            if self._is_over():
+                raise _StoppedError
+            out.seek(0)
+            return int(child.returncode), out.read().decode(errors="replace")
+
+    def _await_rest(self) -> None:
+        while self._show_goes():
+            if self._is_over():
+                raise _StoppedError
+            self._tell(state="waits", **self._share())
+            time.sleep(_LOOK_S)
+
+    def _is_over(self) -> bool:
+        return self._is_stopped() or self._learning.wanted() is None
+
+    def _share(self) -> dict[str, Any]:
+        """How far the training is, as its history tells."""
+        try:
+            newest = stored_json(self._learning.show / "training.json")["history"][-1]
+            return {"share": newest["fraction"], "degrees": newest["held_out_degrees"]}
+        except (OSError, ValueError, KeyError, TypeError, IndexError):
+            return {"share": 0.0, "degrees": None}
+
+    def _tell(self, **state: Any) -> None:
+        """Write what changed; else only a sign of life."""
+        with contextlib.suppress(OSError):
+            if state == self._state:
+                self._learning.tell()
+            else:
+                self._learning.tell(**state)
+                if state["state"] != self._state.get("state") and "share" in state:
+                    self._say(f"{_STATES[state['state']]} ({100 * state['share']:.0f} % trained)")
+                self._state = state
+
+    def _say_result(self, result: dict[str, Any]) -> None:
+        for one in result["figures"]:
+            sign = "✓" if one["holds"] else "✗"
+            self._say(
+                f"{sign} {one['name']}: {one['value']} ({one['bound']}); the default show's dancer "
+                f"{one['default']}; {one['null_name']} {one['null']}"
+            )
+        self._say(f"{result['verdict']} {result['message']} {result['advice']}".strip())
+        if result["passed"]:
+            self._say(f"Dance it: bunraku play --show {self._learning.show}")
+
+
+_STATES = {
+    "training": "Training.",
+    "checking": "Checking.",
+    "waits": "A show dances: learning waits until it stops.",
+}
+
+
+class _StoppedError(Exception):
+    """Asked to stop."""
+
+
+def require_studio() -> None:
+    """Raises NotLearnedError where the studio or PyTorch is not installed."""
+    if any(importlib.util.find_spec(name) is None for name in ("appliance.studio", "torch", "onnx")):
+        raise NotLearnedError(STUDIO_MISSING)
+
+
+def _last(said: str) -> str:
+    """The last sentence of a command's output."""
+    lines = [line for line in said.splitlines() if line.strip()]
+    start = next((n for n in range(len(lines) - 1, -1, -1) if lines[n].startswith("bunraku: ")), -1)
+    return " ".join(lines[start:]).removeprefix("bunraku: ")[-600:]
+
+
+def _print(message: str) -> None:
+    print(message, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

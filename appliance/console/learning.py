@@ -1,0 +1,82 @@
+"""The folder in which page and learner meet: what is to be learned, how far it is, what came of it.
+
+It is on the disk: what was begun goes on after a power cut.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from appliance.box.durable import write_whole
+from appliance.pose.foreign_file import stored_json
+
+FOLDER, RECORDINGS = "learning", "recordings"
+SHORTEST_MIN, USUAL_MIN, LONGEST_MIN = 0.05, 60.0, 1440.0
+STUDIO_MISSING = (
+    "Learning needs the studio, which is not installed on this box: pip install bunraku-studio. The dance "
+    "needs no studio: train on another machine, and bring the show on a stick."
+)
+_SILENT_S = 120.0  # a step of a large network on a slow machine, with the checkpoint after it, takes less
+
+
+class Wanted(NamedTuple):
+    """recordings: their folder; minutes: for all of it, from reading to the check."""
+
+    recordings: str
+    minutes: float = USUAL_MIN
+
+
+class Learning:
+    """`wanted.json` is there while something is learned: its removal ends that. `show`: what is learned."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.show = folder / "show"
+        self._wanted, self._progress = folder / "wanted.json", folder / "progress.json"
+
+    def want(self, wanted: Wanted) -> None:
+        """Begin. Raises OSError."""
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self.tell(state="waits")
+        write_whole(self._wanted, json.dumps(wanted._asdict()).encode())
+
+    def wanted(self) -> Wanted | None:
+        """The current request; None: nothing, or nothing that can be read."""
+        try:
+            said = stored_json(self._wanted)
+            recordings, minutes = said["recordings"], said["minutes"]
+        except (OSError, ValueError, TypeError, KeyError):
+            return None
+        is_sound = isinstance(recordings, str) and isinstance(minutes, int | float)
+        return Wanted(recordings, float(minutes)) if is_sound else None
+
+    def end(self) -> None:
+        """Nothing is wanted any more; what was learned so far stays."""
+        with suppress(OSError):
+            self._wanted.unlink(missing_ok=True)
+
+    def tell(self, **values: object) -> None:
+        """The progress from now on; without values only a sign of life. Raises OSError."""
+        if values:
+            write_whole(self._progress, json.dumps(values).encode())
+        else:
+            os.utime(self._progress)
+
+    def told(self) -> dict[str, Any]:
+        """The progress; {}: there is none."""
+        try:
+            return dict(stored_json(self._progress))
+        except (OSError, ValueError, TypeError):
+            return {}
+
+    def is_silent(self) -> bool:
+        """Whether nobody works on what is wanted."""
+        try:
+            return time.time() - self._progress.stat().st_mtime > _SILENT_S
+        except OSError:
+            return True

@@ -1,0 +1,84 @@
+// Learn tonight, dance tomorrow: two touches, a folder of recordings and the start; then how far it is, and the show.
+import { request } from "./box.js";
+import { showChoices } from "./choices.js";
+import { ask, withPin } from "./device.js";
+import { byId } from "./elements.js";
+import { twice } from "./hold.js";
+import { number, translated, words } from "./words.js";
+
+const LOOK_MS = 2000, ADOPTED_WITHIN_MS = 120_000;
+let timer = 0, chosen = "";
+
+export function initLearn() {
+  byId("learn-open").addEventListener("click", () => withPin(read));
+  byId("learn-begin").addEventListener("click", async () => tell(await ask("/api/learn", { recordings: chosen })));
+  twice(byId("learn-end"), async () => tell(await ask("/api/learn/end", {})), "sure_now");
+  twice(byId("learn-dance"), dance, "sure_now");
+  byId("learn-rehearsal").addEventListener("click", async () => {
+    const answer = await ask("/api/learn/rehearsal", {}, ADOPTED_WITHIN_MS);
+    if (answer.status === 200) chosen = answer.value.name;
+    tell(answer);
+  });
+}
+
+export function leaveLearn() { clearTimeout(timer); }
+
+async function read() {
+  clearTimeout(timer);
+  const answer = await request("/api/learn");
+  if (answer.status !== 200) return say(translated(answer.message) || words("no_page"));
+  const { studio, recordings, journal, runs, progress, can_dance: canDance, show } = answer.value;
+  byId("learn-part").hidden = false;
+  byId("learn-open").hidden = true;
+  chosen = recordings.some((one) => one.name === chosen) ? chosen : "";
+  const folders = recordings.map((one) => ({
+    name: one.name,
+    label: words("learn_folder", { name: one.name, files: one.files, minutes: number(one.minutes, 1) }),
+    now: one.name === chosen,
+  }));
+  showChoices(byId("learn-folders"), byId("learn-folders"), runs ? [] : folders, (name) => {
+    chosen = name;
+    read();
+  });
+  byId("learn-begin").hidden = runs || !recordings.length;
+  byId("learn-begin").disabled = !chosen || studio !== "";
+  byId("learn-end").hidden = !runs;
+  byId("learn-rehearsal").hidden = runs || !journal;
+  byId("learn-dance").hidden = progress.state !== "learned" || !canDance;
+  say(studio ? translated(studio) : stateOf(progress, runs, recordings.length, canDance ? "" : show));
+  figures(progress.figures ?? []);
+  if (runs) timer = setTimeout(read, LOOK_MS);
+  return undefined;
+}
+
+function stateOf(progress, runs, folders, show) {
+  if (!runs && !progress.state) return words(folders ? "learn_choose" : "learn_nothing");
+  const values = { percent: Math.floor(100 * (progress.share ?? 0)), message: translated(progress.message ?? ""), show };
+  if (progress.state === "learned" && show) return words("learn_learned_here", values);
+  return words(`learn_${progress.state}`, values);
+}
+
+function figures(rows) {
+  byId("learn-figures").replaceChildren(...rows.map((one) => {
+    const item = document.createElement("li"), small = document.createElement("small");
+    item.textContent = `${one.holds ? "✓" : "✗"} ${one.name}: ${one.value}`;
+    item.dataset.kind = one.holds ? "" : "wrong";
+    small.textContent = words("learn_beside", one);
+    item.append(small);
+    return item;
+  }));
+}
+
+async function dance() {
+  say(words("file_checking"));
+  const answer = await ask("/api/learn/dance", {}, ADOPTED_WITHIN_MS);
+  const problems = answer.value?.problems?.map((one) => one.message).join(" ");
+  say(answer.status === 200 ? problems || answer.value.message : translated(answer.message) || words("no_page"));
+}
+
+function tell(answer) {
+  if (answer.status === 200) read();
+  else say(translated(answer.message) || words("no_page"));
+}
+
+function say(sentence) { byId("learn-said").textContent = sentence; }
