@@ -11,7 +11,7 @@ from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import reading_options
 from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.clear_errors import INTERRUPTED, clear_errors
-from appliance.studio.model_or_show import OfShow
+from appliance.studio.model_or_show import OfRegion, OfShow
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -46,6 +46,7 @@ def improvise(
     prompt_end: Annotated[
         float | None, typer.Option("--from", min=1.0, help="Second of the prompt to continue from.")
     ] = None,
+    region: OfRegion = None,
     dances: Annotated[int, typer.Option(min=1, help="How many dances to choose the phrase from.")] = 16,
     dance_minutes: Annotated[float, typer.Option(min=0.05, help="Length of each dance.")] = 4.0,
     threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
@@ -58,7 +59,8 @@ def improvise(
     A trained one dances at once, and another --seed gives another phrase. With --prompt it continues a
     recording. With --show the show's improviser continues --prompt, or a moment of the show's phrase.
     The published network (--model, lstm-mixtures) makes no endless phrase: it continues the
-    prompt, or a recorded moment that --seed chooses.
+    prompt, or a recorded moment that --seed chooses. With --region a part of the body improvises from --from
+    on, and the rest goes on with the prompt.
     """
     if show is not None:
         others = (
@@ -76,9 +78,11 @@ def improvise(
         refuse_idle(context, ("minutes", "steps"), "with --model, which is trained already")
     elif steps:
         refuse_idle(context, ("minutes",), "with --steps")
-    if prompt is None:
+    if region and (prompt is None and show is None):
+        raise typer.BadParameter("With --region give the --prompt, which the rest of the body goes on with.")
+    if prompt is None and not region:
         refuse_idle(context, ("prompt_end",), "without --prompt")
-    else:
+    elif prompt is not None:
         refuse_idle(context, ("dances", "dance_minutes"), "with --prompt")
     with clear_errors("improvise"):
         from appliance.studio.improviser.improvise_options import ImproviseOptions, PhraseOptions
@@ -94,6 +98,7 @@ def improvise(
             phrase=PhraseOptions(seconds, seed, temperature, dances, dance_minutes),
             prompt=prompt,
             prompt_end=prompt_end,
+            regions=tuple(region or ()),
             reading=reading,
             show=show,
         )

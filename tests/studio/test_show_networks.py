@@ -1,4 +1,4 @@
-"""A show's own networks in the studio: vary, path, map and improvise without a training and without torch."""
+"""A show's own networks dance in the studio without a training and without torch: vary, path, granular ..."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 from appliance.levers.sources import PATH, VARY
+from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
+from appliance.pose.recording import Recording
 from appliance.show.bundle import default_show_path
+from appliance.studio.data.regions import joints_of
 from appliance.studio.evaluation.dance_figures import jerk
 from appliance.studio.improviser.naturalness import standing_of
 from appliance.studio.opened_model import open_show
@@ -34,8 +37,9 @@ def test_a_shows_networks_dance_where_torch_is_not_installed(tmp_path: Path) -> 
     commands = (
         ["vary", "--count", "1", "--seconds", "3", "--out", tmp_path / "varied"],
         ["path", "--wobble", "0.3", "1", "--seconds", "2", "--out", tmp_path / "wobble.bvh"],
+        ["granular", "--region", "legs", "--seconds", "3", "--out", tmp_path / "walk.bvh"],
         ["map", "--seconds", "4", "--out", tmp_path / "map"],
-        ["improvise", "--seconds", "2", "--out", tmp_path / "more.bvh"],
+        ["improvise", "--seconds", "2", "--region", "arms", "--from", "4", "--out", tmp_path / "more.bvh"],
     )
     for command in commands:
         arguments = [str(each) for each in (*command, "--show", "default")]
@@ -43,13 +47,26 @@ def test_a_shows_networks_dance_where_torch_is_not_installed(tmp_path: Path) -> 
             [sys.executable, "-c", WITHOUT_TORCH, *arguments], capture_output=True, text=True
         )
         assert done.returncode == 0, done.stderr
-    made = ("varied/phrase.bvh", "varied/variation_1.bvh", "wobble.bvh", "more.bvh")
-    phrase, varied, wobble, more = (read_bvh(tmp_path / name) for name in made)
-    assert len(phrase) == 150 and len(wobble) == 100 and len(more) > 50
+    made = ("varied/phrase.bvh", "varied/variation_1.bvh", "wobble.bvh", "more.bvh", "walk.bvh")
+    phrase, varied, wobble, more, walk = (read_bvh(tmp_path / name) for name in made)
+    assert len(phrase) == 150 and len(wobble) == 100 and len(walk) == 150
     assert varied.skeleton.same_joints(phrase.skeleton)
     assert (tmp_path / "map" / "map.png").exists() and (tmp_path / "map" / "map.html").exists()
+    assert differing(more, 250) == {"arms"} and differing(walk, 20) == {"legs"}
     figures = json.loads((tmp_path / "varied" / "variations.json").read_text())["figures"]
     assert figures["phrase"]["nearest"] < 0.1 < figures["variation_1"]["nearest"]
+
+
+def differing(dance: Recording, first: int) -> set[str]:
+    """The regions that are 5 degrees off the show's phrase or more, from a frame on."""
+    phrase, found = read_bvh(default_show_path() / "phrase.bvh"), set[str]()
+    part = slice(first, len(dance))
+    apart = np.degrees(quaternion.angle_between(dance.poses[part], phrase.poses[part])).mean(axis=0)
+    moving = open_show(PATH, default_show_path()).dataset.moving
+    for region in ("arms", "legs", "torso"):
+        if apart[joints_of([region], phrase.skeleton, moving)].max() > 5:
+            found.add(region)
+    return found
 
 
 def test_feet_stand_as_on_stage_and_not_as_the_network_leaves_them(tmp_path: Path) -> None:
@@ -89,6 +106,10 @@ def test_a_variation_goes_far_from_its_phrase_and_trembles_no_more() -> None:
         (["improvise", "--show", "martial"], "has no improviser.onnx"),
         (["improvise", "--show", "default", "--minutes", "3"], "--minutes"),
         (["vary", "--show", "default", "--recordings", "x"], "--recordings"),
+        (["granular"], "Give a CHECKPOINT, or --show"),
+        (["granular", "--show", "default", "--feedback", "0.2"], "--feedback does nothing with --show"),
+        (["granular", "x.pt", "--region", "arms"], "With --region give the --phrase"),
+        (["path", "--show", "default", "--wobble", "0.3", "1", "--region", "wings"], "left upper arm"),
         (["map", "--show", "nowhere"], "There is no such show folder"),
     ],
 )

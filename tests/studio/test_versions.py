@@ -1,4 +1,4 @@
-"""Student and teacher: form and timing of two versions of a dance are told apart, and the worst moments named."""
+"""Two versions of a dance: form and timing are told apart, and the worst moments named."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
 from appliance.studio.opened_model import open_show
-from appliance.studio.standing_dance import excerpt_of
+from appliance.studio.standing_dance import excerpt_of, only_in, standing
 from appliance.studio.studio_error import StudioError
 
 Say = Callable[[str], None]
@@ -37,6 +37,8 @@ def continue_of_show(options: ImproviseOptions) -> None:
     def say(message: str) -> None:
         console.print(message, highlight=False, soft_wrap=True)
 
+    if options.regions and options.prompt is None:
+        options = replace(options, prompt=opened.phrase, prompt_end=options.prompt_end or PROMPT_S)
     follower = MovesFollower(network, network)
     continue_prompt(options, follower, network, opened.dataset, say, is_quick=True)
 
@@ -61,11 +63,16 @@ def continue_prompt(
         else excerpt_of(options.prompt, 0.0, end, moves, dataset, options.reading)
     )
     asked = options.phrase
+    say("dancing on after the prompt, and planting the feet ...")
     made = continued(follower, dataset, prompt, asked.seconds, asked.temperature, asked.seed, is_quick)
     figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
     dance, message = made.dance, f"the prompt ends at {made.joined_s:.1f} s"
-    if options.prompt is None:
+    if options.regions:
+        dance = _in_regions(dance, options, moves, dataset, is_quick)
+        figures, message = {}, f"{' and '.join(options.regions)} only, from {made.joined_s:.1f} s on"
+    elif options.prompt is None:
         dance, figures, message = dance.excerpt(made.joined_s), {}, "after a recorded moment"
+    say("measuring the dance and the recordings, and drawing the strip ...")
     natural = measure(dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
     report = {"phrase": asdict(asked), **figures, "naturalness": natural.as_json()}
     write_dance(options.out, dance, f"{options.out.stem}: {message}", report, rows=3)
@@ -75,6 +82,21 @@ def continue_prompt(
     )
     Console().print(naturalness_table({options.out.stem: natural}))
     say(f"{options.out}: {dance.seconds:.1f} s; {message}.{seam if figures else ''}")
+
+
+def _in_regions(
+    dance: Recording, options: ImproviseOptions, moves: MovedJoints, dataset: Dataset, is_quick: bool
+) -> Recording:
+    """The whole prompt, on its own way, with the regions of the improvisation. Raises StudioError."""
+    assert options.prompt is not None, "the command asks for it"
+    phrase = excerpt_of(options.prompt, 0.0, dance.seconds, moves, dataset, options.reading)
+    if len(phrase) < len(dance) - 1 and options.prompt_end is None:
+        raise StudioError(
+            f"{options.prompt} ends where the improvisation begins. Give an earlier --from, so that the rest "
+            "of the body has a dance to go on with."
+        )
+    poses = dance.poses[: len(phrase), list(dataset.moving)].astype(np.float32)
+    return standing(only_in(options.regions, poses, phrase, dataset), phrase, dataset, is_quick=is_quick)
 
 
 def _recorded_moment(dataset: Dataset, seed: int) -> Recording:

@@ -24,7 +24,7 @@ class PhraseOptions:
 @dataclass(frozen=True)
 class ImproviseOptions:
     """The command line of bunraku improvise. checkpoint: of a puppet; model: of a trained improviser.
-    show: one with an improviser, instead of both.
+    show: one with an improviser, instead of both. regions: improvise, the others go on with the prompt.
     """
 
     checkpoint: Path | None
@@ -39,3 +39,4 @@ class ImproviseOptions:
     prompt_end: float | None = None  # seconds of the prompt; None: all of it
     reading: ReadingOptions = AS_THE_FILES_SAY
     show: Path | None = None
+    regions: tuple[str, ...] = ()
