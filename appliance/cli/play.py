@@ -231,7 +231,7 @@ def _companions(
             "The strings are silent for a moment.",
             watchdog_s=WATCHDOG_S["sound"],
         )
-    if box.timecode is not None or box.midi is not None:
+    if box.timecode is not None or box.midi is not None or box.hours is not None:
         yield Companion(
             "The process for timecode and MIDI",
             (*BUNRAKU, "remote", *named),

@@ -20,4 +20,16 @@ MIDI_AWAY = Fallback(
     "The MIDI device {about} is away: what is in force stays in force. Plug it in, or remove it under midi: "
     "devices: in the box file.",
 )
-OF_THE_REMOTE = (TIMECODE_AWAY, TIMECODE_UNHEARD, MIDI_AWAY)
+PROJECTOR_AWAY = Fallback(
+    "projector-unswitched",
+    "A projector is not switched by the opening hours. Switch it by hand; check its power, its network and "
+    "its PJLink password.",
+    "The projector {about}. Opening hours do not switch it: do it by hand; check its power, its network and "
+    "its PJLink password.",
+)
+CLOCK_NOT_SET = Fallback(
+    "clock-not-set",
+    "The box does not know the time: its clock was never set. It is open all the time, and the dance goes "
+    "on. Connect it to a network with a time server, or give it a battery for its clock.",
+)
+OF_THE_REMOTE = (TIMECODE_AWAY, TIMECODE_UNHEARD, MIDI_AWAY, PROJECTOR_AWAY, CLOCK_NOT_SET)

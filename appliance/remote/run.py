@@ -14,7 +14,7 @@ from typing import Any
 from appliance.box.fallback import Fallbacks
 from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
-from appliance.box.process_health import ProcessHealthWriter
+from appliance.box.process_health import ProcessHealth, ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
 from appliance.box.stop_signals import stop_signals
@@ -23,9 +23,17 @@ from appliance.levers.show_state import ShowState
 from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
 from appliance.outputs.frame_reader import FrameReader
 from appliance.remote import art_net_timecode
+from appliance.remote.caretaker import Caretaker
 from appliance.remote.chase import CueChase, DanceChase, timed_cues
 from appliance.remote.code_clock import CodeClock
-from appliance.remote.fallback import MIDI_AWAY, OF_THE_REMOTE, TIMECODE_AWAY, TIMECODE_UNHEARD
+from appliance.remote.fallback import (
+    CLOCK_NOT_SET,
+    MIDI_AWAY,
+    OF_THE_REMOTE,
+    PROJECTOR_AWAY,
+    TIMECODE_AWAY,
+    TIMECODE_UNHEARD,
+)
 from appliance.remote.linear_timecode import LtcInput
 from appliance.remote.midi_timecode import MidiTimecode
 from appliance.remote.network_midi import NetworkMidi
@@ -244,6 +252,9 @@ class Remote:
         self._bindings_in = (box.state_folder or folder).absolute()
         bindings = MidiBindings(self._bindings_in)
         self.midi = None if box.midi is None else Midi(box.midi, bindings, self._give, _NETWORK_NAME)
+        hours = box.hours
+        self.caretaker = None if hours is None else Caretaker(hours, folder, self._give, time.time)
+        self._processes = ProcessHealth(folder)
         self.trouble = ""
         self._said = ""
         self._was_heard = False
@@ -278,6 +289,9 @@ class Remote:
         self.follower.turn(cues, health, not state.going or not is_alive, now)
         if self.midi is not None:
             self.midi.show(state, now)
+        if self.caretaker is not None:
+            live = str(self._processes.reported("control", now).get("live", ""))
+            self.caretaker.turn(state, health if is_alive else {}, live, now)
         self._senders.turn(self._own_time_s(health, is_alive, now), now)
 
     def report(self, now: float) -> dict[str, Any]:
@@ -292,6 +306,7 @@ class Remote:
         missing = () if self.midi is None else self.midi.missing
         self._fallbacks.set(MIDI_AWAY.name, bool(missing))
         self._fallbacks.concern(MIDI_AWAY.name, missing)
+        self._look_after_house()
         if self.trouble != self._said:
             self._said = self.trouble
             self._say(self.trouble or "Timecode can be heard again.")
@@ -304,11 +319,20 @@ class Remote:
             "midi": [] if self.midi is None else list(self.midi.devices),
             "bindings": "" if self.midi is None else str(self._bindings_in),
             "moved": None if newest is None else newest._asdict(),
+            "hours": None if self.caretaker is None else self.caretaker.report(),
         }
+
+    def _look_after_house(self) -> None:
+        if self.caretaker is not None:
+            troubles = self.caretaker.troubles()
+            self._fallbacks.set(PROJECTOR_AWAY.name, bool(troubles))
+            self._fallbacks.concern(PROJECTOR_AWAY.name, troubles)
+            self._fallbacks.set(CLOCK_NOT_SET.name, not self.caretaker.knows_the_time)
 
     def close(self) -> None:
         """Let go of everything."""
-        for one in (self._port, self._ltc, self.midi, self._senders, self._stage, self._state, self._desk):
+        parts = (self._port, self._ltc, self.midi, self.caretaker, self._senders)
+        for one in (*parts, self._processes, self._stage, self._state, self._desk):
             if one is not None:
                 one.close()
 

@@ -33,11 +33,11 @@ def no_sound(box: Path | None) -> NotAskedForError:
 
 
 def require_remote(box: Path | None) -> None:
-    """Raises NotAskedForError where there is neither timecode nor MIDI; ConfigError: it is no YAML."""
+    """Raises NotAskedForError where there is nothing to follow; ConfigError: it is no YAML."""
     values = {} if box is None else read_yaml(box).values
-    if values.get("timecode") is None and values.get("midi") is None:
+    if all(values.get(name) is None for name in ("timecode", "midi", "hours")):
         cure = "Add `timecode: {source: art-net}`, or `midi: {}` for each controller that is plugged in."
-        raise _not_asked_for(box, "This box file has neither timecode nor MIDI.", cure)
+        raise _not_asked_for(box, "This box file has neither timecode nor MIDI nor opening hours.", cure)
 
 
 def no_wires(box: Path | None) -> NotAskedForError:

@@ -14,6 +14,7 @@ from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
 from appliance.show.foreign_sensors import MOST as MOST_FOREIGN
 from appliance.show.foreign_sensors import ForeignSensorConfig
+from appliance.show.opening_hours import HoursConfig
 from appliance.show.osc import OscConfig, osc_misfits
 from appliance.show.pair import PairConfig
 from appliance.show.posistagenet import PosiStageNetConfig, misfits
@@ -196,6 +197,7 @@ class BoxConfig(Section):
     sound: SoundConfig | None = key("The sound card for a show's strings; null: none.", None)
     timecode: TimecodeConfig | None = key("Timecode in and out; null: none.", None)
     midi: MidiConfig | None = key("MIDI controllers and desks; null: none.", None)
+    hours: HoursConfig | None = key("Opening hours; null: the show always runs.", None)
     runtime: LocalFolder | None = key(
         "Folder shared by the box's processes, relative to the box file; a folder in memory. "
         "null: the one from systemd, otherwise the user's.",
@@ -233,7 +235,7 @@ class BoxConfig(Section):
 
     @model_validator(mode="after")
     def _commands_are_heard(self) -> BoxConfig:
-        for name in ("timecode", "midi"):
+        for name in ("timecode", "midi", "hours"):
             if getattr(self, name) is not None and (self.control is None or not self.control.port):
                 raise refusal(
                     f"`{name}` gives commands to show control, and this box has no port for them.",

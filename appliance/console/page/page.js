@@ -89,6 +89,12 @@ function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+// Opening hours, and the projectors that they switch.
+function house({ open, next, projectors }) {
+  const said = next ? words(open ? "hours_open" : "hours_closed", { next }) : words("hours_always");
+  return [["hours", said], ...projectors.map(({ host, state }) => [`${words("projector_power", { host })}`, words(`power_${state}`)])];
+}
+
 function tonight(value) {
   const status = value.status;
   const worn = value.sensors.filter((one) => one.is_worn);
@@ -112,6 +118,7 @@ function tonight(value) {
     return pair;
   }));
   if (value.remote?.state) figures.push(["timecode", `${value.remote.timecode || "–"} · ${words(`code_${value.remote.state}`)}`]);
+  if (value.remote?.hours) figures.push(...house(value.remote.hours));
   showMidi(value.remote ?? {});
   showCues(value);
   showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));

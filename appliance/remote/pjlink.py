@@ -1,0 +1,112 @@
+"""PJLink class 1: switches projectors on and off, and keeps them so (JBMIA PJLink 1.04, TCP port 4352)."""
+
+from __future__ import annotations
+
+import hashlib
+import socket
+import threading
+from typing import NamedTuple
+
+PORT = 4352
+_WITHIN_S = 5.0
+LOOK_S = 15.0
+_LONGEST = 136  # bytes of a line
+_STATES = {"0": "off", "1": "on", "2": "cooling", "3": "warming"}
+_ERRORS = ("fan", "lamp", "temperature", "cover", "filter", "other")
+_REFUSED = {"ERR1": "knows no such command", "ERR2": "refuses", "ERR3": "is busy", "ERR4": "has failed"}
+
+
+class PjLinkError(Exception):
+    """The projector does not answer, or refuses; the message is a clause about it."""
+
+
+class Seen(NamedTuple):
+    """state: off, on, cooling, warming, or unknown; trouble: a clause, "" where all is well."""
+
+    state: str = "unknown"
+    trouble: str = "was not asked yet"
+
+
+def ask(host: str, port: int, password: str | None, *commands: str) -> list[str]:
+    """The answers to commands like 'POWR ?', in one connection. Raises PjLinkError, OSError."""
+    with socket.create_connection((host, port), _WITHIN_S) as one, one.makefile("rwb", buffering=0) as line:
+        greeting = _line(line).split()
+        if greeting[:1] != ["PJLINK"] or len(greeting) < 2:
+            raise PjLinkError("speaks no PJLink")
+        digest = ""
+        if greeting[1] == "1":
+            if password is None:
+                raise PjLinkError("asks for a password")
+            digest = hashlib.md5((greeting[2] + password).encode(), usedforsecurity=False).hexdigest()
+        found = []
+        for command in commands:
+            line.write(f"{digest}%1{command}\r".encode())
+            digest = ""  # once a connection
+            answer = _line(line)
+            if answer == "PJLINK ERRA":
+                raise PjLinkError("refuses the password")
+            value = answer.partition("=")[2]
+            if value in _REFUSED:
+                raise PjLinkError(_REFUSED[value])
+            found.append(value)
+        return found
+
+
+def _line(line: socket.SocketIO) -> str:
+    received = bytearray()
+    while not received.endswith(b"\r"):
+        byte = line.read(1)
+        if not byte or len(received) > _LONGEST:
+            raise PjLinkError("ends the connection")
+        received += byte
+    return received[:-1].decode("ascii", "replace")
+
+
+class ProjectorPower:
+    """One projector, in a thread that asks it again and again, so that it also follows a power cut.
+
+    wanted: True on, False off, None: as it is.
+    """
+
+    def __init__(
+        self, host: str, port: int = PORT, password: str | None = None, look_s: float = LOOK_S
+    ) -> None:
+        self.host = host
+        self.wanted: bool | None = None
+        self.seen = Seen()
+        self._port, self._password, self._look_s = port, password, look_s
+        self._now, self._is_over = threading.Event(), False
+        self._thread = threading.Thread(target=self._keep, name=f"projector {host}", daemon=True)
+        self._thread.start()
+
+    def want(self, on: bool) -> None:
+        """Switch it, at once and from now on."""
+        if on != self.wanted:
+            self.wanted = on
+            self._now.set()
+
+    def close(self) -> None:
+        """Let it be as it is."""
+        self._is_over = True
+        self._now.set()
+
+    def _keep(self) -> None:
+        while not self._is_over:
+            self.seen = self._look()
+            self._now.wait(self._look_s)
+            self._now.clear()
+
+    def _look(self) -> Seen:
+        try:
+            state, errors = ask(self.host, self._port, self._password, "POWR ?", "ERST ?")
+            state = _STATES.get(state, "unknown")
+            away = {True: "off", False: "on"}.get(self.wanted) if self.wanted is not None else None
+            if state == away:
+                ask(self.host, self._port, self._password, f"POWR {int(bool(self.wanted))}")
+                state = "warming" if self.wanted else "cooling"
+        except PjLinkError as error:
+            return Seen(trouble=str(error))
+        except OSError as error:
+            return Seen(trouble=f"does not answer ({error.strerror or error})")
+        faults = [name for name, level in zip(_ERRORS, errors, strict=False) if level == "2"]
+        return Seen(state, f"reports a fault: {', '.join(faults)}" if faults else "")
