@@ -101,7 +101,7 @@ class Box:
 @contextlib.contextmanager
 def standing(image: Path, around: Hall, disk: DataDisk, folder: Path) -> Iterator[Box]:
     """A box in a hall with a copy of this data disk, switched off; off again at the end."""
-    (folder / "root.squashfs").symlink_to(image)
+    (folder / "root").symlink_to(image)
     boot = folder / "boot"
     boot.mkdir()
     (boot / "box.yaml").write_text(box_file())

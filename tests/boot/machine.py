@@ -42,7 +42,7 @@ class PowerOn:
 
 @dataclass
 class Machine:
-    """A box on a network of its own. `folder`: holds root.squashfs and what is said on the console.
+    """A box on a network of its own. `folder`: holds the root and what is said on the console.
 
     powered_at: when it was last switched on, seconds since 1970 of this machine's clock.
     """

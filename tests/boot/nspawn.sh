@@ -7,7 +7,7 @@ usage() {
 usage: unshare --mount --propagation private nspawn.sh FOLDER NAME [--data IMAGE OPTIONS] [--stick IMAGE]
            [--memory BYTES] -- NSPAWN_OPTION...
 
-Expects FOLDER/root.squashfs. Mounts it, the data disk and the stick below FOLDER/box and starts PID 1 over a
+Expects FOLDER/root. Mounts it read-only, the data disk and the stick below FOLDER/box and starts PID 1 over a
 root whose changes stay in memory, in the control group NAME. Works where systemd runs and where it does not.
 END
 }
@@ -45,7 +45,8 @@ echo $$ >"/sys/fs/cgroup/$name/cgroup.procs"
 mkdir -p "$folder/box"
 mount -t tmpfs tmpfs "$folder/box"
 mkdir "$folder/box/root" "$folder/box/data" "$folder/box/stick"
-mount -o ro,loop "$folder/root.squashfs" "$folder/box/root"
+mount --bind "$folder/root" "$folder/box/root"
+mount -o remount,ro,bind "$folder/box/root"
 binds=()
 if [ -n "$data" ]; then
     mount -o "loop,noatime,$data_options" "$data" "$folder/box/data"

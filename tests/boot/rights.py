@@ -12,7 +12,6 @@ from tests.system import namespace
 _COMMANDS = {
     "systemd-nspawn": "systemd-container",
     "mmdebstrap": "mmdebstrap",
-    "mksquashfs": "squashfs-tools",
     "mke2fs": "e2fsprogs",
     "ssh-keygen": "openssh-client",
     "unshare": "util-linux",
@@ -28,7 +27,7 @@ def why_not() -> str | None:
         if shutil.which(command) is None:
             return f"the command {command} (Debian package {package}) is missing"
     known = Path("/proc/filesystems").read_text().split()
-    for kind in ("squashfs", "overlay", "ext4", "cgroup2"):
+    for kind in ("overlay", "ext4", "cgroup2"):
         if kind not in known and subprocess.run(["modprobe", kind], capture_output=True).returncode != 0:
             return f"the kernel has no {kind}"
     if not Path("/dev/loop-control").exists():

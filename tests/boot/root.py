@@ -18,14 +18,13 @@ BUILT = ROOT / "build" / "boot"
 MAKER = BUILT / "maker"  # the key of the release's maker, made here, thrown away with `build`
 _INPUTS = ("appliance", "hw_sim", "deploy", "distributions", "pyproject.toml")
 _DEBIAN = tuple(f"deploy/image/{name}" for name in ("mkroot.sh", "packages-box.txt", "drop-files.txt"))
-_FAST = ("-comp", "zstd", "-Xcompression-level", "3", "-noappend", "-quiet", "-no-progress")
 _UNSTABLE = {"__pycache__"}
 
 
 def root_image() -> Path:
-    """root.squashfs for this working tree; half a minute when Debian's part is there, else one and a half."""
+    """The folder of this working tree's root; half a minute when Debian's part is there, else a minute."""
     folder = BUILT / f"root-{_key(_files(*_INPUTS))}"
-    image = folder / "root.squashfs"
+    image = folder / "root"
     if not image.exists():
         for old in BUILT.glob("root-*"):
             shutil.rmtree(old)
@@ -48,9 +47,7 @@ def _build(folder: Path, image: Path) -> None:
         make_key(MAKER.parent, MAKER.name)
     _run(str(MAKE_DEB), "--quick", "--out", str(folder), "--key", str(MAKER))
     made = [str(MKROOT), "--without-kernel", "--deb", str(release(image)), "--debian", str(debian)]
-    _run(*made, str(folder / "root"))
-    _run("mksquashfs", str(folder / "root"), str(part), *_FAST)
-    shutil.rmtree(folder / "root")
+    _run(*made, str(part))
     part.rename(image)
 
 
