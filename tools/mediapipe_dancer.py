@@ -1,6 +1,9 @@
-"""A camera makes a live dancer: MediaPipe's landmarks of one person, sent to the box as OSC.
+"""A camera makes a live dancer: MediaPipe's landmarks of one person, sent to the box as OSC, or saved.
 
     python mediapipe_dancer.py --to 10.0.0.5 --camera 0
+    python mediapipe_dancer.py --camera dance.mp4 --save dance.json
+
+The second one is for `bunraku import dance.json --out dance.bvh`.
 
 Copy this one file to the machine with the camera; it needs `pip install mediapipe opencv-python` and no
 part of Bunraku. MediaPipe 0.10.14 brings its network along. MediaPipe 1.2 does not: give it a pose landmarker
@@ -10,7 +13,9 @@ part of Bunraku. MediaPipe 0.10.14 brings its network along. MediaPipe 1.2 does 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
+import json
 import math
 import socket
 import struct
@@ -74,37 +79,51 @@ def landmarker(model: str | None) -> Callable[[Any, int], Sequence[Any] | None]:
     return given
 
 
-def pictures(source: str) -> Iterator[Any]:
-    """A camera's pictures, by its number, or a file's; RGB."""
+def pictures(source: str) -> Iterator[tuple[Any, float]]:
+    """A camera's pictures, by its number, or a file's, RGB; and its second: of a file as it was filmed."""
     cv2 = importlib.import_module("cv2")
-    camera = cv2.VideoCapture(int(source) if source.isdigit() else source)
+    camera, begun = cv2.VideoCapture(int(source) if source.isdigit() else source), time.monotonic()
     if not camera.isOpened():
         sys.exit(f"The camera or file {source} cannot be opened.")
     while (taken := camera.read())[0]:
-        yield cv2.cvtColor(taken[1], cv2.COLOR_BGR2RGB)
+        at = time.monotonic() - begun if source.isdigit() else camera.get(cv2.CAP_PROP_POS_MSEC) / 1000
+        yield cv2.cvtColor(taken[1], cv2.COLOR_BGR2RGB), at
+
+
+def frame_of(found: Sequence[Any] | None, at: float) -> dict[str, Any]:
+    """A frame of the file: its second, and x, y, z, visibility of each landmark; nobody seen: none."""
+    seen = [] if found is None else found
+    return {"time": round(at, 4), "world": [[one.x, one.y, one.z, one.visibility] for one in seen]}
 
 
 def main() -> None:
-    """Send until the pictures end, or Ctrl-C."""
+    """Send or save until the pictures end, or Ctrl-C."""
     as_written = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=as_written)
-    parser.add_argument("--to", required=True, metavar="ADDRESS", help="the box's address")
+    parser.add_argument("--to", metavar="ADDRESS", help="the box's address")
+    parser.add_argument("--save", metavar="FILE", help="write the landmarks into this JSON file instead")
     parser.add_argument("--port", type=int, default=9002, help="the box's control port (9002)")
     parser.add_argument("--camera", default="0", help="number of the camera, or a video file")
     parser.add_argument("--model", metavar="FILE", help="a pose landmarker (.task)")
     given = parser.parse_args()
-    find, begun, sent, missed = landmarker(given.model), time.monotonic(), 0, 0
+    if (given.to is None) == (given.save is None):
+        parser.error("give --to ADDRESS or --save FILE")
+    find, sent, missed, frames = landmarker(given.model), 0, 0, list[dict[str, Any]]()
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    for picture in pictures(given.camera):
-        found = find(picture, int(1000 * (time.monotonic() - begun)))
-        if found is None:
-            missed += 1
-        else:
-            out.sendto(packet(found), (given.to, given.port))
-            sent += 1
-        if (sent + missed) % 100 == 1:
-            print(f"{sent} poses sent; nobody seen in {missed} pictures.", flush=True)
-    print(f"The pictures ended. {sent} poses sent; nobody seen in {missed} pictures.")
+    with contextlib.suppress(KeyboardInterrupt):
+        for picture, at in pictures(given.camera):
+            found = find(picture, int(1000 * at))
+            missed += found is None
+            sent += found is not None
+            if given.save:
+                frames.append(frame_of(found, at))
+            elif found is not None:
+                out.sendto(packet(found), (given.to, given.port))
+            if (sent + missed) % 100 == 1:
+                print(f"{sent} poses; nobody seen in {missed} pictures.", flush=True)
+    if given.save:
+        Path(given.save).write_text(json.dumps({"frames": frames}), encoding="utf-8")
+    print(f"The pictures ended. {sent} poses; nobody seen in {missed} pictures.")
 
 
 if __name__ == "__main__":

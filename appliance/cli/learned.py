@@ -23,7 +23,7 @@ class Bound(NamedTuple):
     least: float | None
     most: float | None
     null_name: str
-    null: float | None
+    null: float
 
 
 BOUNDS = (
@@ -32,7 +32,7 @@ BOUNDS = (
     Bound("speed of the legs", "energy_legs", 0.75, 1.35, "the mean pose", 0.0),
     Bound("speed of the free arms", "energy_arms", 0.75, 1.35, "the mean pose", 0.0),
     Bound("spread of the legs", "spread_legs", 0.7, None, "the mean pose", 0.0),
-    Bound("roughness", "roughness", None, 1.5, "nothing", None),
+    Bound("roughness", "roughness", None, 1.5, "the phrase", 1.0),
     Bound("critic", "critic", None, 0.9, "the mean pose", 1.0),
 )
 ERROR = Bound("degrees off the recordings", "1", None, 10.0, "the mean pose", 22.1)
@@ -77,7 +77,6 @@ def _row(bound: Bound, value: float | None, usual: float, null: float | None) ->
         edges.append(f"at least {bound.least:g}")
     if bound.most is not None:
         edges.append(f"at most {bound.most:g}")
-    floor = bound.null if null is None else null
     holds = value is not None and (bound.least or 0.0) <= value <= (bound.most or math.inf)
     return {
         "name": bound.name,
@@ -86,7 +85,7 @@ def _row(bound: Bound, value: float | None, usual: float, null: float | None) ->
         "bound": ", ".join(edges),
         "default": round(usual, 2),
         "null_name": bound.null_name,
-        "null": "–" if floor is None else round(floor, 2),
+        "null": round(bound.null if null is None else null, 2),
     }
 
 

@@ -21,7 +21,7 @@ from appliance.console.learning import STUDIO_MISSING, Learning, Wanted
 from appliance.show.bundle import default_show_path, named_show
 from tests.command import Command
 
-# Stands for `bunraku`: trains until it is told that it may end, stops at SIGTERM with a checkpoint, as train does.
+# Stands for `bunraku`: trains until it is told that it may end; stops at SIGTERM with a checkpoint, as train.
 PROGRAM = """
 import json, pathlib, shutil, signal, sys, time
 words = sys.argv[1:]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import subprocess
 import sys
@@ -19,10 +20,11 @@ from appliance.levers.sources import LIVE
 from appliance.pose.bvh import read_bvh
 from appliance.pose.point_layouts import LAYOUTS
 from appliance.show_control.packet import messages_in
+from appliance.studio.exchange.landmarks_file import read_landmarks
 from tests.conftest import ROOT
 from tests.pose.landmarks import Landmarks
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts, until
-from tools.mediapipe_dancer import packet
+from tools.mediapipe_dancer import frame_of, packet
 
 PARTS = LAYOUTS["mediapipe"].parts
 
@@ -78,6 +80,18 @@ def test_its_packet_names_the_layout_and_is_osc() -> None:
     assert [math.isnan(one) for one in numbers[:6]] == [True] * 3 + [False] * 3
     with pytest.raises(ValueError, match="33 landmarks"):
         packet(landmarks()[:17])
+
+
+def test_what_it_saves_is_what_import_reads(tmp_path: Path) -> None:
+    """Also a frame in which nobody was seen, and landmarks of which MediaPipe does not say how visible."""
+    for one in (seen := landmarks()):
+        one.visibility = None
+    told = [frame_of(seen, 0.0), frame_of(None, 0.033), frame_of(seen, 0.066)]
+    (tmp_path / "dance.json").write_text(json.dumps({"frames": told}))
+    read = read_landmarks(tmp_path / "dance.json")
+    assert read.times.tolist() == [0.0, 0.033, 0.066] and not read.is_flat
+    assert np.isnan(read.points[1]).all() and read.seen[0].min() == 1.0
+    np.testing.assert_allclose(read.points[2, PARTS.index("left wrist"), 0], seen[15].x)
 
 
 def test_it_runs_by_itself_without_bunraku_or_mediapipe(tmp_path: Path) -> None:

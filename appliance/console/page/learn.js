@@ -7,7 +7,7 @@ import { twice } from "./hold.js";
 import { number, translated, words } from "./words.js";
 
 const LOOK_MS = 2000, ADOPTED_WITHIN_MS = 120_000;
-let timer = 0, chosen = "";
+let timer = 0, chosen = "", isRead = false;
 
 export function initLearn() {
   byId("learn-open").addEventListener("click", () => withPin(read));
@@ -21,10 +21,20 @@ export function initLearn() {
   });
 }
 
-export function leaveLearn() { clearTimeout(timer); }
+// A device that gave the PIN sees the recordings as soon as it opens this page.
+export function showLearn() {
+  const { shown, known } = document.body.dataset;
+  if (shown === "rehearsal" && known === "yes" && !isRead) read();
+}
+
+export function leaveLearn() {
+  clearTimeout(timer);
+  isRead = false;
+}
 
 async function read() {
   clearTimeout(timer);
+  isRead = true;
   const answer = await request("/api/learn");
   if (answer.status !== 200) return say(translated(answer.message) || words("no_page"));
   const { studio, recordings, journal, runs, progress, can_dance: canDance, show } = answer.value;

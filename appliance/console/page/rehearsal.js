@@ -4,7 +4,7 @@ import { request } from "./box.js";
 import { ask, command, withPin } from "./device.js";
 import { byId, first } from "./elements.js";
 import { Figure } from "./figure.js";
-import { initLearn, leaveLearn } from "./learn.js";
+import { initLearn, leaveLearn, showLearn } from "./learn.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
 import { twice } from "./hold.js";
@@ -63,6 +63,7 @@ export function showRehearsal(value, show) {
   tell();
   showMotion(value, show);
   showSprings(value, show);
+  showLearn();
 }
 
 // The settings of now become a cue in a copy of the show; what dances stays as it is.
