@@ -94,6 +94,7 @@ class Grounding:
         self._swinging = (SWINGING_M_S * tick_s) ** 2
         self._offset_x = self._offset_z = 0.0  # offset of the root from its path
         self._step_x = self._step_z = 0.0  # that offset in the last tick
+        self._led = 0.0, 0.0  # how far the root is led in the next tick
         self._hips = 0.0, 0.0, 0.0  # where a hand draws the root to, x and z in metres, and its weight
         self._height: float | None = None
         self._before: list[list[float]] | None = None
@@ -128,6 +129,14 @@ class Grounding:
         """
         self._hips = x, z, weight
 
+    def lead(self, x: float, z: float) -> None:
+        """With the next pose the root leaves its path by so much more, metres.
+
+        A foot that carries the figure stays where it is, as far as its leg reaches (FootLock), and comes
+        along when it lifts. The way back to the path is that of every offset.
+        """
+        self._led = x, z
+
     def ground_pose(
         self,
         pose: FloatArray,
@@ -150,8 +159,10 @@ class Grounding:
             self._rest = rest_heights.tolist()
         if self._rest is not None:
             self._stand(self._rest, lift_m, held)
-        elif self._hips[2]:
-            self._move(0.0)
+        else:
+            self._leave_path(*self._led)
+            if self._hips[2] or self._offset_x or self._offset_z:
+                self._move(0.0)
         return self.figure
 
     def _stand(self, rest: list[float], lift_m: float, held: FloatArray | None) -> None:
@@ -161,6 +172,7 @@ class Grounding:
         lowest = min(clearances)
         if self._before is not None:
             self._pin(points, self._before, clearances, lowest, lift_m)
+            self._leave_path(self._step_x + self._led[0], self._step_z + self._led[1])
         self._before = points
         wanted = lift_m - lowest
         self._height = wanted if self._height is None else self._height + FOLLOW * (wanted - self._height)
@@ -197,10 +209,13 @@ class Grounding:
         standing = max(0.0, 1.0 - lift_m / JUMP_M) / total  # the lowest point gives some support at any speed
         self._step_x += FOLLOW * (-standing * slide_x - self._step_x)
         self._step_z += FOLLOW * (-standing * slide_z - self._step_z)
+
+    def _leave_path(self, x: float, z: float) -> None:
+        """Change the root's offset by so much, and let the whole of it decay."""
         far = (self._offset_x**2 + self._offset_z**2) / FAR_M**2
         kept = max(0.0, 1.0 - self._leak * (1.0 + far))  # below 0 an offset of 17 m would grow for ever
-        self._offset_x = (self._offset_x + self._step_x) * kept
-        self._offset_z = (self._offset_z + self._step_z) * kept
+        self._offset_x = (self._offset_x + x) * kept
+        self._offset_z = (self._offset_z + z) * kept
 
 
 def sole_positions(skeleton: Skeleton, poses: Array, roots: Array) -> Array:

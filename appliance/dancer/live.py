@@ -48,7 +48,7 @@ class Live(Takeover):
         self._slerp, self._over = Slerp(joints), Slerp(window * joints)
         self._extrapolation = Extrapolation(joints, window)
         self._is_new = np.ones((joints, 1), dtype=np.bool_)
-        self._before, self._newest, self._present = np.tile(quaternion.IDENTITY, (3, joints, 1))
+        self._before, self._newest, self._present, self._looked = np.tile(quaternion.IDENTITY, (4, joints, 1))
         self._all = np.ones(joints, dtype=np.bool_)
         self._comes = np.zeros(joints, dtype=np.bool_)  # joints of the newest pose
         self._came, self._follows = np.zeros((2, joints), dtype=np.float32)  # how far each is the stream's
@@ -156,6 +156,16 @@ class Live(Takeover):
         self._follows[:] = ease(came)
         self._phrases_share[:] = 1.0 - self.share * self._follows
         return self._phrases_share.reshape(-1)
+
+    def look(self, now: float) -> tuple[FloatArray, FloatArray] | None:
+        """The stream's own pose (J, 4) and root (3,) at this time, whatever the puppet dances; None while it
+        is silent. Overwritten by the next call.
+        """
+        if self.silent_s(now) > SILENT_S:
+            return None
+        share = min(max((now - self._arrival) / self._interval_s, 0.0), 1.0)
+        self._slerp(self._before, self._newest, share, out=self._looked)
+        return self._looked, self._root[0] + share * (self._root[1] - self._root[0])
 
     def stand_anew(self) -> None:
         """Take the figure from where it stands to the stream's root, as at a takeover."""

@@ -19,8 +19,8 @@ BROWSER_HEAD = struct.Struct("<dII")
 
 class FrameLayout:
     """Offsets of the arrays of J joints in a frame's payload: all float32, little-endian, in this order.
-    Those of the next puppet follow, `stride` bytes after those of the one before; then the hands' orientations
-    and a live dancer's positions.
+    Those of the next puppet follow, `stride` bytes after those of the one before; then the hands'
+    orientations and a live dancer's positions.
     """
 
     def __init__(self, joints: int, puppets: int = 1, hands: int = 0, live: int = 0) -> None:

@@ -39,9 +39,9 @@ class PuppetFrame:
 class JointFrame:
     """The poses of all puppets at one tick, in the show's order. One that was read has read-only arrays.
 
-    hands (H, 4): where the hands of all puppets point their joints, w, x, y, z, whether they hold them or not;
-    zeros: a hand that gives no single orientation. live (J, 3): joints of the live dancer, metres, where the
-    stream has them; zeros: nobody is there. (0, 3) in a show that takes none.
+    hands (H, 4): where the hands of all puppets point their joints, w, x, y, z, whether they hold them or
+    not; zeros: a hand that gives no single orientation. live (J, 3): joints of the live dancer, metres, where
+    the stream has them; zeros: nobody is there. (0, 3) in a show that takes none.
     """
 
     SNAPSHOT = ("sensor_sequence", "sensor_arrival")

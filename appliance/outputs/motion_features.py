@@ -9,12 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.pose import quaternion
+
 WINDOW = 25  # frames that efforts look back: half a second
 PAUSE_S = 0.2  # after which motion begins anew
 LEAST_M = 0.001  # no way is shorter: one who stands still goes straight
 EFFORTS = ("weight_effort", "time_effort", "flow_effort", "space_effort")
 
-Floats = NDArray[np.float32]
+Floats = NDArray[np.float32] | NDArray[np.float64]
 
 
 class Derivatives:
@@ -24,9 +26,9 @@ class Derivatives:
     with the frame that has all that it needs.
     """
 
-    def __init__(self, joints: int, orders: int) -> None:
-        self.found = np.zeros((orders, joints, 3), np.float32)
-        self._before = np.zeros_like(self.found)
+    def __init__(self, joints: int, orders: int, precision: type = np.float32) -> None:
+        self.found: Floats = np.zeros((orders, joints, 3), precision)
+        self._before: Floats = np.zeros_like(self.found)
         self._frames = 0
 
     def begin(self) -> None:
@@ -49,12 +51,12 @@ class MotionFeatures:
     numbers: `qom` (1), `bbox` (6: lowest, highest), `bsphere` (4: centre, radius), each of EFFORTS (1).
     """
 
-    def __init__(self, joints: int) -> None:
-        self._derivatives = Derivatives(joints, 3)
+    def __init__(self, joints: int, precision: type = np.float32) -> None:
+        self._derivatives = Derivatives(joints, 3, precision)
         self.derived = self._derivatives.found
-        self._sizes = np.zeros((WINDOW, 3, joints), np.float32)  # the newest frames among these
-        self._steps = np.zeros((WINDOW, joints), np.float32)  # metres from the frame before
-        self._ways = np.zeros((WINDOW, joints, 3), np.float32)  # positions
+        self._sizes: Floats = np.zeros((WINDOW, 3, joints), precision)  # the newest frames among these
+        self._steps: Floats = np.zeros((WINDOW, joints), precision)  # metres from the frame before
+        self._ways: Floats = np.zeros((WINDOW, joints, 3), precision)  # positions
         self.numbers: dict[str, Floats] = {
             name: np.zeros(count, np.float32)
             for name, count in {"qom": 1, "bbox": 6, "bsphere": 4, **dict.fromkeys(EFFORTS, 1)}.items()
@@ -99,3 +101,29 @@ class MotionFeatures:
         apart = positions - self._ways[oldest]
         far = np.sqrt(np.einsum("jk,jk->j", apart, apart))
         numbers["space_effort"][:] = (np.maximum(way, LEAST_M) / np.maximum(far, LEAST_M)).mean()
+
+
+class TurnFeatures:
+    """The same of what turns: radians take the place of metres. derived (3, 1, 3): angular velocity,
+    acceleration and jerk about the world's axes; numbers: `qom` and the efforts.
+
+    The angle that is measured is the sum of all turns, so that turning round and round is a way like another.
+    """
+
+    def __init__(self) -> None:
+        self._features = MotionFeatures(1, np.float64)  # the sum grows all evening
+        self.derived = self._features.derived
+        self.numbers = {name: self._features.numbers[name] for name in ("qom", *EFFORTS)}
+        self._before: Floats | None = None
+        self._angle = np.zeros((1, 3))
+
+    def take_frame(self, orientation: Floats, seconds: float) -> bool:
+        """An orientation (4,) at a time, zeros: unknown; whether the numbers are new."""
+        if not orientation.any():
+            return False
+        if self._before is not None:
+            turn = quaternion.multiply(orientation, quaternion.inverse(self._before)).astype(float)
+            axis, angle = quaternion.to_axis_angle(turn if turn[0] >= 0.0 else -turn)
+            self._angle += axis * angle
+        self._before = orientation.copy()
+        return self._features.take_frame(self._angle, seconds)

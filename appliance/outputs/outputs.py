@@ -17,9 +17,17 @@ from appliance.show.box import OutputsConfig
 class Outputs:
     """The receivers that the stage sends joint frames to; lights and projector read the shared frame."""
 
-    def __init__(self, config: OutputsConfig, skeleton: Skeleton, puppets: Sequence[str] = ("",)) -> None:
-        """puppets: their names."""
-        self._osc = OscOutputs(config.osc, skeleton, "osc" in config.model_fields_set, len(puppets))
+    def __init__(
+        self,
+        config: OutputsConfig,
+        skeleton: Skeleton,
+        puppets: Sequence[str] = ("",),
+        hands: Sequence[Sequence[str]] = (),
+        has_live: bool = False,
+    ) -> None:
+        """puppets: their names; hands: of each the joints of its hands; has_live: a live dancer may come."""
+        hands = hands or [()] * len(puppets)
+        self._osc = OscOutputs(config.osc, skeleton, "osc" in config.model_fields_set, hands, has_live)
         self._posistagenet = tuple(PosiStageNet(one, skeleton, puppets) for one in config.posistagenet)
         self.receivers: tuple[DatagramSender, ...] = (*self._osc.receivers, *self._posistagenet)
         self._shared: FrameWriter | None = None

@@ -135,6 +135,11 @@ class HandConfig(Section):
         return self
 
     @property
+    def points_a_joint(self) -> bool:
+        """Whether it gives one joint an orientation."""
+        return self.springs is None and self.by == "orientation"
+
+    @property
     def kind(self) -> str:
         """sensor, turning, fixed, kept, osc or springs."""
         return next(kind for kind in KINDS if getattr(self, kind) is not None)

@@ -37,6 +37,12 @@ class PuppetConfig(Section):
         0.0,
         within=(-360, 360),
     )
+    space: float = key(
+        "Room that it keeps around its hips, metres: two puppets stay apart by the sum of theirs, led apart "
+        "before they meet. 0: it dances through others.",
+        0.3,
+        within=(0, 2),
+    )
     phrase: str | None = key(
         "Not for the first puppet: its motion source, `main`, a name under motion.phrases, `live`, `vary`, "
         "`granular`, `path`, `improvise` or a name under motion.kept. null: the phrase that the show starts "

@@ -8,6 +8,7 @@ import numpy as np
 
 from appliance.box.clock import TICK_S
 from appliance.dancer.continuation import FREE, TEMPERATURE, TOP_P, Continuation
+from appliance.dancer.lead import shortened
 from appliance.dancer.live import SILENT_S
 from appliance.dancer.material.improviser_network import ImproviserNetwork
 from appliance.dancer.material.partner_network import PartnerNetwork
@@ -20,8 +21,9 @@ from appliance.stage.stage_puppet import StagePuppet
 
 FADE_S, BACK_S = 1.5, 0.7  # into going on by itself, and back when the guest moves
 MOVES_DEGREES_S = 12.0  # mean speed of a guest's joints, above which the guest moves; dancers have some 70
+LED_M_S = 0.4  # the fastest that a puppet is led to its goal: a leg makes up for it while its foot stands
 LED_S = 1.0  # in which a puppet would be led to a near goal
-SWAY = 0.04  # share of a tick in the mean way to the goal: half a second
+SWAY = 0.02  # share of a tick in the mean way to the goal: over a second, in which steps sway
 _LOOK_TICKS = 10
 
 
@@ -138,7 +140,7 @@ class Continuing:
             here = puppet.grounding.root
             away = x - float(here[0]) - self._off[0], z - float(here[2]) - self._off[1]
             self._off = self._off[0] + SWAY * away[0], self._off[1] + SWAY * away[1]
-            puppet.lead.ask(self._off[0] / LED_S, self._off[1] / LED_S)
+            puppet.lead.ask(*shortened(self._off[0] / LED_S, self._off[1] / LED_S, LED_M_S))
         else:
             self._off = 0.0, 0.0
         return bool(self.goal) or self._guest.still_s >= self._after_s

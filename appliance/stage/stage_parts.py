@@ -13,6 +13,7 @@ from appliance.box.clock import TICK_S
 from appliance.box.live_pose import LivePose, LivePoseReader
 from appliance.box.realtime import borrowed_priority
 from appliance.dancer.blending import Blending
+from appliance.dancer.forward_kinematics import Figure
 from appliance.dancer.grounding import Floor, Grounding, GroundingError
 from appliance.dancer.hands import Hands
 from appliance.dancer.live import Live
@@ -25,6 +26,7 @@ from appliance.dancer.phrase import PhraseError
 from appliance.dancer.phrase_cache import PhraseCache
 from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
 from appliance.dancer.puppeteers import WornSensor
+from appliance.dancer.slerp import FloatArray
 from appliance.dancer.springs import Springs
 from appliance.levers.sources import LIVE, MAIN
 from appliance.outputs.joint_frame import PuppetFrame
@@ -44,6 +46,7 @@ from appliance.stage.continuing import Continuing
 from appliance.stage.iterations import Iterations
 from appliance.stage.liveliness import Liveliness
 from appliance.stage.open_sensors import open_sensors
+from appliance.stage.personal_space import PersonalSpace
 from appliance.stage.puppeteers_of_show import mounting_of, puppeteers_of
 from appliance.stage.stage_error import StageError
 from appliance.stage.stage_puppet import StagePosition, StagePuppet
@@ -58,7 +61,7 @@ class StageParts:
     `complaints`: why sensors are not let in.
     """
 
-    SNAPSHOT = ("puppets", "liveliness", "newest_primary", "continuing")
+    SNAPSHOT = ("puppets", "liveliness", "newest_primary", "continuing", "space")
 
     skeleton: Skeleton
     network: PuppetNetwork
@@ -71,11 +74,13 @@ class StageParts:
     primary: str | None
     link: SensorLink
     outputs: Outputs
+    live_figure: Figure | None = None  # of a live dancer; None: the show takes none
     live_inbox: LivePoseReader | None = None
     live_refused: int = 0  # poses of another figure, or none
     complaints: tuple[str, ...] = ()
     newest_primary: SensorReading | None = field(default=None)
     continuing: Continuing | None = None
+    space: PersonalSpace | None = None  # None: one puppet, or none that gives way
 
     @property
     def not_let_in(self) -> list[str]:
@@ -121,6 +126,26 @@ class StageParts:
             return heard
         self.live_refused += 1
         return None
+
+    def point_hands(self, out: FloatArray) -> None:
+        """Write where the hands of all puppets point their joints, (H, 4); zeros: none of one joint."""
+        row = 0
+        for puppet in self.puppets:
+            for hand, by_place in zip(puppet.hands.puppeteers, puppet.hands.by_place, strict=True):
+                if not by_place and not isinstance(hand, Springs):
+                    out[row] = hand.orientation
+                row += 1
+
+    def show_live(self, now: float, out: FloatArray) -> None:
+        """Write where a live dancer's joints are, (J, 3) metres; zeros: nobody is there."""
+        if self.live_figure is None or self.led.live is None:
+            return
+        seen = self.led.live.look(now)
+        if seen is None:
+            out[:] = 0.0
+            return
+        self.live_figure.set_pose(*seen)
+        out[:] = self.live_figure.positions
 
     def make_by(self, make: Callable[[str], Loop]) -> None:
         """Where loops of recipes come from; it raises ValueError."""
@@ -187,6 +212,8 @@ def assemble(
         outputs=_outputs(show, box, box_file),
         complaints=complaints,
         continuing=_continuing(show, puppets),
+        live_figure=Figure(show.skeleton) if config.motion.live else None,
+        space=_space(show, puppets),
     )
 
 
@@ -289,11 +316,19 @@ def _continuing(show: Show, puppets: Sequence[StagePuppet]) -> Continuing | None
     return Continuing(network, partner, puppets, config.led.number, answerer, after_s, *chosen)
 
 
+def _space(show: Show, puppets: Sequence[StagePuppet]) -> PersonalSpace | None:
+    spaces = [one.space for one in show.config.puppets]
+    return PersonalSpace(puppets, spaces) if len(list(filter(None, spaces))) > 1 else None
+
+
 def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
     problems = box.output_misfits(show.skeleton.names, len(show.config.cast))
     if problems:
         raise ConfigError(problems)
-    return Outputs(box.outputs, show.skeleton, [puppet.name for puppet in show.config.cast])
+    cast = show.config.cast
+    hands = [[hand.joint if hand.points_a_joint else "" for hand in one.hands] for one in cast]
+    names = [one.name for one in cast]
+    return Outputs(box.outputs, show.skeleton, names, hands, show.config.motion.live)
 
 
 def _motion_of(start: PuppetStart, motion: Playback) -> Playback:

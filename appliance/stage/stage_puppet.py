@@ -188,6 +188,12 @@ class StagePuppet:
         if self.place is not None:
             self.place.put(frame)
 
+    def lead_on_stage(self, x: float, z: float) -> None:
+        """Ask the figure in this tick to be led over the stage's floor, metres a second."""
+        if self.place is not None:
+            x, z = Placement(-self.place.placement.yaw).point(x, z)
+        self.lead.ask(x, z)
+
     def advance(self) -> None:
         """The frame has left: the motion moves on."""
         self.motion.advance()

@@ -52,7 +52,13 @@ class Tick:
         self.late_s = late_s
         self.waited_s = 0.0  # for a late reading, in this tick
         self._slowest_s = 0.0  # cost of the slowest tick lately
-        self.frame = JointFrame(tuple(one.frame for one in parts.puppets))
+        hands = sum(len(one.hands.puppeteers) for one in parts.puppets)
+        joints = 0 if parts.live_figure is None else len(parts.skeleton)
+        self.frame = JointFrame(
+            tuple(one.frame for one in parts.puppets),
+            hands=np.zeros((hands, 4), np.float32),
+            live=np.zeros((joints, 3), np.float32),
+        )
         self.late = False  # in this slot the last poses were sent again
         self.readings: Sequence[SensorReading] = ()
         self.live_heard: LivePose | None = None
@@ -93,6 +99,8 @@ class Tick:
         if not self.late:
             for puppet in parts.puppets:
                 puppet.pull(slot.started)
+            parts.point_hands(frame.hands)
+            parts.show_live(slot.started, frame.live)
             ends[HANDS] = now()
             if parts.are_due:
                 parts.network.dance()
@@ -101,6 +109,8 @@ class Tick:
             for puppet in parts.puppets:
                 puppet.blend()
             ends[BLEND] = now()
+            if parts.space is not None:
+                parts.space.keep()
             for puppet in parts.puppets:
                 puppet.stand()
             if parts.continuing is not None:

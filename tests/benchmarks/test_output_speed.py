@@ -15,7 +15,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from appliance.dancer.forward_kinematics import Figure
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.joint_frame import JointFrame
-from appliance.outputs.osc.dialects import DIALECTS
+from appliance.outputs.osc.dialects import DIALECTS, Addressed
 from appliance.outputs.outputs import Outputs
 from appliance.outputs.posistagenet import PosiStageNet
 from appliance.outputs.shared_frame import FrameWriter
@@ -70,18 +70,18 @@ def pack_with_python_osc(frame: JointFrame) -> list[bytes]:
 def test_python_osc(measured: Callable[..., Any], frame: JointFrame) -> None:
     benchmark = measured("python-osc", OSC_GROUP, reference=True)
     packed = benchmark(pack_with_python_osc, frame)
-    ours = encoded(DIALECTS["ai-toolbox"](skeleton(), OscConfig(), 0), frame)
+    ours = encoded(DIALECTS["ai-toolbox"](skeleton(), OscConfig(), Addressed()), frame)
     assert packed == [bytes(datagram) for datagram in ours]
 
 
 def test_ai_toolbox(measured: Callable[..., Any], frame: JointFrame) -> None:
-    encoder = DIALECTS["ai-toolbox"](skeleton(), OscConfig(), 0)
+    encoder = DIALECTS["ai-toolbox"](skeleton(), OscConfig(), Addressed())
     assert len(measured("ours", OSC_GROUP)(encoder.encode, frame, frame.puppets[0])) == 3
 
 
 @pytest.mark.parametrize("dialect", sorted(DIALECTS.keys() - {"ai-toolbox"}))
 def test_dialect(measured: Callable[..., Any], frame: JointFrame, dialect: str) -> None:
-    encoder = DIALECTS[dialect](skeleton(), OscConfig(), 0)
+    encoder = DIALECTS[dialect](skeleton(), OscConfig(), Addressed())
     assert measured(dialect, DIALECTS_GROUP)(encoder.encode, frame, frame.puppets[0])
 
 

@@ -14,7 +14,7 @@ from pythonosc.osc_packet import OscPacket
 
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.ai_toolbox import AiToolbox
-from appliance.outputs.osc.dialects import DIALECTS
+from appliance.outputs.osc.dialects import DIALECTS, Addressed
 from appliance.outputs.osc.frame_message import FrameMessage
 from appliance.outputs.osc.joint import Joint
 from appliance.outputs.osc.template import MAX_DATAGRAM, address_part, bundles, message
@@ -77,11 +77,11 @@ def test_a_frame_message_carries_tick_time_sequence_and_lateness() -> None:
 
 @pytest.mark.parametrize("dialect", sorted(DIALECTS))
 def test_the_same_buffers_carry_the_next_frame(dialect: str, skeleton: Skeleton, frame: JointFrame) -> None:
-    encoder = DIALECTS[dialect](skeleton, OscConfig(), 0)
+    encoder = DIALECTS[dialect](skeleton, OscConfig(), Addressed())
     first = encoded(encoder, frame)
     second = encoded(encoder, fill(frame, skeleton, seed=2))
     assert all(a is b for a, b in zip(first, second, strict=True))
-    fresh = DIALECTS[dialect](skeleton, OscConfig(), 0)
+    fresh = DIALECTS[dialect](skeleton, OscConfig(), Addressed())
     encoded(fresh, fill(one_puppet(len(skeleton)), skeleton, seed=1))  # the same first frame time
     assert [bytes(d) for d in second] == [bytes(d) for d in encoded(fresh, frame)]
 
@@ -91,7 +91,7 @@ def test_the_same_buffers_carry_the_next_frame(dialect: str, skeleton: Skeleton,
 def test_bundles_fit_an_ethernet_frame_and_lose_nothing(dialect: str, count: int, longest: int) -> None:
     names = tuple(f"{'n' * (index % longest)}{index}" for index in range(count))
     parents = tuple(range(-1, count - 1))
-    encoder = DIALECTS[dialect](Skeleton(names, parents, np.zeros((count, 3))), OscConfig(), 0)
+    encoder = DIALECTS[dialect](Skeleton(names, parents, np.zeros((count, 3))), OscConfig(), Addressed())
     datagrams = encoded(encoder, one_puppet(count))
     assert max(map(len, datagrams)) < ETHERNET_PAYLOAD
     assert len(read(datagrams)) == (2 * count if dialect == "joint" else 3 + 1)
@@ -112,6 +112,6 @@ def test_bundles_are_as_few_as_they_can_be_in_order(sizes: list[int]) -> None:
 def test_the_documentation_names_every_address(dialect: str, skeleton: Skeleton, frame: JointFrame) -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "osc.md").read_text(encoding="utf-8")
     names = {f"/{name}/" for name in skeleton.names}
-    for address, _ in read(encoded(DIALECTS[dialect](skeleton, OscConfig(), 0), frame)):
+    for address, _ in read(encoded(DIALECTS[dialect](skeleton, OscConfig(), Addressed()), frame)):
         spoken = next((address.replace(name, "/<joint>/") for name in names if name in address), address)
         assert f"`{spoken}`" in page

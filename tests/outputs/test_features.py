@@ -104,3 +104,55 @@ def test_a_late_frame_repeats_the_numbers_and_a_pause_begins_anew() -> None:
 def test_older_pieces_get_their_prefix() -> None:
     found = Dancer(straight, "/mocap/joint").dance(2)
     assert {"/mocap/joint/velocity", "/mocap/qom"} < set(found)
+
+
+class Hand:
+    """A hand that turns about one axis, and a live dancer beside it."""
+
+    def __init__(self, number: int = 0) -> None:
+        self._frame = one_puppet(JOINTS)
+        self._frame.hands, self._frame.live = np.zeros((2, 4), np.float32), np.zeros((JOINTS, 3), np.float32)
+        self._features = Features(
+            FIGURE, OscConfig(dialect="features"), {1: "l Wrist"}, number, has_live=True
+        )
+
+    def at(self, second: float, radians: float, moved: float | None) -> dict[str, NDArray[np.float64]]:
+        self._frame.frame_time = 100.0 + second
+        self._frame.hands[1] = np.cos(radians / 2), 0.0, np.sin(radians / 2), 0.0
+        self._frame.live[:] = 0.0 if moved is None else PLACES + np.array([moved, 0.0, 0.0])
+        messages = [decode(bytes(one))[0] for one in encoded(self._features, self._frame)]
+        return {address: np.array(values, float) for address, values in messages}
+
+
+def test_a_hand_that_turns_steadily_has_its_angular_velocity_and_goes_straight() -> None:
+    """Through half a turn and more, where a quaternion's sign and the shortest way change."""
+    hand = Hand()
+    for tick in range(3 * WINDOW):
+        told = hand.at(tick * STEP_S, 3.0 * tick * STEP_S, None)
+    assert told["/bunraku/hand/l_Wrist/velocity"] == pytest.approx([0.0, 3.0, 0.0], abs=1e-3)
+    assert told["/bunraku/hand/l_Wrist/qom"] == pytest.approx([3.0], abs=1e-3)
+    assert told["/bunraku/hand/l_Wrist/weight_effort"] == pytest.approx([9.0], abs=0.02)
+    assert told["/bunraku/hand/l_Wrist/space_effort"] == pytest.approx([1.0], abs=1e-3)
+    assert np.abs(told["/bunraku/hand/l_Wrist/acceleration"]).max() < 0.3
+    assert not any(address.startswith("/bunraku/live") for address in told), "nobody is there"
+    assert "/bunraku/1/hand/l_Wrist/qom" in Hand(number=1).at(0.0, 0.0, None)
+
+
+def test_a_hand_that_shakes_is_indirect_and_sudden() -> None:
+    steady, shaking = Hand(), Hand()
+    for tick in range(2 * WINDOW):
+        one = steady.at(tick * STEP_S, tick * STEP_S, None)
+        other = shaking.at(tick * STEP_S, 0.1 * np.sin(25.0 * tick * STEP_S), None)
+    for name, least in (("space_effort", 5.0), ("time_effort", 5.0), ("flow_effort", 5.0)):
+        address = f"/bunraku/hand/l_Wrist/{name}"
+        assert other[address][0] > least * one[address][0]
+
+
+def test_a_live_dancer_has_a_puppets_features() -> None:
+    hand = Hand()
+    for tick in range(2 * WINDOW):
+        told = hand.at(tick * STEP_S, 0.0, 0.5 * tick * STEP_S)
+    assert told["/bunraku/live/velocity"] == pytest.approx([0.5, 0.0, 0.0] * JOINTS, abs=1e-3)
+    assert told["/bunraku/live/qom"] == pytest.approx([0.5], abs=1e-3)
+    assert told["/bunraku/live/space_effort"] == pytest.approx([1.0], abs=1e-3)
+    assert told["/mocap/0/qom"] == pytest.approx([0.0])

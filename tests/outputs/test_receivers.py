@@ -67,7 +67,7 @@ def test_each_puppet_goes_out_under_its_own_addresses(skeleton: Skeleton) -> Non
     with ExitStack() as opened:
         peers = [opened.enter_context(OscReceiver(LOOPBACK)) for _ in wanted]
         configs = [OscConfig(port=peer.port, **one) for peer, one in zip(peers, wanted, strict=True)]
-        outputs = OscOutputs(configs, skeleton, puppets=3)
+        outputs = OscOutputs(configs, skeleton, puppets=[()] * 3)
         outputs.send_frame(together(*frames))
         toolbox = take(peers[0], 4)
         assert [said[1] for said in toolbox[:1]] == ["/bunraku/frame"]

@@ -46,7 +46,8 @@ def write_puppets(folder: Path, puppets: list[dict[str, Any]] = PUPPETS, **more:
 
 @pytest.fixture
 def night(tmp_path: Path) -> Night:
-    return Night(write_puppets(tmp_path / "show"), tmp_path / "run")
+    through = [{"space": 0.0} | one for one in PUPPETS]
+    return Night(write_puppets(tmp_path / "show", through), tmp_path / "run")
 
 
 def test_each_puppet_stands_where_the_show_puts_it(night: Night) -> None:

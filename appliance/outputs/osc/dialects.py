@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple, Protocol
 
 from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.osc.ai_toolbox import AiToolbox
@@ -22,10 +23,20 @@ class Encoder(Protocol):
         ...
 
 
-# From a skeleton and a receiver: the dialect for the puppet with this number in its addresses.
-DIALECTS: dict[str, Callable[[Skeleton, OscConfig, int], Encoder]] = {
+class Addressed(NamedTuple):
+    """A puppet as a receiver gets it. number: in its addresses; hands: their joints by their rows in the
+    frame; has_live: a live dancer is told of with this puppet.
+    """
+
+    number: int = 0
+    hands: Mapping[int, str] = MappingProxyType({})
+    has_live: bool = False
+
+
+# From a skeleton, a receiver and a puppet.
+DIALECTS: dict[str, Callable[[Skeleton, OscConfig, Addressed], Encoder]] = {
     "ai-toolbox": lambda skeleton, config, _: AiToolbox(skeleton, config),
-    "features": lambda skeleton, config, _: Features(skeleton, config),
-    "joint": lambda skeleton, _, puppet: Joint(skeleton, puppet),
+    "features": lambda skeleton, config, one: Features(skeleton, config, one.hands, one.number, one.has_live),
+    "joint": lambda skeleton, _, one: Joint(skeleton, one.number),
     "vmc": lambda skeleton, _, __: Vmc(skeleton),
 }
