@@ -179,6 +179,7 @@ class MidiBindings:
                 continue
 
     def _write(self, bindings: Sequence[Binding]) -> None:
+        self._path.parent.mkdir(parents=True, exist_ok=True)
         self._file.write(json.dumps({"bindings": [one._asdict() for one in bindings]}, indent=1).encode())
 
 

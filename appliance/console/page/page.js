@@ -108,6 +108,8 @@ function tonight(value) {
     ["late_ticks", status ? number(status.late + status.skipped) : "–"],
     ["temperature", status && status.temperature_c >= 0 ? `${number(status.temperature_c)} °C` : "–"],
   ];
+  if (value.remote?.state) figures.push(["timecode", `${value.remote.timecode || "–"} · ${words(`code_${value.remote.state}`)}`]);
+  if (value.remote?.hours) figures.push(...house(value.remote.hours));
   const list = byId("figures");
   list.replaceChildren(...figures.map(([key, said]) => {
     const pair = document.createElement("div");
@@ -117,8 +119,6 @@ function tonight(value) {
     pair.append(term, meaning);
     return pair;
   }));
-  if (value.remote?.state) figures.push(["timecode", `${value.remote.timecode || "–"} · ${words(`code_${value.remote.state}`)}`]);
-  if (value.remote?.hours) figures.push(...house(value.remote.hours));
   showMidi(value.remote ?? {});
   showCues(value);
   showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
@@ -179,6 +179,7 @@ initProve();
 initRig();
 initSensorChanges();
 initLogs();
+initMidi();
 initVenue();
 initHelp();
 initUpdate();
