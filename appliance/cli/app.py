@@ -47,6 +47,7 @@ _MODULES = {  # in each a function or a group of the command's name
     "provision": "appliance.cli.sensors.commands",
     "sensors": "appliance.cli.sensors.commands",
     "lights": "appliance.cli.lights_commands",
+    "pair": "appliance.cli.pair",
     "sound": "appliance.cli.sound",
     "remote": "appliance.cli.remote",
     "learn": "appliance.cli.learn",

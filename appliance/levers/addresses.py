@@ -99,6 +99,10 @@ THE_SHOW = (
         arguments="[fixture; left out: the whole rig]",
     ),
     _once("lights", "walk/stop", "/lights/walk/stop", "ends the walk"),
+    _once(
+        *("stage", "pair/back", "/pair/back"),
+        "the other box of the [pair](pair.md) leads from the next frame on; refused while it is not ready",
+    ),
     Address("/ping", Form(), "`/pong` comes back"),
 )
 PLAYBACK = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import select
 import socket
 import time
@@ -20,6 +21,7 @@ _AT_ONCE = 256  # datagrams in one look
 _PARTS_A_TICK = 12  # of a keyframe: it is over within some 5 ticks
 _ASK_KEYFRAME_S = 0.06
 _BUFFER_BYTES = 1 << 20
+REPEATS = 2  # of each message, in the ticks after it
 _TRY_AGAIN_S = 1.0
 _KEYFRAME = 0  # first number of a question for a keyframe; messages are numbered from 1
 
@@ -60,7 +62,7 @@ class Pair:
         self._poll = select.poll()
         self._open_at = float("-inf")
         self._outgoing, self._incoming = Outgoing(), Incoming()
-        self._before: list[bytes] = []  # bodies of the newest message, which leave twice
+        self._before: deque[list[bytes]] = deque(maxlen=REPEATS)  # bodies of the newest messages
         self._to_repeat: deque[int] = deque(maxlen=64)
         self._keyframe = 0, b""
         self._keyframe_parts: deque[int] = deque()
@@ -103,12 +105,12 @@ class Pair:
             self._send(wire.BEAT, now)
 
     def publish(self, message: bytes, now: float) -> None:
-        """The leader: the next message, after the one before once more, and what was asked for."""
-        for body in self._before:
+        """The leader, once a frame has left: the next message, and those before once more."""
+        bodies = [*self._outgoing.put(message)]
+        for body in itertools.chain(bodies, *self._before):
             self._send(wire.MESSAGE, now, body)
-        self._before = [*self._outgoing.put(message)]
-        for body in self._before:
-            self._send(wire.MESSAGE, now, body)
+        self._before.append(bodies)
+        self.beat(now)
 
     def answer(self, now: float) -> None:
         """The leader: what was asked for, a part at a time."""
@@ -168,7 +170,8 @@ class Pair:
 
     def lead_anew(self) -> None:
         """This box has begun to lead: its messages begin anew, and none of before is repeated."""
-        self._outgoing, self._before = Outgoing(), []
+        self._outgoing = Outgoing()
+        self._before.clear()
         self._to_repeat.clear()
         self._keyframe, self.wants_keyframe = (0, b""), False
         self._keyframe_parts.clear()

@@ -11,8 +11,8 @@ SECOND_WAITS_S = 6.0
 UNREADY_WAITS_S = 2.0  # a follower that knows no dance yet gives the first's stage time to restart
 YIELDS_S = 0.15  # a leader that gave back and hears nobody leads again
 SHORT_S = 2.0  # a box that lost the lead so soon after it had taken it waits longer before it takes it again
-MOST_PATIENCE_S = 0.5
-PATIENCE_FOR_S = 30.0
+MOST_PATIENCE_S = 0.3
+PATIENCE_FOR_S = 10.0
 
 
 class Role(IntEnum):
@@ -82,21 +82,25 @@ class Roles:
             self._heard_leader = now
             if self.role is not Role.LEADS:
                 if self.role is not Role.FOLLOWS:
-                    self._become(Role.FOLLOWS, now, "it leads")
+                    self._become(Role.FOLLOWS, now, "that one leads")
                 self.epoch = max(self.epoch, heard.epoch)
             elif (heard.epoch, not self.is_first) > (self.epoch, self.is_first):
                 if now - self._since < SHORT_S:
                     self.patience_s = min(2.0 * self.patience_s, MOST_PATIENCE_S)
                     self._deposed_at = now
-                self._become(Role.FOLLOWS, now, "it took over")
+                self._become(Role.FOLLOWS, now, "that one took over")
                 self.epoch = heard.epoch
         elif heard.role is Role.YIELDS:
             self._heard_leader = now
             self.epoch = max(self.epoch, heard.epoch) if self.role is not Role.LEADS else self.epoch
             if self.role is Role.FOLLOWS and is_ready:
-                self._lead(now, "it gave back")
+                self._lead(now, "that one gave it back")
         elif self.role is not Role.LEADS:
             self.epoch = max(self.epoch, heard.epoch)
+
+    def begin(self, now: float) -> None:
+        """The box is ready to hear: from now on it waits."""
+        self._since = now
 
     def look(self, now: float, is_ready: bool) -> None:
         """What time alone brings; call it at least once a tick."""
@@ -104,14 +108,14 @@ class Roles:
             self.patience_s = self.silent_s
         if self.role is Role.WAITS:
             if now - self._since >= (FIRST_WAITS_S if self.is_first else SECOND_WAITS_S):
-                self._lead(now, "alone")
+                self._lead(now, "no other box leads")
         elif self.role is Role.FOLLOWS:
             silent_s = now - max(self._heard_leader, self._since)
             if silent_s > (self.patience_s if is_ready else max(UNREADY_WAITS_S, self.patience_s)):
                 self.takeovers += 1
-                self._lead(now, "it is silent")
+                self._lead(now, "the other one is silent")
         elif self.role is Role.YIELDS and now - self._since > YIELDS_S:
-            self._lead(now, "nobody took it")
+            self._lead(now, "the other one did not take it")
 
     def give_back(self, now: float) -> bool:
         """Ask the other box to lead, which could; whether it is asked."""

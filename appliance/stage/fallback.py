@@ -138,6 +138,16 @@ FOLDER_LOST = Fallback(
     "it was made again, with what is in force. Find what deletes it: a cleaner of temporary files, or a "
     "person.",
 )
+PAIR_ALONE = Fallback(
+    "pair-alone",
+    "The pair's other box is not heard, or cannot follow: the show goes on, and nobody would take over. "
+    "Switch it on; look at the cable between the boxes.",
+)
+PAIR_TAKEN = Fallback(
+    "pair-taken",
+    "The other box was silent, and this one took over: at most one frame was lost. Look at the other box; "
+    "it follows once it is back, and `bunraku pair back` gives it the lead again.",
+)
 OF_THE_STAGE = (
     *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),
     *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED, FIGURE_REFUSED),
@@ -154,5 +164,7 @@ OF_THE_STAGE = (
         POSE_REFUSED,
         SOURCE_JUMPED,
         FOLDER_LOST,
+        PAIR_ALONE,
+        PAIR_TAKEN,
     ),
 )

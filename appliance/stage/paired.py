@@ -35,9 +35,12 @@ from appliance.stage.tick import Tick
 
 STATE, ROUTES = 16, 17  # kinds of items beside the journal's
 _ITEM = struct.Struct("<BI")
+_PLACE = struct.Struct("<qd")  # tick and deadline before a keyframe
 _EACH_TICKS = 50  # show state and routes, also unchanged
-_AT_ONCE = 5  # ticks that a follower runs before it looks at the network again
-_MOST_BEHIND = 4  # messages, so some 80 ms: from there the dance goes on without a jump that is seen
+_AT_ONCE = 3  # ticks that a follower runs before it looks at the network again
+_REST_S = 0.001  # between as many, when it is far behind: others need the processor too
+_MOST_BEHIND = 25  # messages, so some 0.5 s: a jump that far is better than no dance
+_OWN_STATE_S = 1.0  # a box that lost the lead may take it back from where it stood, until it follows
 _FRESH_LOOK_S = 0.004
 _OTHERS = frozenset(("run", "pid", "show_directory", "python", "numpy", "onnxruntime"))
 TOLERANCE_DEGREES = 0.5  # between processors of two kinds; beyond it the leader's state is fetched again
@@ -105,6 +108,8 @@ class PairedStage:
         self._last = 0, 0.0  # tick, deadline of the newest one that was followed
         self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
         self._role = self.pair.roles.role
+        self._led_until = float("-inf")
+        self._has_begun = False
         self._looked_at = self._beat_at = self._work_s = 0.0
         self.resyncs = 0
         parts.outputs.may_speak = self._may_speak
@@ -136,7 +141,8 @@ class PairedStage:
             self._items.append(_ITEM.pack(ROUTES, len(routes)) + routes)
         self.flush(now)
         if self.pair.wants_keyframe:
-            self.pair.give_keyframe(packed(self._tick))
+            frame = self._tick.frame
+            self.pair.give_keyframe(_PLACE.pack(frame.tick, frame.frame_time) + packed(self._tick))
         self.pair.answer(now)
         self._write_part(now)
 
@@ -158,6 +164,9 @@ class PairedStage:
         """
         self.pair.await_datagram(0.004 if self.pair.is_ready else 0.01)
         now = clock.now()
+        if not self._has_begun:
+            self._has_begun = True
+            self.pair.roles.begin(now)
         self._look(now)
         if self.pair.leads:
             for message in self.pair.take_rest():
@@ -177,7 +186,10 @@ class PairedStage:
             if (message := self.pair.take_message()) is None:
                 break
             self._run(message, clock, pulse)
-        self.pair.is_ready = self._has_danced and self.pair.behind <= _MOST_BEHIND
+        else:
+            time.sleep(_REST_S)
+        follows = self._has_danced and self.pair.behind <= _MOST_BEHIND
+        self.pair.is_ready = follows or now - self._led_until < _OWN_STATE_S
 
     def give_back(self, now: float) -> tuple[bool, str]:
         """Let the other box lead; whether it was asked to, and a sentence."""
@@ -237,11 +249,21 @@ class PairedStage:
         self._role = role = self.pair.roles.role
         if before is role:
             return
+        self._say(self._sentence(role))
         if before is Role.LEADS:
             self._parts.outputs.mute(True)
-            self._has_danced = self.pair.is_ready = False
+            self._has_danced, self._led_until = False, now
             self._hear_leader()
         self._write_part(now)
+
+    def _sentence(self, role: Role) -> str:
+        """What this box does from now on, and why, for people and the journal."""
+        roles, name = self.pair.roles, self._settings.name
+        if role is Role.LEADS:
+            return f"This box leads the pair from now on ({roles.why}; change {roles.epoch})."
+        if role is Role.FOLLOWS:
+            return f"This box follows {name}, its outputs silent ({roles.why}; change {roles.epoch})."
+        return f"This box gives the lead to {name}."
 
     def _may_speak(self) -> bool:
         """Right before a frame leaves: a box that was held up may have lost the lead meanwhile."""
@@ -263,11 +285,12 @@ class PairedStage:
 
     def _restore(self, keyframe: bytes) -> None:
         try:
-            restore(self._tick, keyframe)
+            self._last = _PLACE.unpack_from(keyframe)
+            restore(self._tick, keyframe[_PLACE.size :])
         except DAMAGED as error:
             self._lose_step(f"The leader's state does not fit here ({type(error).__name__}: {error}).")
             return
-        self._has_danced = False
+        self._has_danced, self._led_until = True, float("-inf")
         self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
 
     def _run(self, message: bytes, clock: TickClock, pulse: Callable[[float, float], None]) -> None:

@@ -48,6 +48,7 @@ _ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5
 _FIRST_FRAME_IN_S = 0.001
 _LONGEST_WARM_UP_MS = 3.0  # a network this heavy comes from memory each time: warming it up gains nothing
+GIVE_BACK = "pair/back"
 _HUNG_SLOTS = 3  # skipped before a tick: what sensors sent meanwhile may not all be heard in it
 _LONGEST_TICK_S = 0.1  # held up for longer, a tick knows too little of the sensors to take an order
 _FORGET_PHASE_S = 5.0  # a sensor silent for longer may return at any phase: it is learned again
@@ -215,7 +216,7 @@ class Stage:
             return None  # what the other box would follow is what the recorder notes; it was said why not
         paired = PairedStage(
             *(self.box.pair, self.show, self.parts, self.wearing, self.tick, self.reconciler),
-            *(self.sharing.folder, self.say),
+            *(self.sharing.folder, self._say_and_note),
         )
         self.recorder.tap = paired.note
         return paired
@@ -229,7 +230,6 @@ class Stage:
         paired.follow(clock, self._note_followed)
         now = self._now = clock.now()
         if paired.leads:
-            self._say_and_note(f"This box leads the pair: {paired.told(now)['why']}.")
             if self.recorder is not None:
                 self.recorder.keyframe(self.tick)
             return False  # the reconciler and the orders come with the first tick
@@ -290,6 +290,8 @@ class Stage:
             self.inbox.answer(*answer)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
+        if order.name == GIVE_BACK:
+            return self._give_back(now)
         done, message = carry_out(order, self.parts, self.wearing, now)
         if self.recorder is not None:
             asked = {"name": order.name, "values": order.values, "text": order.text}
@@ -297,6 +299,12 @@ class Stage:
         if message:
             self.say(message)
         return done, message
+
+    def _give_back(self, now: float) -> tuple[bool, str]:
+        """The other box of the pair is to lead; no order of the dance, so no replay carries it out."""
+        if self.paired is None:
+            return False, "This box has no pair. Write `pair:` in its box file."
+        return self.paired.give_back(now)
 
     def _resume(self, now: float) -> None:
         """After a crash or a power cut: go on where the show was, or else with what is declared."""
@@ -312,8 +320,13 @@ class Stage:
         self.batteries.hear(states, now)
         roster = roster_lines(states, wearing.neutral_of, wearing.corrected_of, self.batteries.left_s)
         age_s, locked = self._sensor_age_s(now), self._is_locked
+        if self.paired is not None:
+            self.watch.note_pair(now, self.paired.complaint(now), self.paired.pair.roles.takeovers)
         fallbacks = self.watch.fallbacks.happened(now)
-        self.sharing.publish_health(now, self.health, self.reconciler, age_s, locked, roster, fallbacks)
+        pair = None if self.paired is None else self.paired.told(now)
+        self.sharing.publish_health(
+            *(now, self.health, self.reconciler, age_s, locked, roster, fallbacks, pair)
+        )
 
     def _say_and_note(self, message: str) -> None:
         """Say it on the terminal, and note that in the journal."""

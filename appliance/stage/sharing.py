@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -116,11 +116,12 @@ class Sharing:
         locked: bool,
         sensors: Sequence[Sequence[Any]],
         fallbacks: Sequence[Sequence[Any]] = (),
+        pair: Mapping[str, Any] | None = None,
     ) -> None:
         """Publish how the box is, after the frame has left; docs/outputs.md lists the keys.
 
         `sensors`: a line of the roster for each; `fallbacks`: those that ever happened; `sensor_age_s`: None
-        without a sensor, infinite if unheard.
+        without a sensor, infinite if unheard. `pair`: of a box that is one of two.
         """
         parts = reconciler.parts
         told = health.snapshot(now)
@@ -167,6 +168,8 @@ class Sharing:
             "complaints": parts.complaints if parts.not_let_in else (),
             "fallbacks": fallbacks,
         }
+        if pair is not None:
+            told["pair"] = pair
         parts.outputs.publish_health(told)
 
     def close(self) -> None:

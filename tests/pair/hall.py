@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import os
 import random
 import select
@@ -13,7 +14,6 @@ import subprocess
 import threading
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -31,65 +31,55 @@ def _ip(*words: str) -> None:
     subprocess.run(["ip", *words], check=True, capture_output=True)
 
 
-@dataclass
-class Link:
-    """The way between the boxes: what it does to datagrams. Times in seconds."""
-
-    loss: float = 0.0
-    delay_s: float = 0.0
-    jitter_s: float = 0.0
-    is_cut: bool = False
-    seed: int = 1
-    passed: int = 0
-    lost: int = 0
-    rng: random.Random = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.rng = random.Random(self.seed)
-
-
 class Relay:
-    """Passes the pair's datagrams on, in a thread: lost, late and out of order as its link says."""
+    """The cable between the boxes, a process: loses datagrams, and holds them up. Times in seconds."""
 
     def __init__(self, network: Namespace) -> None:
-        self.link = Link()
+        self._ways = multiprocessing.get_context("fork").Array("d", [0.0] * 4, lock=False)
         with network.entered():
-            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            self._socket.bind((HALL, PAIR_PORT))
-        self._socket.setblocking(False)
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+            taken = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            taken.bind((HALL, PAIR_PORT))
+        self._process = multiprocessing.get_context("fork").Process(
+            target=self._run, args=(taken,), daemon=True
+        )
+        self._process.start()
+        taken.close()
+
+    def set(
+        self, *, loss: float = 0.0, delay_s: float = 0.0, jitter_s: float = 0.0, cut: bool = False
+    ) -> None:
+        """From now on."""
+        self._ways[:] = [loss, delay_s, jitter_s, float(cut)]
 
     def close(self) -> None:
-        self._ended.set()
-        self._thread.join()
-        self._socket.close()
+        self._process.kill()
+        self._process.join()
 
-    def _run(self) -> None:
+    def _run(self, taken: socket.socket) -> None:
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(80))  # a cable is never busy
+        taken.setblocking(False)
+        rng, number = random.Random(1), 0
         waiting: list[tuple[float, int, bytes, str]] = []
-        number = 0
-        while not self._ended.is_set():
+        while True:
             now = time.monotonic()
-            wait_s = min([0.05, *(max(0.0, one[0] - now) for one in waiting)])
-            select.select([self._socket], [], [], wait_s)
-            with contextlib.suppress(BlockingIOError):
+            wait_s = min([0.5, *(max(0.0, one[0] - now) for one in waiting)])
+            select.select([taken], [], [], wait_s)
+            with contextlib.suppress(OSError):
                 while True:
-                    data, (host, _) = self._socket.recvfrom(4096)
-                    link, rng = self.link, self.link.rng
-                    if link.is_cut or rng.random() < link.loss:
-                        link.lost += 1
+                    data, (host, _) = taken.recvfrom(4096)
+                    loss, delay_s, jitter_s, cut = self._ways
+                    if cut or rng.random() < loss:
                         continue
-                    link.passed += 1
                     number += 1
-                    at = time.monotonic() + link.delay_s + link.jitter_s * rng.random()
+                    at = time.monotonic() + delay_s + jitter_s * rng.random()
                     waiting.append((at, number, data, SECOND if host == FIRST else FIRST))
             now = time.monotonic()
             due = sorted(one for one in waiting if one[0] <= now)
             waiting = [one for one in waiting if one[0] > now]
             for _, _, data, to in due:
                 with contextlib.suppress(OSError):
-                    self._socket.sendto(data, (to, PAIR_PORT))
+                    taken.sendto(data, (to, PAIR_PORT))
 
 
 class Seen:
@@ -280,6 +270,7 @@ class Hall:
             "console": None,
             "runtime": "runtime",
             "resume": "never",
+            "realtime": {"priority": 75},  # above a box of another test
             "pair": {
                 "role": "first" if is_first else "second",
                 "peer": [peer],

@@ -40,6 +40,7 @@ CHECKS = (
     box_state.watchdog,
     box_state.clock,
     venue.ports,
+    venue.pair,
     venue.network,
     venue.radios,
     venue.access_point,

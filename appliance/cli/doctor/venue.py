@@ -11,6 +11,7 @@ from serial.tools.list_ports_common import ListPortInfo
 
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
 from appliance.cli.doctor.host_view import HostView, output_of
+from appliance.cli.pair import sentence
 from appliance.outputs.dmx.adapter_wire import AdapterError
 from appliance.outputs.dmx.serial_port import (
     adapters_here,
@@ -46,6 +47,20 @@ def ports(host: HostView) -> Iterator[Finding]:
             )
     if (message := out_of_reach(host.box.sensors)) is not None:
         yield better("sensors by Wi-Fi", message, "If all sensors are on cables, leave it as it is.")
+
+
+def pair(host: HostView) -> Iterator[Finding]:
+    """The other box of a pair is there, and could take over."""
+    if host.box.pair is None or host.stage is None:
+        return
+    told = host.stage.health.get("pair")
+    if not told:
+        yield better("pair", "This stage notes no journal, so no box can follow it.", "Free memory, restart.")
+    elif told["peer"] and told["ready"]:
+        yield ok("pair", sentence(told))
+    else:
+        cure = "Switch the other box on; give it the same show, release and secret; look at the cable."
+        yield better("pair", sentence(told), cure)
 
 
 def _holders(host: HostView, port: int) -> list[tuple[str, bool]]:

@@ -1,0 +1,101 @@
+"""`bunraku pair`: how the two boxes of a pair are, the lead back by hand, and the pair's secret."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from appliance.box.runtime_folder import runtime_folder
+from appliance.cli.options import ThisBoxFile
+from appliance.cli.sensors.control_client import ControlClient, NoBoxError
+from appliance.outputs.frame_reader import FrameReader
+from appliance.release.installed_box import box_here
+from appliance.sensor.wire import KEY_BYTES
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.config_error import NotAskedForError, Problem
+
+pair = typer.Typer(
+    help="Two boxes for one show: the second follows the first, and takes over when it is silent.",
+    no_args_is_help=True,
+)
+_ROLES = {"waits": "waits for the other one", "follows": "follows", "leads": "leads", "yields": "gives back"}
+
+
+@pair.command()
+def status(box: ThisBoxFile = None) -> None:
+    """Tell which box leads, and whether the other one could take over; status 1 when it could not."""
+    config = _paired(box)
+    told = pair_told(config)
+    if told is None:
+        print("No stage dances on this box, so nothing is known of its pair. Start it: bunraku play.")
+        raise typer.Exit(1)
+    print(sentence(told))
+    raise typer.Exit(0 if told["peer"] and told["ready"] else 1)
+
+
+@pair.command()
+def back(box: ThisBoxFile = None) -> None:
+    """Let the other box lead again: at the box that leads, once the other one follows."""
+    try:
+        answer = ControlClient.of(_paired(box)).ask("/pair/back")
+    except NoBoxError as error:
+        print(error)
+        raise typer.Exit(1) from None
+    print(answer.message)
+    raise typer.Exit(0 if answer.done else 1)
+
+
+@pair.command()
+def secret(
+    file: Annotated[Path, typer.Argument(help="Written there; the other box needs the same file.")],
+) -> None:
+    """Draw the pair's secret and write it to a new file that only this user can read."""
+    try:
+        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        print(f"{file} is there already, and stays as it is: both boxes need the same secret.")
+        raise typer.Exit(1) from None
+    with os.fdopen(descriptor, "w") as out:
+        out.write(secrets.token_hex(KEY_BYTES) + "\n")
+    print(f"{file}: name it as `secret:` under `pair:` in the box file, and copy it to the other box.")
+
+
+def pair_told(config: BoxConfig) -> dict[str, Any] | None:
+    """What the stage of this box says of its pair; None where none dances."""
+    reader = FrameReader(runtime_folder(config))
+    try:
+        if not reader.is_alive(time.monotonic()):
+            return None
+        told: dict[str, Any] | None = (reader.health() or {}).get("pair")
+    finally:
+        reader.close()
+    return told
+
+
+def sentence(told: dict[str, Any]) -> str:
+    """For people."""
+    role = _ROLES.get(str(told["role"]), str(told["role"]))
+    other = "second" if told["box"] == "first" else "first"
+    if not told["peer"]:
+        state = f"The {other} one is not heard: nobody would take over."
+    elif not told["same_show"]:
+        state = f"The {other} one has another show or release: it cannot follow."
+    elif not told["ready"]:
+        state = "The one that follows is not ready yet."
+    else:
+        state = "The one that follows could take over at any moment."
+    changes = f"Takeovers by this box: {told['takeovers']}; lead changed {max(0, told['epoch'] - 1)} times."
+    return f"This is the {told['box']} box of the pair, and it {role}. {state} {changes}"
+
+
+def _paired(box: Path | None) -> BoxConfig:
+    config = load_box(box_here(box, None))
+    if config.pair is None:
+        cure = "Write it: docs/pair.md has an example."
+        raise NotAskedForError([Problem(config.file.path, 0, "This box file has no `pair:`.", cure)])
+    return config

@@ -1,0 +1,206 @@
+"""Which box leads: by hand-made cases, and by thousands of random nights in which nothing may go wrong."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass, field
+
+import pytest
+
+from appliance.pair.roles import (
+    FIRST_WAITS_S,
+    MOST_PATIENCE_S,
+    SECOND_WAITS_S,
+    SHORT_S,
+    UNREADY_WAITS_S,
+    YIELDS_S,
+    Heard,
+    Role,
+    Roles,
+)
+
+SILENT_S, TICK_S = 0.042, 0.02
+
+
+def roles(is_first: bool = True, now: float = 0.0) -> Roles:
+    return Roles(is_first, now, SILENT_S)
+
+
+def leading(is_first: bool = True) -> Roles:
+    one = roles(is_first)
+    one.look(SECOND_WAITS_S, False)
+    assert one.leads
+    return one
+
+
+def following(is_first: bool = False, epoch: int = 1, now: float = 0.0) -> Roles:
+    one = roles(is_first, now)
+    one.hear(Heard(Role.LEADS, epoch, True), now, True)
+    assert one.role is Role.FOLLOWS
+    return one
+
+
+def test_the_first_box_leads_soon_and_the_second_one_leaves_it_time() -> None:
+    first, second = roles(True), roles(False)
+    for one in (first, second):
+        one.look(FIRST_WAITS_S, False)
+    assert first.leads and not second.leads
+    second.look(SECOND_WAITS_S, False)
+    assert second.leads
+
+
+def test_a_box_that_comes_follows_the_one_that_leads() -> None:
+    first = roles(True)
+    first.hear(Heard(Role.LEADS, 7, True), 0.1, False)
+    first.look(10.0 - 9.0, False)
+    assert first.role is Role.FOLLOWS and first.epoch == 7
+
+
+@pytest.mark.parametrize("ready", [True, False])
+def test_a_follower_takes_over_once_the_leader_is_silent(ready: bool) -> None:
+    second = following()
+    patience = SILENT_S if ready else UNREADY_WAITS_S
+    second.look(patience - 0.001, ready)
+    assert not second.leads
+    second.look(patience + 0.001, ready)
+    assert second.leads and second.epoch == 2 and second.takeovers == 1
+
+
+def test_of_two_leaders_the_one_that_took_over_last_goes_on() -> None:
+    first, second = leading(), following(epoch=1)
+    second.look(1.0, True)
+    first.hear(Heard(second.role, second.epoch, True), 7.0, False)
+    second.hear(Heard(Role.LEADS, 1, True), 7.0, False)
+    assert second.leads and first.role is Role.FOLLOWS and first.epoch == 2
+
+
+def test_of_two_leaders_at_the_start_the_first_box_goes_on() -> None:
+    first, second = leading(True), leading(False)
+    assert first.epoch == second.epoch
+    first.hear(Heard(Role.LEADS, second.epoch, True), 7.0, True)
+    second.hear(Heard(Role.LEADS, first.epoch, True), 7.0, True)
+    assert first.leads and not second.leads
+
+
+def test_the_lead_comes_back_by_hand_only() -> None:
+    first, second = following(True, epoch=5), leading(False)
+    second.epoch = 5
+    for tick in range(500):  # the first box is there again, and stays a follower
+        now = 10.0 + TICK_S * tick
+        second.hear(Heard(first.role, first.epoch, True), now, True)
+        first.hear(Heard(second.role, second.epoch, True), now, True)
+        first.look(now, True), second.look(now, True)
+    assert second.leads and first.role is Role.FOLLOWS
+    assert second.give_back(20.0) and not second.leads
+    first.hear(Heard(second.role, second.epoch, True), 20.001, True)
+    second.hear(Heard(first.role, first.epoch, True), 20.002, True)
+    assert first.leads and second.role is Role.FOLLOWS
+
+
+def test_nothing_is_given_to_a_box_that_is_away_or_not_ready() -> None:
+    one = leading()
+    assert not one.give_back(7.0)
+    one.hear(Heard(Role.FOLLOWS, 1, False), 7.0, True)
+    assert not one.give_back(7.1)
+    one.hear(Heard(Role.FOLLOWS, 1, True), 7.0, True)
+    assert not one.give_back(9.0)
+
+
+def test_a_lead_that_nobody_takes_is_taken_up_again() -> None:
+    one = leading()
+    one.hear(Heard(Role.FOLLOWS, 1, True), 7.0, True)
+    assert one.give_back(7.1)
+    one.look(7.1 + YIELDS_S + 0.001, True)
+    assert one.leads
+
+
+def test_a_lead_that_was_short_makes_the_next_takeover_slower() -> None:
+    one = following()
+    one.look(1.0, True)
+    one.hear(Heard(Role.LEADS, 9, True), 1.0 + SHORT_S / 2, True)
+    assert one.role is Role.FOLLOWS and one.patience_s == 2 * SILENT_S
+    one.look(60.0, False)
+    assert one.patience_s == SILENT_S
+
+
+@dataclass
+class Night:
+    """Two boxes and a way between them that loses, holds up and breaks; times are invented."""
+
+    rng: random.Random
+    now: float = 0.0
+    boxes: list[Roles | None] = field(default_factory=lambda: [roles(True), roles(False)])
+    stopped_until: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    cut_until: float = 0.0
+    loss: float = 0.0
+    on_the_way: list[tuple[float, int, Heard]] = field(default_factory=list)
+    both_since: float | None = None
+    longest_both_s: float = 0.0
+    changes: int = 0
+    spoken: float = 0.0  # when a box last spoke
+
+    def step(self) -> None:
+        """Five milliseconds."""
+        self.now += 0.005
+        due = [one for one in self.on_the_way if one[0] <= self.now]
+        self.on_the_way = [one for one in self.on_the_way if one[0] > self.now]
+        for _, to, heard in due:
+            if (box := self.boxes[to]) is not None and self.stopped_until[to] <= self.now:
+                box.hear(heard, self.now, True)
+        speaking = 0
+        for number, box in enumerate(self.boxes):
+            if box is None or self.stopped_until[number] > self.now:
+                continue
+            before = box.leads
+            box.look(self.now, True)
+            self.changes += box.leads != before
+            speaking += box.leads
+            if round(self.now / 0.005) % 4 == 0 and self.now >= self.cut_until:
+                for _ in range(2):
+                    if self.rng.random() >= self.loss:
+                        at = self.now + self.rng.uniform(0.0, 0.006)
+                        self.on_the_way.append((at, 1 - number, Heard(box.role, box.epoch, True)))
+        if speaking:
+            self.spoken = self.now
+        together = speaking > 1 and self.now >= self.cut_until
+        self.both_since = (self.both_since or self.now) if together else None
+        if self.both_since is not None:
+            self.longest_both_s = max(self.longest_both_s, self.now - self.both_since)
+
+    def fault(self) -> None:
+        """Anything."""
+        kind, one = self.rng.randrange(6), self.rng.randrange(2)
+        if kind == 0:
+            self.boxes[one] = None
+        elif kind == 1:
+            self.stopped_until[one] = self.now + self.rng.uniform(0.0, 0.6)
+        elif kind == 2:
+            self.cut_until = self.now + self.rng.uniform(0.0, 0.4)
+        elif kind == 3:
+            self.loss = self.rng.choice((0.0, 0.05, 0.2))
+        elif self.boxes[one] is None:
+            self.boxes[one] = Roles(one == 0, self.now, SILENT_S)
+        elif kind == 4 and (box := self.boxes[one]) is not None:
+            box.give_back(self.now)
+
+
+def test_in_thousands_of_random_nights_no_two_speak_together_and_one_always_comes_back() -> None:
+    for seed in range(120):
+        night = Night(random.Random(seed))
+        for _ in range(12):
+            night.fault()
+            for _ in range(night.rng.randrange(4, 25)):
+                night.step()
+        night.loss, night.cut_until, night.stopped_until = 0.0, 0.0, [0.0, 0.0]
+        night.boxes = [
+            box or Roles(number == 0, night.now, SILENT_S) for number, box in enumerate(night.boxes)
+        ]
+        for _ in range(100):
+            night.step()
+        assert night.longest_both_s <= 0.1, f"night {seed}: two boxes spoke for {night.longest_both_s:.3f} s"
+        changes = night.changes
+        for _ in range(60):
+            night.step()
+            assert sum(box is not None and box.leads for box in night.boxes) == 1, f"night {seed}"
+        assert night.changes == changes, f"night {seed}: the lead flaps"
+        assert all(SILENT_S <= box.patience_s <= MOST_PATIENCE_S for box in night.boxes if box is not None)
