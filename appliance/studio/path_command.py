@@ -1,4 +1,4 @@
-"""`bunraku path` and `bunraku map`: the space of a dancer's poses. The app joins the studio's commands."""
+"""`bunraku path`, `map` and `explore`: the space of a dancer's poses. The app joins the studio's commands."""
 
 from __future__ import annotations
 
@@ -122,3 +122,63 @@ def map_(
         from appliance.studio.pose_space.pose_map import MapOptions, run
 
         run(MapOptions(model, out, tuple(files), show, recordings, seconds, reading))
+
+
+@app.command()
+@reading_options
+def explore(
+    context: typer.Context,
+    out: Annotated[
+        Path, typer.Option(help="The dance, a BVH file; figures, pictures and map lie beside it.")
+    ],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            default_factory=list,
+            help="BVH recordings of rehearsals or performances that count as visited, too.",
+            show_default="none",
+        ),
+    ],
+    model: Model = None,
+    show: OfShow = None,
+    phrase: Annotated[
+        Path | None,
+        typer.Option(help="BVH whose movement is danced there.", show_default="the phrase of --show"),
+    ] = None,
+    count: Annotated[int, typer.Option(min=1, max=12, help="How many regions.")] = 5,
+    seconds: Annotated[float, typer.Option(min=6.0, max=600.0, help="How long the dance is.")] = 30.0,
+    start: Annotated[float, typer.Option(min=0.0, help="Second of the phrase to begin at.")] = 0.0,
+    seed: Annotated[int, typer.Option(help="Another seed looks elsewhere.")] = 1,
+    recordings: Moved = None,
+    *,
+    reading: ReadingOptions,
+) -> None:
+    """Find where a dancer could go and never went, and dance there.
+
+    Known poses are mixed, in the latents and limb by limb. Regions that no recording comes near to, although
+    each limb was so before, are listed, the largest first. The dance begins and ends as the phrase, and
+    carries the phrase's movement through them.
+    """
+    require_either(context, model, show)
+    if phrase is None and show is None:
+        raise typer.BadParameter(
+            "Give the --phrase whose movement is danced there, or --show for its phrase."
+        )
+    with clear_errors("explore"):
+        from appliance.studio.pose_space.explore import ExploreOptions, run
+
+        run(
+            ExploreOptions(
+                model=model,
+                out=out,
+                seen=tuple(files),
+                show=show,
+                phrase=phrase,
+                recordings=recordings,
+                count=count,
+                seconds=seconds,
+                start=start,
+                seed=seed,
+                reading=reading,
+            )
+        )

@@ -29,7 +29,7 @@ from appliance.studio.export import release
 from appliance.studio.granular import walk
 from appliance.studio.improviser import own_output
 from appliance.studio.improviser.footing import Progress, plant_feet
-from appliance.studio.pose_space import path
+from appliance.studio.pose_space import explore, path
 from appliance.studio.variations import sweep, vary
 from tests.studio.tiny import write_recordings
 
@@ -53,7 +53,7 @@ def _small_answers() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(answer_picture, "COLUMNS", 2)
         patch.setattr(own_answer, "MOST_TICKS", 150)
-        for module in (pictures, sweep, vary, path, own_output, strips):
+        for module in (pictures, sweep, vary, path, explore, own_output, strips):
             patch.setattr(module, "COLUMNS", 2)
         patch.setattr(figure, "SUPERSAMPLE", 1)
         for module in (standing_dance, walk):

@@ -68,9 +68,11 @@ class Ground:
         low, high = np.percentile(self.known[:, :2], [EDGE, 100 - EDGE], axis=0)
         return low, high
 
-    def draw(self, file: Path, paths: Mapping[str, Array]) -> tuple[float, float, float, float]:
-        """Paths over the map's first two directions; returns its left, right, bottom and top."""
-        return map_pictures.draw_map(file, self.known, paths, self._figures(), NOBODY)
+    def draw(
+        self, file: Path, paths: Mapping[str, Array], marks: Array | None = None
+    ) -> tuple[float, float, float, float]:
+        """Paths and numbered marks over the map's first two directions; its left, right, bottom and top."""
+        return map_pictures.draw_map(file, self.known, paths, self._figures(), NOBODY, marks)
 
     def _figures(self) -> list[tuple[Array, Array, Sequence[tuple[int, int]]]]:
         """On a grid: place (2,), the figure that is usual there (J, 3) in metres, its bones."""

@@ -39,10 +39,12 @@ def draw_map(
     paths: Mapping[str, Array],
     figures: Sequence[tuple[Array, Array, Sequence[tuple[int, int]]]],
     nobody: float,
+    marks: Array | None = None,
 ) -> tuple[float, float, float, float]:
     """All recorded poses as a cloud, figures that are usual at a place, recordings as lines.
 
     Faint figures: nobody has been there: farther than `nobody` of the map's spread from all recorded poses.
+    marks (N, 2 or more): numbered places.
     Returns the frame: left, right, bottom, top in the map's units; the picture fills it.
     """
     places = np.array([place for place, _, _ in figures])
@@ -69,6 +71,10 @@ def draw_map(
     for number, points in enumerate(paths.values()):
         colour = COLOURS[number % len(COLOURS)]
         axes.plot(*points[:, :2].T, color=colour, linewidth=0.9, alpha=0.6, zorder=2)
+    for number, place in enumerate(() if marks is None else marks[:, :2], 1):
+        where = np.clip(place, (left, bottom), (right, top))
+        axes.plot(*where, "o", markersize=20, color=BACKDROP, markeredgecolor=INK, zorder=5)
+        axes.text(*where, str(number), color=INK, fontsize=11, ha="center", va="center", zorder=6)
     _name(axes, list(paths))
     save(figure, path)
     return left, right, bottom, top
