@@ -37,8 +37,7 @@ DEBIAN_FOR_BOOT := mmdebstrap:mmdebstrap systemd-container:systemd-nspawn squash
     e2fsprogs:mke2fs openssh-client:ssh-keygen
 # Its disk image, and a whole machine in software that starts it.
 DEBIAN_FOR_IMAGE := $(DEBIAN_FOR_BOOT) mtools:mcopy dosfstools:mkfs.vfat fdisk:sfdisk \
-    $(if $(filter arm64,$(ARCH)),kmod:depmod cpio:cpio xz-utils:xz zstd:zstd qemu-user-static:qemu-aarch64-static \
-        gcc-aarch64-linux-gnu:aarch64-linux-gnu-gcc g++-aarch64-linux-gnu:aarch64-linux-gnu-g++, \
+    $(if $(filter arm64,$(ARCH)),kmod:depmod cpio:cpio xz-utils:xz zstd:zstd qemu-user-static:qemu-aarch64-static, \
         grub-common:grub-mkimage grub-pc-bin:/usr/lib/grub/i386-pc/boot.img \
         grub-efi-amd64-bin:/usr/lib/grub/x86_64-efi/linux.mod)
 DEBIAN_FOR_VM := $(DEBIAN_FOR_IMAGE) $(if $(filter arm64,$(ARCH)),qemu-system-arm:qemu-system-aarch64, \

@@ -55,8 +55,7 @@ def bill(arch: str, debian: str = "", root: Path = ROOT, of: Path | None = None)
     project = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["project"]
     version = project["version"]
     release = root / "deploy" / "release"
-    locks = [release / f"requirements-{arch}.lock", release / f"sources-{arch}.lock"]
-    components = [one for lock in locks if lock.is_file() for one in python_packages(lock.read_text("utf-8"))]
+    components = python_packages((release / f"requirements-{arch}.lock").read_text("utf-8"))
     components.append(_component("bunraku-sim", version, "pkg:pypi/bunraku-sim", licence=_LICENCE))
     components += firmware_parts((root / "firmware" / "wearable" / "sketch.yaml").read_text("utf-8"))
     components += debian_packages(debian, arch)

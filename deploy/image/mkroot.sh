@@ -129,7 +129,8 @@ settle_unpacked() {
     for name in NetworkManager avahi-daemon chrony wpa_supplicant; do
         systemctl --root="$root" enable "$name.service" >/dev/null 2>&1 || fail "$name.service cannot be enabled."
     done
-    target_python -m compileall -q -s "$root" -p / --invalidation-mode unchecked-hash "$root/usr/lib/python$PYTHON"
+    target_python -m compileall -q -s "$root" -p / --invalidation-mode unchecked-hash "$root/usr/lib/python$PYTHON" \
+        "$root/usr/lib/python3"
 }
 
 debian_kept() {

@@ -13,8 +13,6 @@ machine() {
     esac
 }
 
-uv_platform() { echo "$(machine "$1")-unknown-linux-gnu"; }
-
 # A separate environment in build/release, so that a release does not depend on the developer's.
 prepare_tools() {
     tools=${checkout:?}/build/release/tools
