@@ -96,3 +96,17 @@ def test_what_moves_fast_is_blurred_and_what_stands_is_not(
     if style == "plaster":
         changed = np.abs(moving - held_still).max(axis=2)
         assert (changed[240:344] > 12).sum() > 40, "the foot is as sharp as if it stood"
+
+
+def test_a_fast_limb_of_ink_runs_dry_and_the_rest_stays_as_it_is(
+    gl: moderngl.Context, looks: Renderer, dance: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The null product: the same picture with a shutter that is open for no time."""
+    moment = moment_of(dance, FAST_S)
+    smeared = picture(gl, looks, moment, "ink", detail=SAMPLED)
+    monkeypatch.setattr(Scene, "shutter", lambda scene, wall: [0.0])
+    sharp = picture(gl, looks, moment, "ink", detail=SAMPLED)
+    changed = np.abs(smeared - sharp).max(axis=2)
+    assert (changed > 25).sum() > 40
+    dark = sharp.max(axis=2) < 90
+    assert changed[dark].mean() < 6, "a trunk that hardly moves"

@@ -14,6 +14,7 @@ uniform vec3 accent_colour;
 uniform vec3 air_colour;
 uniform vec3 held_colour;
 uniform float fog;
+uniform float dry;  // 1: a fast limb is the mean of several moments, and its brush runs dry there
 uniform vec2 texel;
 #include wall
 
@@ -46,6 +47,8 @@ void main() {
         float body = smoothstep(0.36 - edge, 0.36 + edge, full);
         float dried = 1.0 - smoothstep(0.45, 0.8, wet.r);
         float covers = clamp(body * (ink.r + 0.15 * dried + 0.40 * rough + 0.04), 0.0, 1.0);
+        float bristles = smoothstep(0.30, 0.62, texture(noise, vec2(uv.x * aspect, uv.y) * vec2(3.0, 9.0)).b + 0.5 * rough);
+        covers = max(covers, dry * (1.0 - body) * smoothstep(0.03, 0.40, ink.r) * bristles * 0.85);
         float echo = smoothstep(0.02, 0.7, 0.55 * wet.g + 0.45 * ink.g) * (0.68 + 0.75 * rough);
         float stroke = ink.b * (0.85 + 0.6 * rough) * (1.0 - 0.6 * covers);
         shown = mix(shown, light_colour, fog * (0.35 + 0.8 * drinks) * wet.r * (1.0 - body));

@@ -59,11 +59,19 @@ class Ink:
             **easel.behind(look),
             "noise": easel.noise,
         }
-        picture.start()
-        picture.keep("ra")
-        easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         easel.weigh(pressure)
-        easel.draw_figures(self._figure, inputs | {"row": 0, "level": 1.0, "hollow": 1.0, "swell": SWELL})
+        moments = scene.shutter(wall)
+
+        def draw(back: float) -> None:
+            picture.start()
+            picture.keep("ra")
+            easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+            own = {"row": 0, "level": 1.0, "hollow": 1.0, "swell": SWELL, "back": back}
+            easel.draw_figures(self._figure, inputs | own)
+            picture.keep("rgba")
+            picture.finish()
+
+        picture = easel.expose(picture, moments, draw)
         lay = None
         if look.trail_s > 0:
             inputs |= self._brush(scene, look.trail_s)
@@ -89,6 +97,7 @@ class Ink:
             "texel": (1 / picture.size[0], 1 / picture.size[1]),
             "reach": (PULL / scene.aspect, PULL),
             "fog": look.fog,
+            "dry": float(len(moments) > 1),
         }
         box = scene.box(ROWS, SPILL) if look.trail_s > 0 else scene.box(margin=SPILL)
         easel.lay("ink_finish", wall, opacity, inputs, box)
