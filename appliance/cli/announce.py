@@ -1,6 +1,6 @@
 """Announces the page in the network, by DNS-SD: `python -m appliance.cli.announce --chosen FILE` for avahi.
 
-Writes avahi's file of services: `_bunraku._tcp` for whoever lists boxes, `_http._tcp` (`_https._tcp`) for
+Writes avahi's file of services: `_bunraku._tcp` for lists of boxes, `_http._tcp` (`_https._tcp`) for
 browsers. Where the box file keeps the page on this machine, there is no such file.
 """
 
@@ -35,7 +35,7 @@ _SERVICE = """
 
 
 def services(box: BoxConfig) -> str:
-    """avahi's file; empty where the page is for this machine alone, or on a port that nobody chose."""
+    """avahi's file; empty if only this machine can open the page, or if its port is any free one."""
     console = box.console
     if console is None or not console.port or is_loopback(console.host):
         return ""

@@ -43,6 +43,7 @@ while [ $# -gt 0 ]; do
     esac
 done
 [ -n "$out" ] || { usage >&2; exit 2; }
+out=$(realpath -m "$out") # dpkg's scripts do not find a relative one
 [ "$(id -u)" = 0 ] || fail "needs root: it makes device nodes and installs packages into a new root."
 command -v mmdebstrap >/dev/null || fail "mmdebstrap is missing. Install it: apt-get install mmdebstrap"
 case $arch in
