@@ -30,6 +30,7 @@ from appliance.console.certificate import certificate_in, https_context
 from appliance.console.desk import Desk
 from appliance.console.devices import Devices
 from appliance.console.fallback import OF_THE_PAGE, note_crowd
+from appliance.console.fleet import Fleet
 from appliance.console.guard import Guard
 from appliance.console.hands import Hands
 from appliance.console.happened import Happened
@@ -96,7 +97,7 @@ async def _serve(settings: Settings) -> int:
     phones = Phones(guard, door, settings.phones, folder, fallbacks)
     others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes(), *phones.routes()]
     update = Update(guard, folder, settings.is_installed, Proving(folder).show_goes)
-    others += Midi(guard, stage, box).routes()
+    others += [*Midi(guard, stage, box).routes(), *Fleet(guard).routes()]
     others += [*night.routes(), *helping.routes(), *update.routes()]
     others += certificate.routes(Path(settings.devices).parent)
     named = ("--box", settings.box["box"]) if "box" in settings.box else ()
