@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from appliance.dancer.grounding import Grounding, sole_positions, survey
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.pose import quaternion
 from appliance.pose.point_axes import PointAxes
-from appliance.pose.point_fit import TRUNK, PointFit
+from appliance.pose.point_fit import TRUNK, PointFit, rest_points
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.roles import missing_roles
@@ -71,7 +71,7 @@ def dance_of(
     fit = PointFit(skeleton)
     if read.is_flat:
         points, path = lifted(parts, points, skeleton)
-    turns, points = _turned(read, points, fit)
+    turns, points = _turned(read, points, fit, rest_points(skeleton))
     poses = _poses(skeleton, turns)
     roots = _roots(skeleton, poses, parts, points, path, fit)
     dance = Recording(skeleton, quaternion.continuous(poses), roots, FPS)
@@ -86,7 +86,9 @@ def _require_trunk(source: Path, parts: Sequence[str], points: Array) -> None:
         raise ExchangeError(source, f"Never seen: {', '.join(never)}. The camera has to see the trunk.")
 
 
-def _turned(read: LandmarksFile, points: Array, fit: PointFit) -> tuple[dict[str, Array], Array]:
+def _turned(
+    read: LandmarksFile, points: Array, fit: PointFit, rest: Mapping[str, Vector]
+) -> tuple[dict[str, Array], Array]:
     """Each bone's turns (N, 4) in the room, not numbers where nothing says it; and the points with y up."""
     parts = read.layout.parts
     axes = PointAxes(read.layout.is_y_down and not read.is_flat)
@@ -100,6 +102,7 @@ def _turned(read: LandmarksFile, points: Array, fit: PointFit) -> tuple[dict[str
                 if parts[place] in found:
                     upright[frame, place] = found[parts[place]]
     upright = _levelled(parts, upright)
+    _set_feet_flat(parts, upright, rest)
     turns = {bone: np.full((len(points), 4), np.nan) for bone in _BONES.values()}
     fit.begin()
     for frame, row in enumerate(upright.tolist()):
@@ -150,6 +153,19 @@ def _levelled(parts: Sequence[str], points: Array) -> Array:
     return quaternion.rotate(np.broadcast_to(turn, (*points.shape[:2], 4)), points)
 
 
+def _set_feet_flat(parts: Sequence[str], points: Array, rest: Mapping[str, Vector]) -> None:
+    """Toes raised or lowered so that feet that carry slope as the figure's do: networks have them steeper."""
+    sides = [side for side in ("left", "right") if f"{side} toe" in parts]
+    ankles = {side: points[:, parts.index(f"{side} ankle")] for side in sides}
+    for side in sides:
+        toes = points[:, parts.index(f"{side} toe")]
+        low = ankles[side][:, 1] <= np.min([ankles[one][:, 1] for one in sides], axis=0)
+        long = np.linalg.norm(toes - ankles[side], axis=-1)
+        figure = np.subtract(rest[f"{side} toe"], rest[f"{side} ankle"])
+        slope = np.median(((toes - ankles[side])[:, 1] / np.maximum(long, 1e-9))[low]) if low.any() else 0.0
+        toes[:, 1] += (figure[1] / np.linalg.norm(figure) - slope) * long
+
+
 def _poses(skeleton: Skeleton, turns: dict[str, Array]) -> Array:
     """(N, J, 4) local rotations; a joint that no bone turns goes with the one above it."""
     rest = humanoid_rest(skeleton)
@@ -193,7 +209,8 @@ def _roots(
         roots[:, [0, 2]] = _carried(soles)
     if path is not None:
         roots[:, 0] = path
-    return roots - np.array([roots[0, 0], 0.0, roots[0, 2]])
+    roots[:, [0, 2]] -= roots[0, [0, 2]]
+    return roots
 
 
 def _named(parts: Sequence[str], row: list[list[float]]) -> dict[str, Vector]:

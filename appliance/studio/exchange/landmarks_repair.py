@@ -44,21 +44,21 @@ def repaired(
 ) -> Repaired:
     """Landmarks (N, P, 3) of these parts at uneven times -> at an even rate.
 
-    seen (N, P): 0..1. Gaps up to longest_gap_s are crossed in straight lines, and longer ones too, but they
-    are listed.
+    seen (N, P): 0..1. Gaps up to longest_gap_s are crossed in straight lines. In longer ones a landmark is
+    where the network guessed it, else it is crossed too; they are listed.
     """
-    found = points.copy()
+    found, rate = points.copy(), 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else FPS
     trunk = [part in TRUNK for part in parts]
     found[(seen < LEAST_SEEN) & ~np.array(trunk)] = np.nan
+    hidden = [one for one in gaps_of(found) if (one.last - one.first + 1) / rate > longest_gap_s]
+    for gap in hidden:  # a network's guess for long is better than nothing
+        found[gap.first : gap.last + 1, gap.joint] = points[gap.first : gap.last + 1, gap.joint]
     size = _height(found)
     found, swapped = _sides_put_back(parts, found, size)
     leaps = _leaps(found, size)
     found[leaps] = np.nan
-    rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else FPS
     gaps = [
-        (gap.joint, float(times[gap.first]), float(times[gap.last]))
-        for gap in gaps_of(found)
-        if (gap.last - gap.first + 1) / rate > longest_gap_s and parts[gap.joint]
+        (gap.joint, float(times[gap.first]), float(times[gap.last])) for gap in hidden if parts[gap.joint]
     ]
     even = evenly(found, times)
     if smooths:
