@@ -42,6 +42,11 @@ class AnswerQueue(Generic[Asked]):
             queue = self._waiting or self._new
             del queue[next(iter(queue))]
 
+    def clear(self) -> None:
+        """Owe nothing."""
+        self._new.clear()
+        self._waiting.clear()
+
     def take_due(self, now: float) -> Iterator[tuple[int, Asked]]:
         """Remove and give the questions to answer now, each with its boot nonce."""
         turns = [(boot_nonce, self._new) for boot_nonce in islice(self._new, A_TICK)]

@@ -141,6 +141,12 @@ class SensorLink:
                     {route[1] for route in routes if route is not None and route[0] is intake}
                 )
 
+    def overhear(self, now: float) -> None:
+        """Another box has the sensors: what they send here is neither used nor answered."""
+        self.drain(now)
+        for sensor in self._by_device.values():
+            sensor.pairing.owe_nothing()
+
     def heard_at(self, now: float) -> dict[str, tuple[int, str, int]]:
         """Of each linked wearable in the network: its power-on, and its address and port."""
         found = {}

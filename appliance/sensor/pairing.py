@@ -148,6 +148,11 @@ class Pairing:
         """Ask the sensor of an unknown session for a hello."""
         self._uncalled.put(boot_nonce, route)
 
+    def owe_nothing(self) -> None:
+        """Another box answers."""
+        self._unanswered.clear()
+        self._uncalled.clear()
+
     # Packets to the sensor.
 
     def due_packets(

@@ -18,6 +18,7 @@ from appliance.box.orders import Order
 from appliance.box.snapshot import packed, restore, shift_times
 from appliance.levers import show_state as states
 from appliance.levers.show_state import ShowState
+from appliance.pair.carrier import Carrier
 from appliance.pair.pair import Pair, PairSettings
 from appliance.pair.part import BoxPart, PartWriter
 from appliance.pair.roles import Role
@@ -40,6 +41,7 @@ _EACH_TICKS = 50  # show state and routes, also unchanged
 _AT_ONCE = 3  # ticks that a follower runs before it looks at the network again
 _REST_S = 0.001  # between as many, when it is far behind: others need the processor too
 _MOST_BEHIND = 25  # messages, so some 0.5 s: a jump that far is better than no dance
+_CALL_EACH_S, _CALLS_FOR_S = 0.25, 3.0  # after that a wearable greets by itself
 _OWN_STATE_S = 1.0  # a box that lost the lead may take it back from where it stood, until it follows
 _FRESH_LOOK_S = 0.004
 _OTHERS = frozenset(("run", "pid", "show_directory", "python", "numpy", "onnxruntime"))
@@ -99,6 +101,7 @@ class PairedStage:
         self._own_latest_start_s = tick.latest_start_s
         self._own_most = [one.iterations.most for one in parts.puppets]
         self._part = PartWriter(folder)
+        self._carrier = Carrier(config.peer)
         self._items: list[bytes] = []
         self._sent_state: ShowState | None = None
         self._state_due = 0
@@ -108,7 +111,7 @@ class PairedStage:
         self._last = 0, 0.0  # tick, deadline of the newest one that was followed
         self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
         self._role = self.pair.roles.role
-        self._led_until = float("-inf")
+        self._led_until = self._took_over_at = self._call_at = float("-inf")
         self._has_begun = False
         self._looked_at = self._beat_at = self._work_s = 0.0
         self.resyncs = 0
@@ -140,6 +143,7 @@ class PairedStage:
             routes = json.dumps(self._own_link.heard_at(now)).encode()
             self._items.append(_ITEM.pack(ROUTES, len(routes)) + routes)
         self.flush(now)
+        self._call_sensors(now)
         if self.pair.wants_keyframe:
             frame = self._tick.frame
             self.pair.give_keyframe(_PLACE.pack(frame.tick, frame.frame_time) + packed(self._tick))
@@ -176,6 +180,7 @@ class PairedStage:
         if now - self._beat_at >= TICK_S:
             self._beat_at = now
             self.pair.beat(now)
+            self._own_link.overhear(now)
             self._write_part(now)
         self.pair.ask(now)
         if not self.pair.same_show:
@@ -272,6 +277,8 @@ class PairedStage:
         now = time.monotonic()
         if now - self._looked_at > _FRESH_LOOK_S:
             self._look(now)
+        if not self.pair.roles.peer_lives(now) and self._carrier.holds_silent(now):
+            return False
         return self.pair.leads
 
     def _write_part(self, now: float) -> None:
@@ -337,6 +344,17 @@ class PairedStage:
         settings = {name: replace(one, since=one.since + ahead_s) for name, one in state.settings.items()}
         self._part.write_state(replace(state, settings=settings))
 
+    def _call_sensors(self, now: float) -> None:
+        """Ask the wearables that the other box had to greet this one, until they do: they go on streaming
+        meanwhile, to nobody.
+        """
+        if now < self._call_at or now - self._took_over_at > _CALLS_FOR_S:
+            return
+        self._call_at = now + _CALL_EACH_S
+        for name, (boot_nonce, host, port) in self._routes.items():
+            if (self._own_link.newest_arrival(name) or float("-inf")) < self._took_over_at:
+                self._own_link.call(name, boot_nonce, (host, port))
+
     def _take_over(self, clock: TickClock) -> None:
         """From the next slot on this box speaks."""
         parts, ahead_s = self._parts, self.pair.offset.seconds
@@ -351,8 +369,8 @@ class PairedStage:
             tick, deadline = self._last
             clock.go_on(tick, deadline + ahead_s)
             now = clock.now()
-            for name, (boot_nonce, host, port) in self._routes.items():
-                self._own_link.call(name, boot_nonce, (host, port))
+            self._took_over_at = self._call_at = now
+            self._call_sensors(now)
             self._own_link.send_due(now)
             self._reconciler.go_on_after(self._applied, now)
         else:

@@ -119,8 +119,8 @@ def lost_in(hall: Hall, since: float, until: float) -> dict[str, float]:
         changes = [b[0] - a[0] for a, b in itertools.pairwise(sacn) if a[1] != b[1]]
         found["dmx_taken_ms"] = 1000.0 * max([0.0, *changes])  # unchanged levels repeat once in 0.85 s
         found["dmx_overlap_ms"] = _overlap([one[:2] for one in sacn])
-    jump = _jump([one for one in list(seen.poses) if since <= one[0] <= until])
-    found["jump_degrees"] = jump
+    poses = [one for one in list(seen.poses) if since <= one[0] <= until]
+    found["jump_degrees"] = _jump(poses, int(found["osc_lost"]))
     return found
 
 
@@ -129,7 +129,7 @@ def _gap(times: list[float]) -> float:
 
 
 def _overlap(arrivals: list[tuple[float, str]]) -> float:
-    """Longest time in which two boxes spoke in turn, ms: from a change of the box to one back within 0.15 s."""
+    """Longest time in which two boxes spoke in turn, ms: from a change of the box to one back in 0.15 s."""
     changes = [at for (_, before), (at, box) in itertools.pairwise(arrivals) if before != box]
     longest = span = 0.0
     for before, at in itertools.pairwise(changes):
@@ -138,9 +138,9 @@ def _overlap(arrivals: list[tuple[float, str]]) -> float:
     return 1000.0 * longest
 
 
-def _jump(poses: list[Any]) -> float:
-    """Largest turn of a joint from one frame to the next where the box changed, beyond the largest of the same
-    joint elsewhere, degrees: a lost frame is no jump of a dancer who stood still for that long.
+def _jump(poses: list[Any], lost: int) -> float:
+    """Largest turn of a joint from one frame to the next where the box changed, degrees, beyond the largest
+    that the same joint made elsewhere in the frames that have passed.
     """
     import numpy as np
 
@@ -156,7 +156,7 @@ def _jump(poses: list[Any]) -> float:
                 found.get(address, 0.0), float(np.degrees(4 * np.arcsin(min(1.0, chord / 2))))
             )
         before[address] = box, quaternion
-    return max([0.0, *(turn - usual.get(address, 0.0) for address, turn in changed.items())])
+    return max([0.0, *(turn - (1 + lost) * usual.get(address, 0.0) for address, turn in changed.items())])
 
 
 def run(count: int, seed: int, folder: Path, names: list[str]) -> list[dict[str, Any]]:

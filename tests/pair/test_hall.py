@@ -84,7 +84,7 @@ def test_the_second_box_takes_over_and_gives_back(hall: Hall) -> None:
     found = lost_in(hall, since, time.time())
     assert found["overlap_ms"] <= 100.0 and found["jump_degrees"] <= 1.0, found
     assert next(one[2] for one in reversed(hall.seen.sacn) if one[1] == SECOND) == 101
-    assert "pair-taken" in hall.boxes[SECOND].output
+    hall.boxes[SECOND].await_output("pair-taken")
 
     since = time.time()
     code, said = pair_command(hall, SECOND, "back")

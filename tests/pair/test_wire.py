@@ -1,0 +1,133 @@
+"""The pair's datagrams and messages: what is let in, and that nothing is lost that can be asked for."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from appliance.pair import wire
+from appliance.pair.carrier import Carrier, cards_to
+from appliance.pair.clock_offset import ClockOffset
+from appliance.pair.roles import Heard, Role
+from appliance.pair.stream import KEPT, MOST_PART, Incoming, Outgoing, body_of, numbers_in
+from appliance.pair.wire import BEAT, MESSAGE, Codec
+
+KEY, PRINT = bytes(range(16)), b"same    "
+LEADS = Heard(Role.LEADS, 3, True)
+
+
+def acquainted() -> tuple[Codec, Codec]:
+    """Two boxes that know each other's numbers."""
+    one, other = Codec(KEY, PRINT), Codec(KEY, PRINT)
+    assert other.accept(one.pack(BEAT, LEADS, 0.0)) is None and other.greeting
+    assert one.accept(other.pack(BEAT, LEADS, 0.0, to=other.greeting)) is not None
+    assert other.accept(one.pack(BEAT, LEADS, 0.0)) is not None
+    return one, other
+
+
+def test_a_datagram_comes_as_it_was_sent() -> None:
+    one, other = acquainted()
+    found = other.accept(one.pack(MESSAGE, LEADS, 12.5, b"body"))
+    assert found == wire.Datagram(MESSAGE, LEADS, PRINT, 12.5, b"body")
+
+
+@pytest.mark.parametrize("place", [0, 2, 3, 5, 15, 40, 60, -1])
+def test_a_datagram_with_a_changed_byte_is_dropped(place: int) -> None:
+    one, other = acquainted()
+    data = bytearray(one.pack(MESSAGE, LEADS, 12.5, b"body"))
+    data[place] ^= 1
+    assert other.accept(bytes(data)) is None
+
+
+def test_repeats_strangers_and_other_nights_are_dropped() -> None:
+    one, other = acquainted()
+    recorded = one.pack(BEAT, LEADS, 1.0)
+    assert other.accept(recorded) is not None
+    assert other.accept(recorded) is None and other.counts["repeat"] == 1
+    assert other.accept(Codec(bytes(16), PRINT).pack(BEAT, LEADS, 1.0)) is None and other.counts["tag"] == 1
+    assert other.accept(other.pack(BEAT, LEADS, 1.0)) is None and other.counts["own"] == 1
+    tomorrow = Codec(KEY, PRINT)
+    assert tomorrow.accept(recorded) is None and tomorrow.counts["greeting"] == 1
+
+
+def test_a_box_that_starts_again_is_let_in_and_its_earlier_start_is_not() -> None:
+    one, other = acquainted()
+    late = one.pack(BEAT, LEADS, 1.0)
+    again = Codec(KEY, PRINT)
+    assert other.accept(again.pack(BEAT, LEADS, 0.0)) is None
+    assert again.accept(other.pack(BEAT, LEADS, 0.0, to=other.greeting)) is not None
+    assert other.accept(again.pack(BEAT, LEADS, 0.0)) is not None
+    assert other.accept(late) is None and other.counts["ended"] == 1
+
+
+def test_late_datagrams_count_once() -> None:
+    one, other = acquainted()
+    sent = [one.pack(MESSAGE, LEADS, 0.0, bytes([number])) for number in range(100)]
+    random.Random(1).shuffle(sent)
+    assert sum(other.accept(data) is not None for data in sent + sent) == 100
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.2, 0.5])
+def test_all_messages_come_in_order_whatever_is_lost(loss: float) -> None:
+    rng, outgoing, incoming, now = random.Random(2), Outgoing(), Incoming(), 0.0
+    messages = [rng.randbytes(rng.choice((10, 900, 3 * MOST_PART))) for _ in range(200)]
+    came: list[bytes] = []
+    for message in [*messages, *[b""] * 40]:
+        now += 0.02
+        bodies = [*outgoing.put(message)]
+        for number in numbers_in(body_of(incoming.missing(now))):
+            bodies += outgoing.again(number)
+        rng.shuffle(bodies)
+        for body in bodies:
+            if rng.random() >= loss:
+                incoming.put(body)
+        while (whole := incoming.take()) is not None:
+            came.append(whole)
+    assert came[:200] == messages
+
+
+def test_a_box_that_missed_too_much_says_so_and_goes_on_behind_a_keyframe() -> None:
+    outgoing, incoming = Outgoing(), Incoming()
+    for _ in range(KEPT + 10):
+        body = next(outgoing.put(b"x"))
+    incoming.put(body)
+    assert incoming.is_lost
+    incoming.begin_at(outgoing.number)
+    incoming.put(body)
+    assert incoming.take() == b"x"
+
+
+def test_of_a_leader_that_is_gone_the_rest_is_taken_without_what_is_missing() -> None:
+    outgoing, incoming = Outgoing(), Incoming()
+    for word in (b"one", b"two", b"three"):
+        for body in outgoing.put(word):
+            if word != b"two":
+                incoming.put(body)
+    assert incoming.take() == b"one" and incoming.take() is None
+    assert [*incoming.take_rest()] == [b"three"]
+
+
+def test_the_shortest_way_tells_how_far_clocks_are_apart() -> None:
+    offset = ClockOffset()
+    for number in range(100):
+        offset.hear(100.0 + number, 40.0 + number + 0.0003 + 0.01 * (number % 7))
+    assert offset.seconds == pytest.approx(-60.0 + 0.0003)
+
+
+def test_a_cable_that_comes_back_leaves_time_to_hear_the_other_box(tmp_path: Path) -> None:
+    routes = tmp_path / "route"
+    routes.write_text(
+        "Iface\tDestination\n" + "\t".join(["eth0", "00004D0A", *"00000", "00FFFFFF", "0"]) + "\n"
+    )
+    assert cards_to("10.77.0.2", routes) == ["eth0"] and cards_to("10.78.0.2", routes) == []
+    (tmp_path / "eth0").mkdir()
+    card = tmp_path / "eth0" / "carrier"
+    card.write_text("1\n")
+    carrier = Carrier(["10.77.0.2"], routes, tmp_path)
+    assert not carrier.holds_silent(1.0)
+    card.write_text("0\n")
+    assert carrier.holds_silent(2.0)
+    card.write_text("1\n")
+    assert carrier.holds_silent(2.05) and not carrier.holds_silent(2.1)
