@@ -22,7 +22,7 @@ from appliance.outputs.frame_layout import (
     WRITER,
     FrameLayout,
 )
-from appliance.outputs.puppet_facts import led_by, unpacked
+from appliance.outputs.puppet_facts import layout_of, led_by, unpacked
 from appliance.pose.foreign_file import plain_json
 from appliance.show_control.status_messages import SeenFacts
 
@@ -64,7 +64,7 @@ class StageView:
             return None
         tick, self._frame_time, _, _, _, flags, joints = FRAME_HEAD.unpack_from(payload)
         layout = self._layout
-        ends = range(layout.root_at + layout.stride, layout.bytes + 1, layout.stride)
+        ends = range(layout.root_at + layout.stride, layout.hands_at + 1, layout.stride)
         left_out = layout.world_at - layout.root_at
         seen = b"".join(payload[end - layout.stride + left_out : end] for end in ends)
         begin = layout.source_at + self._led * layout.stride
@@ -111,12 +111,14 @@ class StageView:
             facts = plain_json(found[1] if found else b"")
             facts["puppets"] = unpacked(facts["puppets"])
             self._led = facts["puppets"].index(led_by(facts["puppets"]))
+            self._layout = layout_of(
+                len(facts["skeleton"]["joints"]), facts["puppets"], facts.get("phrases", ())
+            )
             self.facts, self.show_directory = _for_browsers(facts), Path(facts["show_directory"])
             self.seen_facts = _seen(facts)
         except (ValueError, KeyError, TypeError, IndexError):
             self._file.refuse(f"holds no facts about a show. Start {WRITER} again.")
             return
-        self._layout = FrameLayout(len(self.facts["joints"]), len(facts["puppets"]))
         self.generation += 1
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
+
+from appliance.levers.sources import LIVE
+from appliance.outputs.frame_layout import FrameLayout
 
 
 class HandFacts(NamedTuple):
@@ -40,3 +43,9 @@ def led_by(puppets: Iterable[PuppetFacts]) -> PuppetFacts:
     """The puppet that cues and orders lead. Raises ValueError where none is led, or several are."""
     (led,) = (one for one in puppets if one.is_led)
     return led
+
+
+def layout_of(joints: int, puppets: Sequence[PuppetFacts], phrases: Collection[str]) -> FrameLayout:
+    """How the frames of a show lie, for its writer and for each reader."""
+    hands = sum(len(one.hands) for one in puppets)
+    return FrameLayout(joints, len(puppets), hands, joints if LIVE in phrases else 0)

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from appliance.box.ring_file import RingFileWriter
-from appliance.levers.sources import LIVE
 from appliance.outputs.frame_layout import (
     FACTS,
     FILE,
@@ -28,7 +27,7 @@ from appliance.outputs.frame_layout import (
     FrameLayout,
 )
 from appliance.outputs.joint_frame import Floats, JointFrame, PuppetFrame
-from appliance.outputs.puppet_facts import PuppetFacts, led_by, unpacked
+from appliance.outputs.puppet_facts import PuppetFacts, layout_of, led_by, unpacked
 from appliance.pose.foreign_file import plain_json
 from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
 
@@ -64,8 +63,7 @@ class Facts:
     @property
     def layout(self) -> FrameLayout:
         """How its frames lie."""
-        joints, hands = len(self.skeleton), sum(len(one.hands) for one in self.puppets)
-        return FrameLayout(joints, len(self.puppets), hands, joints if LIVE in self.phrases else 0)
+        return layout_of(len(self.skeleton), self.puppets, self.phrases)
 
     @property
     def led(self) -> PuppetFacts:
