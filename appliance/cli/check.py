@@ -7,20 +7,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from appliance.body.mesh_file import MESH_FILE, read_mesh
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import SHOW_OR_NAME, BoxFile
 from appliance.cli.phones import out_of_phones_reach
+from appliance.dancer.material.liveness import what_is_dead
 from appliance.dancer.material.maker import open_network
-from appliance.dancer.material.map_reach import MapReach
-from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
+from appliance.dancer.material.motion_network import MotionNetworkError
 from appliance.dancer.phrase_cache import PhraseCache
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.glb_body import write_body
-from appliance.levers.sources import MAIN, PATH
+from appliance.levers.sources import MAIN
 from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
@@ -89,7 +88,7 @@ def _check(directory: Path, box_file: Path | None) -> None:
         *out_of_phones_reach(box),
         *unwired(show, box),
         *too_many,
-        *_dead_map(show),
+        *_dead_networks(show),
         *_no_mesh(show),
     )
     for warning in found:
@@ -168,23 +167,18 @@ def _no_mesh(show: Show) -> Iterator[str]:
         )
 
 
-def _dead_map(show: Show) -> Iterator[str]:
-    """A warning where a finger on the map of poses would change next to nothing."""
-    if PATH not in show.motion_networks:
-        return
-    network = MotionNetwork(show.motion_networks[PATH], show.skeleton.names)
+def _dead_networks(show: Show) -> Iterator[str]:
+    """A warning where a source's network would make the same motion whatever it is asked, or a finger on the
+    map would change next to nothing.
+    """
     found = PhraseCache(show.directory, None).phrase(show.phrases[MAIN], show.skeleton, False)
-    if network.ground is None or found is None:
+    if found is None:
         return
-    middle, directions, low, high = network.ground
-    reached = MapReach.of(
-        low,
-        high,
-        lambda points: network.decode((middle + points @ directions).astype(np.float32))[:, 0],
-        found[0].poses[:, network.places],
-    )
-    if reached.is_dead:
-        yield f"{show.motion_networks[PATH].name}: {reached.sentence()}"
+    sources = {file: source for source, file in show.motion_networks.items()}
+    for file, source in sources.items():
+        network = open_network(source, file, show.skeleton.names)
+        if dead := what_is_dead(network, found[0].poses[:, network.places]):
+            yield f"{file.name}: {dead}"
 
 
 def _refuse_misfits(show: Show, box: BoxConfig) -> None:

@@ -6,15 +6,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.console import Console
 
+from appliance.dancer.material.liveness import SAMPLES, liveness_of
 from appliance.dancer.material.maker import open_network
 from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
 from appliance.levers.sources import GRANULAR, IMPROVISE, PATH, VARY
+from appliance.pose import quaternion
 from appliance.pose.reading_options import ReadingOptions
 from appliance.show.show import load_show
+from appliance.studio.coded_windows import decoded, encoded, latent_of, window_of
 from appliance.studio.data.catalogue import ALWAYS, Catalogue
-from appliance.studio.data.dataset import Dataset
+from appliance.studio.data.dataset import Dataset, window_starts
 from appliance.studio.data.remembered import remembered_reading
 from appliance.studio.data.takes import load_take
 from appliance.studio.evaluation.coders import MovedJoints
@@ -55,10 +59,40 @@ def open_either(
 ) -> OpenedModel:
     """The checkpoint of a model, or a show's network of a source. Raises StudioError, ConfigError."""
     if show is not None:
-        return open_show(source, show)
+        opened = open_show(source, show)
+        say_if_dead(opened.network, opened.dataset, console)
+        return opened
     assert checkpoint is not None, "the command asks for one of both"
     coder, dataset = open_model(MODELS[source], checkpoint, recordings, console, reading)
+    say_if_dead(coder.autoencoder, dataset, console)
     return OpenedModel(coder.autoencoder, coder, dataset)
+
+
+def say_if_dead(network: Network, dataset: Dataset, console: Console) -> bool:
+    """Says what is wrong with a network that would make the same motion whatever it is asked, or knows
+    another dance. True if something is.
+    """
+    length, moving = window_of(network), list(dataset.moving)
+    starts = [(take, first) for take in dataset.training for first in window_starts(take, window=length)]
+    if not starts:
+        return False
+    chosen = np.linspace(0, len(starts) - 1, min(SAMPLES, len(starts))).round().astype(int)
+    places = [starts[place] for place in chosen]
+    windows = np.stack(
+        [
+            quaternion.continuous(take.recording.poses[first : first + length, moving])
+            for take, first in places
+        ]
+    )
+    dead = liveness_of(
+        windows,
+        latent_of(network),
+        lambda given: encoded(network, given)[0],
+        lambda latents: decoded(network, latents),
+    ).sentence()
+    if dead:
+        console.print(dead, highlight=False, soft_wrap=True)
+    return bool(dead)
 
 
 def open_show(source: str, folder: Path) -> OpenedModel:

@@ -32,6 +32,7 @@ from appliance.studio.improviser.improviser_training import ImproviserTraining
 from appliance.studio.improviser.learning import AnyTraining, train_until_done, training_for
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesTraining
 from appliance.studio.model_uses import USES
+from appliance.studio.opened_model import say_if_dead
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.processes import Processes, joined
 from appliance.studio.studio_error import StudioError
@@ -119,6 +120,7 @@ def _finish(
             coder = load_checkpoint(checkpoint)[0]
             file = export_motion(coder, training.dataset, settings.model, options.out)
             console.print(f"{file}: a show that holds it dances from it live (docs/variations.md, On stage).")
+            say_if_dead(coder.autoencoder, training.dataset, console)
         if isinstance(training, Training) and settings.model == "pose":
             ground = Ground.of(load_checkpoint(checkpoint)[0].autoencoder, training.dataset)
             console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)

@@ -145,11 +145,12 @@ def test_a_line_on_the_map_becomes_a_dance(
     for name in ("map.png", "projections.png", "distance.png", "map.html", "map.svg", "map.json"):
         assert (tmp_path / "map" / name).stat().st_size > 100, name
     report = json.loads((tmp_path / "map" / "map.json").read_text())
-    assert "UMAP is left out: umap-learn is not installed" in result.output
+    assert "UMAP is not installed here: projections.png has PCA and the pose autoencoder only" in result.output
     assert "laying the recordings over the map ..." in result.output
     assert report["reach"]["is_dead"] is False and "The map is alive" in result.output
     assert set(report["projections"]) >= {"PCA, heading kept", "PCA, heading removed", "pose autoencoder"}
     assert report["apart"]["largest"] >= report["apart"]["mean"] > 0
+    assert report["apart"]["on_the_clock"] > 0 and "aligned in time" in result.output
     sheet = (tmp_path / "map" / "map.svg").read_text()
     left, top, width, height = (float(x) for x in re.search(r'viewBox="([^"]+)"', sheet)[1].split())
     drawn = f'<path d="M {left + width / 3} {top + height / 2} l {width / 3} 0"/></svg>'

@@ -48,8 +48,8 @@ class MapReach:
         if not self.is_dead:
             return f"The map is alive: {seen}."
         return (
-            f"The map is dead: {seen}. Moving over it changes next to nothing. Train longer (--minutes), or "
-            "with the default network and --latent."
+            f"The map is dead: {seen}. Moving over it changes next to nothing, though the network has other "
+            "directions that do. Train one that has only the map's: --latent 2, or 3."
         )
 
 

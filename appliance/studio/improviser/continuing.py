@@ -19,7 +19,7 @@ from appliance.studio.improviser.improvise_options import ImproviseOptions
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
-from appliance.studio.opened_model import open_show
+from appliance.studio.opened_model import open_show, say_if_dead
 from appliance.studio.standing_dance import excerpt_of, only_in, standing
 from appliance.studio.studio_error import StudioError
 
@@ -33,6 +33,7 @@ def continue_of_show(options: ImproviseOptions) -> None:
     console, opened = Console(stderr=True), open_show(IMPROVISE, options.show)
     network = opened.network
     assert isinstance(network, ImproviserNetwork)
+    say_if_dead(network, opened.dataset, console)
 
     def say(message: str) -> None:
         console.print(message, highlight=False, soft_wrap=True)

@@ -17,7 +17,9 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
+from appliance.studio.comparison.alignment import align
 from appliance.studio.data.dataset import FPS
+from appliance.studio.evaluation.nearest import without_heading
 from appliance.studio.opened_model import open_either
 from appliance.studio.pose_space import map_pictures
 from appliance.studio.pose_space.drawing import UNITS
@@ -76,12 +78,19 @@ def run(options: MapOptions) -> None:
         },
     }
     if len(paths) == 2:
-        report["apart"] = _compare(options.out, paths)
+        report["apart"] = _compare(options.out, recordings, paths, moving)
     (options.out / "map.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     for projection in found:
         console.print(_continuity(projection), highlight=False)
     if not any(one.name.startswith("UMAP") for one in found):
-        console.print(f"- {WITHOUT_UMAP}", highlight=False)
+        console.print(f"- {WITHOUT_UMAP}", highlight=False, soft_wrap=True)
+    if "apart" in report:
+        console.print(
+            f"The two are {report['apart']['mean']:.2f} apart on the map, aligned in time "
+            f"({report['apart']['on_the_clock']:.2f} on the clock). Joint by joint: bunraku compare.",
+            highlight=False,
+            soft_wrap=True,
+        )
     console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
     console.print(
         f"{options.out}: map.html to turn in a browser, map.png, projections.png, and map.svg to draw a "
@@ -91,12 +100,30 @@ def run(options: MapOptions) -> None:
     )
 
 
-def _compare(out: Path, paths: dict[str, Array]) -> dict[str, float]:
-    """Two versions of a phrase: their distance on the map over time."""
+def _compare(
+    out: Path, recordings: dict[str, Recording], paths: dict[str, Array], moving: list[int]
+) -> dict[str, float]:
+    """Two versions of a phrase: their distance on the map over the seconds of the first, aligned in time.
+
+    Where one is too long to be a version of the other, at the same ticks of both.
+    """
     (one, first), (other, second) = paths.items()
+    on_the_clock, begins = distance_over_time(first, second), 0
+    try:
+        found = align(*(without_heading(each.poses[:, moving]) for each in recordings.values()))
+        begins, ticks = found.first, np.arange(len(second))
+        second = np.stack([np.interp(found.ticks, ticks, column) for column in second.T], axis=1)
+        first = first[begins:]
+    except StudioError:
+        pass
     apart = distance_over_time(first, second)
     map_pictures.draw_distance(out / "distance.png", apart, one, other, FPS)
-    return {"mean": float(apart.mean()), "largest": float(apart.max()), "at_s": float(apart.argmax() / FPS)}
+    return {
+        "mean": float(apart.mean()),
+        "largest": float(apart.max()),
+        "at_s": float((begins + apart.argmax()) / FPS),
+        "on_the_clock": float(on_the_clock.mean()),
+    }
 
 
 def _write_sheet(path: Path, picture: Path, frame: tuple[float, float, float, float]) -> None:

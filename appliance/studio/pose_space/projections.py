@@ -20,7 +20,10 @@ from appliance.studio.pose_space.latent_poses import PoseMap, latents_of
 if TYPE_CHECKING:
     from appliance.studio.coded_windows import Network
 
-WITHOUT_UMAP = "UMAP is left out: umap-learn is not installed here. Add it with: pip install umap-learn"
+WITHOUT_UMAP = (
+    "UMAP is not installed here: projections.png has PCA and the pose autoencoder only, and the map is the "
+    "autoencoder's, as always. Add UMAP with: pip install umap-learn"
+)
 MOST_NEIGHBOURS_OF = 4000  # figures that UMAP is fitted to
 
 
