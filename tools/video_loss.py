@@ -1,4 +1,4 @@
-"""What a video loses: landmarks made of true recordings, brought back to a dance, against the truth.
+"""Measures the losses of a video: landmarks made of true recordings become a dance again.
 
     python -m tools.video_loss recordings/anna_1.bvh
 
@@ -98,8 +98,8 @@ def seen_by(camera: Camera, dance: Recording, rng: np.random.Generator, flat: bo
 
 
 def losses(dance: Recording, true: Recording) -> Mapping[str, float]:
-    """Of each group of joints the mean degrees in the room; centimetres of all joints from the hips, and of
-    the hips' way; the slide of feet that stand in the truth, cm/s.
+    """Mean degrees in the room for each group of joints; centimetres of all joints from the hips, and of the
+    hips' way; slide of feet while the true ones do not move, cm/s.
     """
     count = min(len(dance), len(true))
     roles = true.skeleton.roles

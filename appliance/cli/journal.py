@@ -113,7 +113,7 @@ def export_journal(
     source = _recorded(box, chosen, recorded)
     if training is not None:
         if to is not None or bvh is not None or glb is not None:
-            raise typer.BadParameter("--training writes a folder of its own: leave the others out")
+            raise typer.BadParameter("--training writes a folder: leave the others out")
         from appliance.exchange.training_set import write_training_set
         from appliance.recorder.reading import read_journal
 

@@ -51,7 +51,7 @@ _STOPPED = "Stopped. Nothing is lost: the same command continues."
 
 
 class NotLearnedError(Exception):
-    """What came in between; the message is for the user."""
+    """Learning cannot go on; the message is for the user."""
 
 
 def learn(
@@ -83,7 +83,7 @@ def learn(
 
 
 def begin(learning: Learning, wanted: Wanted) -> None:
-    """What was learned before gives way. Raises OSError."""
+    """Delete what was learned before, and write the request. Raises OSError."""
     shutil.rmtree(learning.show, ignore_errors=True)
     learning.want(wanted)
 

@@ -1,4 +1,4 @@
-"""What a dancer that was learned has to reach before its show is offered: figures, bounds, null products.
+"""The bar for a learned dancer: figures, bounds and null products. Its show is offered only above it.
 
 The bounds are those at which `bunraku train` begins to give advice. Beside them are the figures of the dancer
 that comes with the box, and of a null product that fails: a network that copies the phrase, a phrase with the

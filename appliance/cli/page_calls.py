@@ -89,7 +89,7 @@ def recordings(folders: list[str]) -> Any:
 
 
 def use_rehearsal(journal: str, into: str) -> Any:
-    """What a live dancer danced in the journal, as recordings to learn from."""
+    """Write a live dancer's dance from the journal as recordings to learn from."""
     import shutil
 
     from appliance.exchange.training_set import write_training_set

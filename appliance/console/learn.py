@@ -107,7 +107,7 @@ class Learn:
         return web.json_response({"done": True})
 
     async def _use_rehearsal(self, request: web.Request) -> web.Response:
-        """What a live dancer danced in the journal becomes recordings to learn from."""
+        """Turn a live dancer's dance in the journal into recordings to learn from."""
         self._guard.require_device(request)
         await said(request)
         if self._journal is None:

@@ -21,6 +21,6 @@ def recorded_minutes(folder: Path) -> tuple[int, float]:
             if found is not None:
                 files += 1
                 seconds += int(found[1]) * float(found[2].replace(b",", b"."))
-    except (OSError, ValueError):  # a stick that is pulled, a frame time that is none
+    except (OSError, ValueError):  # the stick was pulled, or a frame time is no number
         pass
     return files, seconds / 60

@@ -46,7 +46,7 @@ class TrainingSet(NamedTuple):
     seconds: float
 
     def sentence(self) -> str:
-        """What is in it, for people."""
+        """Its contents, for people."""
         if not self.recordings:
             return (
                 f"{self.folder}: no live dancer danced in this journal, so there is nothing to train on. "
@@ -102,7 +102,7 @@ def write_training_set(journal: JournalRecording, folder: Path) -> TrainingSet:
 
 
 def live_dances(run: Run) -> list[Recording]:
-    """What the live dancer danced, at the tick's rate: a recording for each time that the stream went on.
+    """The live dancer's dance at the tick's rate, a recording for each uninterrupted stream.
 
     Joints that nothing said turn as they do in the stance.
     """

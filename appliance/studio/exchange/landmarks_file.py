@@ -161,7 +161,7 @@ def _has(frame: Any, key: str) -> bool:
 
 
 def _person(path: Path, where: str, given: list[Any] | None) -> Array | None:
-    """(33, 4) of one frame; None: nobody was seen. Of several persons the first."""
+    """(33, 4) of one frame; None: nobody was seen. The first of several persons."""
     if not given:
         return None
     if isinstance(given[0], list) and given[0] and isinstance(given[0][0], dict | list):

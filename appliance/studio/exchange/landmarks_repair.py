@@ -14,9 +14,9 @@ from appliance.studio.exchange.fitting import gaps_of
 
 FPS = 50.0
 LEAST_SEEN = 0.3  # a network's own doubt: below it the place is a guess
-_LEAP = 0.12  # of the figure's height: a landmark this far from its neighbours in time was somewhere else
+_LEAP = 0.12  # fraction of the figure's height: a landmark this far from its neighbours in time leapt
 _LEAP_FRAMES = 3  # neighbours on each side
-_SWAP_COST = 0.5  # of the figure's height: what a change of sides has to save
+_SWAP_COST = 0.5  # fraction of the figure's height that a change of sides has to save
 _LIMBS = (("shoulder", "elbow", "wrist", "index", "little", "thumb", "hand"), ("hip", "knee", "ankle", "toe"))
 # The One-Euro filter (Casiez 2012), there and back, so that it does not lag. Tried on made landmarks of four
 # dances with 1 to 3 cm of noise: less smoothing leaves jitter, more rounds off quick arms.

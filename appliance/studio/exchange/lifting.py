@@ -26,7 +26,7 @@ _BENDS_WRONG = 4.0  # cost of an elbow or a knee that bends the wrong way, for e
 _BEHIND = 0.15  # cost of a hand behind the chest, for each metre: arms are mostly in front
 _MOVES = 1.0  # cost of each metre that a joint moves in a frame
 _FACING_FRAMES = 25
-_SHORTENED = 0.92  # of a squared length: less is the camera's perspective and the network's noise
+_SHORTENED = 0.92  # fraction of a squared length: the rest is perspective and noise
 
 
 def lifted(parts: Sequence[str], picture: Array, skeleton: Skeleton) -> tuple[Array, Array]:
