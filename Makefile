@@ -236,7 +236,7 @@ wheels: $(VENV)/.ready-to-run ## wheels and source distributions of the last com
 	@rm -rf out/dist build/dist && mkdir -p out/dist build/dist
 	@set -o pipefail; git archive HEAD | tar -C build/dist -xf -
 	@umask 022; for each in $(DISTRIBUTIONS); do for kind in sdist wheel; do \
-	    (cd build/dist/$$each && $(CURDIR)/$(BIN)/python -c \
+	    (cd build/dist/$$each && "$(CURDIR)/$(BIN)/python" -c \
 	        "from setuptools import build_meta as b; b.build_$$kind('$(CURDIR)/out/dist')") \
 	        >build/dist.log 2>&1 || { cat build/dist.log; exit 1; }; done; done
 	@for sdist in out/dist/*.tar.gz; do rm -rf build/dist/again && mkdir build/dist/again && \
