@@ -10,17 +10,19 @@ import torch
 from typer.testing import CliRunner
 
 from appliance.dancer.material.improviser_network import ImproviserNetwork
-from appliance.dancer.material.partner_network import GAP, LED_STEPS, PartnerNetwork
+from appliance.dancer.material.partner_network import GAP, LED_STEPS, SEEN, PartnerNetwork
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.commands import app
+from appliance.studio.evaluation.accord import Accord
 from appliance.studio.evaluation.dependence import dependence, likeness, share_led_by_second
 from appliance.studio.partner import training
 from appliance.studio.partner.couples import Moments
 from appliance.studio.partner.export import FILE, export_partner
+from appliance.studio.partner.measure import Row, what_is_dead
 from appliance.studio.partner.training import Answers, Scorer, found_of, nats_of, train, train_answers
 from tests.bundles import MOVING
-from tests.sources import write_improviser_network, write_show_with_sources
+from tests.sources import LATENT, write_improviser_network, write_show_with_sources
 from tests.studio.tiny import write_recordings
 
 JOINTS = ("hips", "spine", "LeftArm", "RightArm", "LeftUpLeg", "RightUpLeg")
@@ -68,50 +70,88 @@ def test_what_does_not_answer_and_what_copies_are_found_out() -> None:
     assert np.isnan(dependence(first[:200], first[:200], JOINTS).above)
 
 
-def couples(count: int = 300, features: int = 4) -> Moments:
-    """The own move of each moment continues what the other did last; the twelve others do not."""
-    chance = np.random.default_rng(3)
-    led = chance.standard_normal((count, LED_STEPS, features)).astype(np.float32)
-    moves = chance.standard_normal((count, 13, 11, features)).astype(np.float32)
-    moves[:, 0, 3:] = led[:, -1:] + 0.3 * moves[:, 0, 3:]
-    codes = led[:, -1, :3] + 0.1 * chance.standard_normal((count, 3)).astype(np.float32)
-    return Moments(led, moves, codes, np.zeros(count))
+def test_accord_has_a_sign() -> None:
+    """A couple's answer, its opposite, and a stranger: above, below and at nothing."""
+    learned = Accord([(dance(wandering(n)), answering(wandering(n), 24)) for n in range(3, 9)])
+    led = wandering(1)
+    first, stranger = dance(led), dance(wandering(2), (0.0, 0.6, 0.8))
+    assert learned(first, answering(led, 24)) > 0.4
+    assert learned(first, answering(-led, 24)) < -0.4
+    assert abs(learned(first, stranger)) < 0.15
+    assert np.isnan(learned(first[:200], first[:200]))
 
 
-def part(moments: Moments, rows: slice) -> Moments:
-    return Moments(*(one[rows] for one in moments))
+FEATURES, CODE = LATENT + 4, 3
 
 
-def test_it_learns_which_move_answers_and_only_beside_the_right_dancer(
-    monkeypatch: pytest.MonkeyPatch,
+def stretches(network: ImproviserNetwork, first: int, count: int = 6) -> list[Stretch]:
+    """The second dancer's moves go where the first one was shortly before; the first one's go anywhere."""
+    found = []
+    for take in range(count):
+        chance = np.random.default_rng(first + take)
+        led = np.repeat(chance.standard_normal((30, FEATURES)), 4, 0).astype(np.float32)
+        own = np.roll(led, GAP, 0)[:, ::-1] + 0.1 * chance.standard_normal(led.shape).astype(np.float32)
+        found += [Stretch(own, led, 1, take), Stretch(led, own, 0, take)]
+    return found
+
+
+def trained(folder: Path, monkeypatch: pytest.MonkeyPatch, steps: int) -> tuple[ImproviserNetwork, Partner]:
+    for name, value in {"BATCH": 64, "LOOK_EVERY": 30, "WIDTH": 48, "DEEP": (32, 32)}.items():
+        monkeypatch.setattr(training, name, value)
+    monkeypatch.setattr(training.Answers.__init__, "__defaults__", (48, 0.1))
+    write_improviser_network(folder / "improviser.onnx")
+    network = ImproviserNetwork(folder / "improviser.onnx", MOVING)
+    return network, train(network, stretches(network, 0), stretches(network, 100, 2), 2, 1e9, steps)
+
+
+def test_it_learns_what_answers_and_who_dances_and_its_file_gives_what_was_trained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(training, "BATCH", 48)
-    monkeypatch.setattr(training, "LOOK_EVERY", 50)
-    moments = couples()
-    learned = train(part(moments, slice(0, 240)), part(moments, slice(240, None)), 1e9, 100)
-    assert learned.found > 0.5 and learned.found_shuffled < learned.found - 0.2  # chance: 1 of 13
-    assert found_of(Scorer(4).eval(), part(moments, slice(240, None)))[0] < 0.3
-    answers, nats, other = train_answers(
-        part(moments, slice(0, 240)), part(moments, slice(240, None)), 1e9, 100
-    )
-    assert nats < other - 0.1
-    assert nats_of(answers, part(moments, slice(240, None)))[0] == pytest.approx(nats)
+    network, partner = trained(tmp_path, monkeypatch, 150)
+    export_partner(partner, network, tmp_path / FILE)
+    played = PartnerNetwork(tmp_path / FILE, MOVING)
+    assert played.dancers == 2
+    apart = stretches(network, 200, 4)
+    shown = [(one.own[at - SEEN : at], one.who) for one in apart for at in range(SEEN, 100, 9)]
+    assert np.mean([played.recognised(steps) == who for steps, who in shown]) > 0.8  # chance: 0.5
+    noise, who = np.random.default_rng(1).standard_normal((64, CODE)).astype(np.float32), np.eye(2)[1]
+    who = who.astype(np.float32)
+
+    def away(led_from: int) -> float:
+        """How far the answers beside one moment's steps are from the danced moves' codes."""
+        errors = []
+        for one in apart[::2]:
+            assert one.led is not None
+            for at in range(24, 80, 8):
+                steps = one.led[at + led_from - 20 : at + led_from - 4]
+                codes = played.answers(one.own[at - SEEN : at], steps, who, noise)
+                own = network.code_of(one.own[None, at - 3 : at], one.own[None, at : at + 8])
+                errors.append(float(np.abs(codes.mean(0) - own).mean()))
+        return float(np.mean(errors))
+
+    assert away(0) < 0.9 * away(24)
+    free = played.answers(apart[0].own[:SEEN], None, who, noise)
+    with torch.no_grad():
+        seen = torch.from_numpy(apart[0].own[None, :SEEN].copy())
+        none = torch.zeros(1, LED_STEPS, FEATURES), torch.from_numpy(who)[None], torch.zeros(1, 1)
+        own = partner.answers(seen, *none, torch.from_numpy(noise)).numpy()
+    assert free == pytest.approx(own, abs=0.1)
+    assert (tmp_path / FILE).stat().st_size < 400_000
 
 
-def test_its_file_gives_what_was_trained(tmp_path: Path) -> None:
+def test_its_moments_follow_the_recordings_and_stray_from_them(tmp_path: Path) -> None:
     write_improviser_network(tmp_path / "improviser.onnx")
     network = ImproviserNetwork(tmp_path / "improviser.onnx", MOVING)
-    torch.manual_seed(1)
-    scorer = Scorer(network.features, 32).eval()
-    answers = Answers(network.features, network.code_size, 2, 32).eval()
-    export_partner(scorer, answers, network, tmp_path / FILE)
-    partner = PartnerNetwork(tmp_path / FILE, MOVING)
-    led, moves = torch.randn(LED_STEPS, network.features), torch.randn(5, 11, network.features)
-    with torch.no_grad():
-        scores, mixture = scorer(led[None], moves[None])[0], answers(moves[:1, :3], led[None])
-    assert partner.scores(led.numpy(), moves.numpy()) == pytest.approx(scores.numpy(), abs=1e-2)
-    assert partner.answers(moves[0, :3].numpy(), led.numpy()) == pytest.approx(mixture.numpy(), abs=1e-2)
-    assert partner.mixtures == 2 and GAP > 0
+    alone = stretches(network, 0, 1)[0]._replace(led=None)
+    moments = moments_of(network, [*stretches(network, 0, 1), alone], np.random.default_rng(1))
+    assert set(moments.who.tolist()) == {0, 1} and not moments.heard.all()
+    own = alone.own.astype(np.float16)
+    recorded = [
+        any(np.array_equal(own[at - SEEN : at], one) for at in range(SEEN, 120))
+        for one in moments.own[~moments.heard]
+    ]
+    assert recorded == moments.recorded[~moments.heard].tolist()
+    assert 0.2 < np.mean(recorded) < 0.8
 
 
 def test_recordings_without_couples_are_refused_with_the_cure(tmp_path: Path) -> None:
@@ -120,3 +160,19 @@ def test_recordings_without_couples_are_refused_with_the_cure(tmp_path: Path) ->
     result = CliRunner().invoke(app, ["duet", str(tmp_path / "takes"), "--show", str(show)])
     assert result.exit_code == 2, result.output
     assert "No couple is kept apart" in result.output and "catalogue.yaml" in result.output
+
+
+@pytest.mark.parametrize(
+    ("partner", "message"),
+    [
+        (Row("follow 1, lead 0", 0.048, 0.3, 0.2, 0.95, 0.8, 0.9), "The partner answers"),
+        (Row("follow 1, lead 0", 0.048, 0.3, 0.2, 0.95, 0.8, 0.1), "it is a statue"),
+        (Row("follow 1, lead 0", 0.300, 0.5, 0.0, 0.35, 0.8, 1.0), "The partner copies"),
+        (Row("follow 1, lead 0", 0.008, 0.3, 0.5, 1.0, 0.8, 1.0), "does not listen"),
+    ],
+)
+def test_a_dead_partner_is_told(partner: Row, message: str) -> None:
+    recorded = Row("recorded couples", 0.077, 0.2, 0.5, 0.97)
+    copy = Row("a copy 0.5 s later (null)", 0.4, 0.5, 0.0, 0.31)
+    stranger = Row("the same beside dancers of other couples (null)", 0.006, 0.0, 0.5, 1.0)
+    assert message in what_is_dead([recorded, copy, partner, stranger])

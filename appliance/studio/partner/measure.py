@@ -20,18 +20,28 @@ from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.show.show import Show, load_show
 from appliance.studio.data.dataset import Dataset, Take, load_folder
+from appliance.studio.data.jumps import runs
 from appliance.studio.data.mirror import mirror_pairs
+from appliance.studio.evaluation.accord import Accord
 from appliance.studio.evaluation.critic import critic
 from appliance.studio.evaluation.dependence import dependence, likeness, share_led_by_second
 from appliance.studio.evaluation.limbs import limb_figures, limbs_of
-from appliance.studio.partner.couples import Moments, couples_of, moments_of
+from appliance.studio.partner.couples import couples_of, stretches_of
 from appliance.studio.partner.duet import LEAD_IN, danced_duet
 from appliance.studio.partner.export import FILE, export_partner
-from appliance.studio.partner.training import train, train_answers
+from appliance.studio.partner.training import train
 from appliance.studio.studio_error import StudioError
 
+LEAST_TICKS = 200  # of a stretch from which accord is learned
 COPY_LATE = 25  # ticks by which the null product copies
-_FOLLOWS, _LEADS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.5, 1.0)
+FOLLOWS_NAME, STRANGERS_NAME = "follow 1, lead 0", "the same beside dancers of other couples (null)"
+STANDS = 0.3  # of a dancer's energy
+LISTENS, LEAST_DEPENDENCE = (
+    2.0,
+    0.005,
+)  # times a stranger's dependence, and above it: the default 0.048 to 0.006
+MANY = 8  # couples, two of which say which networks are best
+_FOLLOWS, _LEADS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.25, 0.5, 0.75, 1.0)
 Pairs = Sequence[tuple[Take, Take]]
 
 
@@ -51,13 +61,18 @@ class DuetOptions:
 
 @dataclass(frozen=True)
 class Row:
-    """A kind of duet: how much the second dancer depends on the first, and so on; see docs/partner.md."""
+    """A kind of duet: how much the second dancer depends on the first, and so on; see docs/partner.md.
+
+    error: the standard error of accord.
+    """
 
     name: str
     dependence: float
     lag_s: float
     leads: float
     likeness: float
+    accord: float = float("nan")
+    error: float = float("nan")
     critic: float = float("nan")
     energy: float = float("nan")
 
@@ -104,17 +119,24 @@ def _train(
     console: Console,
     device: str,
 ) -> None:
-    """Both networks, each for half of the time; the last couple of the training takes says which is best."""
+    """The last couple of the training takes, or the last two of many, say which networks are best."""
     console.print("Couples become steps.")
-    moments = moments_of(network, dataset, dataset.training, np.random.default_rng(options.seed))
-    is_last = moments.takes == moments.takes.max()
-    if is_last.all():
+    takes = sorted(couples_of(dataset.training))
+    if len(takes) < 2:
         raise StudioError("It takes two couples that are not kept apart to train a partner.")
-    training, asked = (Moments(*(part[rows] for part in moments)) for rows in (~is_last, is_last))
-    seconds, steps = (30.0 * options.minutes, 10**9) if options.minutes else (float("inf"), options.steps)
-    learned = train(training, asked, seconds, steps, device, options.seed, console.print)
-    answers, _, _ = train_answers(training, asked, seconds, steps, device, options.seed, console.print)
-    export_partner(learned.scorer, answers, network, path)
+    asked = takes[-2:] if len(takes) >= MANY else takes[-1:]
+    training, apart = (
+        stretches_of(
+            network, dataset, [take for take in dataset.training if (take.take in asked) == is_asked]
+        )
+        for is_asked in (False, True)
+    )
+    if not training or not apart:
+        raise StudioError("The couples have no sound stretch of 3 s, or only one of them has.")
+    seconds, steps = (60.0 * options.minutes, 10**9) if options.minutes else (float("inf"), options.steps)
+    dancers = 4 if dataset.mirrors else 2
+    partner = train(network, training, apart, dancers, seconds, steps, device, options.seed, console.print)
+    export_partner(partner, network, path)
     console.print(f"{path} is written.")
 
 
@@ -131,6 +153,7 @@ def _rows(
     pairs = [moving.index(counterparts[joint]) for joint in moving]
     couples = [one for pair in apart for one in (pair, pair[::-1])]
     whole = {take.name: _seen(take.recording, moving) for pair in couples for take in pair}
+    accords = _accords(dataset, moving)
 
     def row(name: str, both: Sequence[tuple[Array, Array]], recorded: Sequence[Take] = ()) -> Row:
         found = [dependence(one, two, joints) for one, two in both]
@@ -143,11 +166,14 @@ def _rows(
                 [likeness(one, two, pairs) for one, two in both],
             )
         ]
+        if accords:  # every other duet is led by the second of its couple, but where all are led by the first
+            found = [accords[n % 2 if len(both) == len(couples) else 0](*one) for n, one in enumerate(both)]
+            figures += [float(np.mean(found)), float(np.std(found) / np.sqrt(max(1, len(found) - 1)))]
+        else:
+            figures += [float("nan")] * 2
         if recorded:
             made, real = [two for _, two in both], [whole[take.name] for take in recorded]
-            seen = [one[: len(two) + LEAD_IN] for one, two in zip(real, made, strict=True)]
-            names = [take.take for take in recorded]
-            figures.append(critic(seen, made, list(range(len(moving))), names))
+            figures.append(_critic(recorded, made, moving))
             limbs = limbs_of(joints)
             energies = [
                 value
@@ -187,9 +213,32 @@ def _rows(
         if (follow, lead) == (1.0, 0.0) and len(apart) > 1:
             wrong = seen[2:] + seen[:2]
             yield row(
-                "the same beside dancers of other couples (null)",
+                STRANGERS_NAME,
                 [(other[0], own[1]) for other, own in zip(wrong, seen, strict=True)],
             )
+
+
+def _accords(dataset: Dataset, moving: Sequence[int]) -> list[Accord]:
+    """Accord with the first of a couple, and with the second; none where no couple has been learned from."""
+    sound = []
+    for first, second in couples_of(dataset.training).values():
+        for start, end in runs(first.sound & second.sound):
+            if end - start >= LEAST_TICKS:
+                sound.append([_seen(one.recording, moving)[start:end] for one in (first, second)])
+    if not sound:
+        return []
+    return [Accord([(one, two) for one, two in sound]), Accord([(two, one) for one, two in sound])]
+
+
+def _critic(recorded: Sequence[Take], made: Sequence[Array], moving: Sequence[int]) -> float:
+    """Of the dances against the dancers' own, of which only sound stretches count."""
+    real, danced, names = [], [], []
+    for take, dance in zip(recorded, made, strict=True):
+        stretches = runs(take.sound[: len(dance) + LEAD_IN])
+        real += [_seen(take.recording, moving)[start:end] for start, end in stretches]
+        danced += [dance, *([dance[:0]] * (len(stretches) - 1))]
+        names += [take.take] * len(stretches)
+    return critic(real, danced, list(range(len(moving))), names)
 
 
 def _beginning(recording: Recording, seconds: float) -> Recording:
@@ -204,16 +253,19 @@ def _seen(recording: Recording, moving: Sequence[int]) -> Array:
 
 
 def _print(rows: Sequence[Row]) -> None:
-    table = Table("duet", "depends", "later by, s", "second leads", "likeness", "critic", "energy")
+    table = Table(
+        "duet", "accord", "+-", "depends", "later by, s", "second leads", "likeness", "critic", "energy"
+    )
     for row in rows:
-        values = (row.dependence, row.lag_s, row.leads, row.likeness, row.critic, row.energy)
-        digits = (3, 1, 2, 2, 2, 2)
+        values = (
+            *(row.accord, row.error, row.dependence, row.lag_s),
+            *(row.leads, row.likeness, row.critic, row.energy),
+        )
+        digits = (3, 3, 3, 1, 2, 2, 2, 2)
         table.add_row(
             row.name,
             *("" if value != value else f"{value:.{n}f}" for value, n in zip(values, digits, strict=True)),
         )
     Console().print(table)
-    real, best = rows[0].dependence, max(row.dependence for row in rows if row.name == "follow 1, lead 0")
-    print(
-        f"The partner depends on the other dancer by {best:.3f} above chance; recorded couples by {real:.3f}."
-    )
+    real, own = rows[0].accord, next(row.accord for row in rows if row.name == "follow 1, lead 0")
+    print(f"The partner dances in accord with the other dancer by {own:.3f}; recorded couples by {real:.3f}.")
