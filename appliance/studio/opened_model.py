@@ -35,13 +35,14 @@ TWO_HALVES_S = 8.0  # a longer phrase counts as two takes, so that each has anot
 @dataclass(frozen=True)
 class OpenedModel:
     """network: encodes and decodes; moved: its joints; dataset: what it is measured against; phrase: a show's
-    own, which is danced if no other is given.
+    own, which is danced if no other is given; is_dead: whether say_if_dead said so.
     """
 
     network: Network
     moved: MovedJoints
     dataset: Dataset
     phrase: Path | None = None
+    is_dead: bool = False
 
     @property
     def is_of_show(self) -> bool:
@@ -60,12 +61,11 @@ def open_either(
     """The checkpoint of a model, or a show's network of a source. Raises StudioError, ConfigError."""
     if show is not None:
         opened = open_show(source, show)
-        say_if_dead(opened.network, opened.dataset, console)
-        return opened
+        return replace(opened, is_dead=say_if_dead(opened.network, opened.dataset, console))
     assert checkpoint is not None, "the command asks for one of both"
     coder, dataset = open_model(MODELS[source], checkpoint, recordings, console, reading)
-    say_if_dead(coder.autoencoder, dataset, console)
-    return OpenedModel(coder.autoencoder, coder, dataset)
+    is_dead = say_if_dead(coder.autoencoder, dataset, console)
+    return OpenedModel(coder.autoencoder, coder, dataset, is_dead=is_dead)
 
 
 def say_if_dead(network: Network, dataset: Dataset, console: Console) -> bool:

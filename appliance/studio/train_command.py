@@ -116,14 +116,8 @@ def _finish(
     if not isinstance(training, Training) or training.settings.model != "puppet":
         if isinstance(training, Training) and settings.model == "sequence":
             report(load_checkpoint(checkpoint)[0].autoencoder, training.dataset, options.out, console)
-        if isinstance(training, Training) and settings.model in FILES and settings.network == "mlp":
-            coder = load_checkpoint(checkpoint)[0]
-            file = export_motion(coder, training.dataset, settings.model, options.out)
-            console.print(f"{file}: a show that holds it dances from it live (docs/variations.md, On stage).")
-            say_if_dead(coder.autoencoder, training.dataset, console)
-        if isinstance(training, Training) and settings.model == "pose":
-            ground = Ground.of(load_checkpoint(checkpoint)[0].autoencoder, training.dataset)
-            console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
+        if isinstance(training, Training) and settings.model in FILES:
+            _finish_motion(training, checkpoint, console)
         if isinstance(training, ImproviserTraining):
             _export_improviser(training, checkpoint, console)
         console.print(f"{checkpoint} is ready. Its use: {USES[settings.model]}.")
@@ -140,6 +134,17 @@ def _finish(
             for line in few_data(training.dataset):
                 console.print(line, highlight=False)
         console.print(f"{options.out} is a show. Dance it: bunraku play --show {show} --emulate")
+
+
+def _finish_motion(training: Training, checkpoint: Path, console: Console) -> None:
+    """The file of a pose or sequence model for a show, and whether the model is alive."""
+    coder, settings = load_checkpoint(checkpoint)[0], training.settings
+    if settings.network == "mlp":
+        file = export_motion(coder, training.dataset, settings.model, checkpoint.parent)
+        console.print(f"{file}: a show that holds it dances from it live (docs/variations.md, On stage).")
+    if not say_if_dead(coder.autoencoder, training.dataset, console) and settings.model == "pose":
+        ground = Ground.of(coder.autoencoder, training.dataset)
+        console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
 
 
 def _export_improviser(training: ImproviserTraining, checkpoint: Path, console: Console) -> None:

@@ -62,7 +62,7 @@ def run(options: PathOptions) -> None:
         line = even_path(read_line(options.draw), round(options.seconds * FPS))
         ground = Ground.of(network, dataset)
         poses = poses_of(network, ground.pose_map.latents(line))
-        if ground.reach.is_dead:
+        if ground.reach.is_dead and not opened.is_dead:
             console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
     if given is not None and options.regions:
         poses = only_in(options.regions, poses, given, dataset)

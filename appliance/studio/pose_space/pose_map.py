@@ -91,7 +91,8 @@ def run(options: MapOptions) -> None:
             highlight=False,
             soft_wrap=True,
         )
-    console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
+    if not opened.is_dead:  # a dead network's cause is said already; its map's would be another one
+        console.print(ground.reach.sentence(), highlight=False, soft_wrap=True)
     console.print(
         f"{options.out}: map.html to turn in a browser, map.png, projections.png, and map.svg to draw a "
         "line on for bunraku path --draw.",
