@@ -1,23 +1,28 @@
 """docs/pictures/page-*.png, by `python -m tools.page_pictures`: the page on a phone, taken by Chromium.
 
-It starts a box with emulated sensors; `--address` takes the pictures from another one.
+It starts a box with emulated sensors; `--address` takes the pictures from another one. What depends on the
+load of the machine that takes them is left out (`at_rest`), so that each time they show the same evening.
 """
 
 from __future__ import annotations
 
 import contextlib
+import json
 import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from PIL import Image
-from playwright.sync_api import Browser, Page, TimeoutError, sync_playwright
+from playwright.sync_api import Browser, Page, Route, TimeoutError, WebSocketRoute, sync_playwright
+
+from appliance.console.verdict import verdict
+from appliance.levers.status import Status
 
 CHROMIUM = "/usr/bin/chromium-headless-shell"  # without the windows of a desktop
 PAGES = ("tonight", "dance", "sensors", "rehearsal", "picture", "prove", "happened", "box", "device")
@@ -27,25 +32,83 @@ _CAPTIONS = {"dance": "#held", "rehearsal": "#figure-said"}  # they say when a f
 _COLOURS = 64  # a third of the bytes, and nothing that is seen
 _WELL_WITHIN_MS = 20_000
 _FADED_MS, _PROVEN_WITHIN_MS = 4_000, 300_000
+_EVENING = 1_767_816_900.0  # 20:15 of an evening
+_DANCED_S = 45 * 60.0  # the show has danced this long
 _LINKED_S = 15.0  # the emulated sensor is on, its neutral pose taken, and no fallback of the start in force
 
 
+def at_rest(told: str, now: float) -> str:
+    """What the server tells each second, as of a box with nothing else to do: no late ticks, no fallbacks,
+    and the server's own verdict on that. now: Unix seconds, which the page shows."""
+    value = json.loads(told)
+    if value.get("status") is None:
+        return told
+    rest = {"late": 0, "skipped": 0, "fallbacks": 0, "rate_hz": 50.0, "tick_p50_ms": 2.0, "tick_p99_ms": 4.0}
+    value["status"] |= rest
+    value |= {"fallbacks": [], "time": now, "since": now - _DANCED_S}
+    value["processes"] = [one | {"late": 0} for one in value["processes"]]
+    for sensor in value["sensors"]:
+        if sensor["heard"]:
+            sensor |= {"rate_hz": 50.0, "loss": 0.0, "round_trip_s": 0.004}
+    judged = verdict(
+        *(value["frames"], Status(**value["status"]), value["sensors"], [], value["since"], value["trouble"])
+    )
+    return json.dumps(value | {"verdict": judged._asdict()})
+
+
+def _calm(tab: Page, now: float) -> None:
+    """The page is told of a box at rest from now on; frames and all else are the server's."""
+
+    def between(browser: WebSocketRoute) -> None:
+        server = browser.connect_to_server()
+        server.on_message(lambda said: browser.send(at_rest(said, now) if isinstance(said, str) else said))
+
+    def journal(route: Route) -> None:
+        answer = route.fetch()
+        if answer.status == 200:
+            runs = [_calm_run(run, now) for run in answer.json()]
+            return route.fulfill(response=answer, json=runs)
+        return route.fulfill(response=answer)
+
+    tab.route_web_socket("**/watch", between)
+    tab.route("**/api/happened", journal)
+
+
+def _calm_run(run: dict[str, Any], now: float) -> dict[str, Any]:
+    """A run of the journal in which no tick was late."""
+    none = [0 for _ in run["late"]]
+    slowest = [round(3.0 + place % 3 * 0.4, 1) for place in range(len(none))]
+    events = [one for one in run["events"] if one[1] == "order"]
+    return run | {
+        **dict.fromkeys(("late", "skipped", "failed"), none),
+        "slowest_ms": slowest,
+        "events": events,
+        "begun": now - run["seconds"],
+    }
+
+
 def take_pictures(
-    browser: Browser, address: str, folder: Path, pin: str = "", well_within_ms: int = _WELL_WITHIN_MS
+    browser: Browser,
+    address: str,
+    folder: Path,
+    pin: str = "",
+    well_within_ms: int = _WELL_WITHIN_MS,
+    pages: Sequence[str] = PAGES,
 ) -> list[Path]:
-    """A PNG of each page as a phone shows it. pin: with it latency is proven first, for a picture of that.
+    """A PNG of each page as a phone shows it. pin: with it latency is measured first, for a picture of that.
 
     well_within_ms: a box that is not well by then is pictured as it is.
     """
     folder.mkdir(parents=True, exist_ok=True)
     taken = []
-    tab = browser.new_page(viewport={"width": 390, "height": 844}, locale="en-GB")
+    tab = browser.new_page(viewport={"width": 390, "height": 844}, locale="en-GB", timezone_id="Etc/UTC")
+    _calm(tab, _EVENING)
     tab.goto(address)
     tab.wait_for_selector("#figures dt", state="attached")
     _await_well(tab, well_within_ms)
     if pin:
         _prove(tab, pin)
-    for page in PAGES:
+    for page in pages:
         tab.click(f'[data-page="{page}"]')
         if page in _CAPTIONS:
             tab.wait_for_selector(f'{_CAPTIONS[page]}:text-matches("Held|No hand")')  # a frame is drawn
@@ -121,12 +184,16 @@ def _dancing() -> Iterator[tuple[str, str]]:
 def main(
     address: Annotated[str | None, typer.Option(help="Of a page; left out: a box is started.")] = None,
     out: Annotated[Path, typer.Option(help="The folder.")] = _FOLDER,
+    measure: Annotated[
+        bool, typer.Option(help="Measure too, for page-prove.png: on a quiet machine.")
+    ] = False,
 ) -> None:
     """Take the pictures of docs/page.md."""
     box = contextlib.nullcontext((address, "")) if address else _dancing()
     with box as (found, pin), sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        for path in take_pictures(browser, found, out, pin):
+        pages = [page for page in PAGES if measure or page != "prove"]  # of an earlier measurement
+        for path in take_pictures(browser, found, out, pin if measure else "", pages=pages):
             print(path)
         print(take_phone(browser, found, out))
         browser.close()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
+from appliance.levers.status import Status
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.show.bundle import default_show_path
@@ -15,6 +17,7 @@ from tools import certificate_picture
 from tools.certificate_picture import NOTES, note_of
 from tools.joints_picture import FINGERS, draw_joints
 from tools.loop_picture import HANG, SECONDS, arm_at
+from tools.page_pictures import at_rest
 
 
 def test_the_arm_of_the_loop_hangs_at_its_start_and_comes_round() -> None:
@@ -36,6 +39,33 @@ def test_every_joint_but_fingers_and_eyes_is_named(tmp_path: Path, monkeypatch: 
     assert Image.open(draw_joints(tmp_path / "joints.png")).size == (960, 760)
     names = read_bvh(default_show_path() / "skeleton.bvh").skeleton.names
     assert set(names) & set(written) == {name for name in names if not any(one in name for one in FINGERS)}
+
+
+def test_the_pages_of_the_documents_are_of_a_box_at_rest() -> None:
+    """However busy the machine was that took them; what is not of its load stays."""
+    sensor = {
+        "name": "left",
+        "heard": True,
+        "is_worn": True,
+        "rate_hz": 41.0,
+        "loss": 0.2,
+        "round_trip_s": 0.3,
+    }
+    lost = {**sensor, "name": "right", "heard": False}
+    status = Status(state="dancing", show="A", late=22, skipped=3, rate_hz=41.0, cue="storm", level=1.0)
+    told = {
+        "frames": "fresh", "trouble": "", "time": 7.0, "since": 6.0, "status": status._asdict(),
+        "fallbacks": [{"name": "tick-late", "active": True, "message": "Late."}],
+        "processes": [{"process": "lights", "late": 4}], "sensors": [sensor], "verdict": {"level": "warning"},
+    }  # fmt: skip
+    rest = json.loads(at_rest(json.dumps(told), 5000.0))
+    assert (rest["verdict"]["level"], rest["verdict"]["values"]["rate"]) == ("well", 50.0)
+    assert (rest["status"]["late"], rest["status"]["cue"], rest["fallbacks"]) == (0, "storm", [])
+    assert rest["sensors"][0]["loss"] == 0.0
+    missing = json.loads(at_rest(json.dumps({**told, "sensors": [sensor, lost]}), 5000.0))
+    assert missing["verdict"]["key"] == "sensors_missing", "what is wrong with the box is still shown"
+    nothing = json.dumps({**told, "status": None})
+    assert at_rest(nothing, 5000.0) == nothing
 
 
 def test_each_limit_of_a_measurement_has_its_own_note() -> None:
