@@ -49,7 +49,14 @@ def firewall(
 
 def rules(box: BoxConfig, access_points: Sequence[str] = ()) -> str:
     """One table of our own: all other tables stay as they are."""
-    lines = [*_sensors(box), *_commands(box), *_remote(box), *_page(box), *_own_network(access_points)]
+    lines = [
+        *_sensors(box),
+        *_commands(box),
+        *_remote(box),
+        *_page(box),
+        *_pair(box),
+        *_own_network(access_points),
+    ]
     return _RULES.format(rules="\n".join(f"\t\t{line}" for line in lines))
 
 
@@ -83,6 +90,14 @@ def _remote(box: BoxConfig) -> Iterator[str]:
     if network and not _is_loopback(network.host):
         where = f"{_to(network.host)}ip saddr {{ {', '.join(network.senders)} }}"
         yield f'{where} udp dport {network.port}-{network.port + 1} accept comment "MIDI"'
+
+
+def _pair(box: BoxConfig) -> Iterator[str]:
+    """The other box of a pair."""
+    pair = box.pair
+    if pair is not None and not _is_loopback(pair.host):
+        where = f"{_to(pair.host)}ip saddr {{ {', '.join(pair.peer)} }}"
+        yield f'{where} udp dport {pair.port} accept comment "the other box"'
 
 
 def _page(box: BoxConfig) -> Iterator[str]:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import struct
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.show_state import ShowStateReader
 from appliance.levers.show_state import ShowState, packed, unpacked
 
 FILE, KIND = "pair", "pair"
@@ -84,6 +87,29 @@ class PartReader:
         """Let go of the files."""
         self._part.close()
         self._state.close()
+
+
+class DarkWhileFollowing(ShowStateReader):
+    """The show state for a projector that is black while its box follows the other one."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self._part = PartReader(folder)
+        self._seen = self._dark = ShowState(blackout=True)
+
+    def read(self) -> ShowState:
+        """The newest show state, dark where this box follows."""
+        newest = super().read()
+        if not self._part.follows(time.monotonic()):
+            return newest
+        if newest is not self._seen:
+            self._seen, self._dark = newest, replace(newest, blackout=True)
+        return self._dark
+
+    def close(self) -> None:
+        """Let go of the files."""
+        super().close()
+        self._part.close()
 
 
 def forget_part(folder: Path) -> None:

@@ -21,6 +21,7 @@ from appliance.box.show_state import ShowStateReader
 from appliance.box.watchdog import Patience, guarded
 from appliance.levers.table import LOOK
 from appliance.outputs.frame_reader import FrameReader
+from appliance.pair.part import DarkWhileFollowing
 from appliance.projector.alignment import AlignmentFile, alignment_folder
 from appliance.projector.context import GlContext
 from appliance.projector.controls import Controls
@@ -111,7 +112,8 @@ class Run:
             opened.callback(self._health.close)
             self.reader = FrameReader(folder)
             opened.callback(self.reader.close)
-            self._show_state = ShowStateReader(folder)
+            is_dark = box.pair is not None and box.pair.picture == "black"
+            self._show_state = DarkWhileFollowing(folder) if is_dark else ShowStateReader(folder)
             opened.callback(self._show_state.close)
             self.projector = Projector(
                 self.context.gl, config, self.reader, self._show_state, self._controls, say

@@ -16,6 +16,7 @@ import numpy as np
 from appliance.box.clock import TICK_S, TickClock
 from appliance.box.orders import Order
 from appliance.box.snapshot import packed, restore, shift_times
+from appliance.dancer.loop import Loop
 from appliance.levers import show_state as states
 from appliance.levers.show_state import ShowState
 from appliance.pair.carrier import Carrier
@@ -28,6 +29,7 @@ from appliance.show.config_error import ConfigError, Problem
 from appliance.show.pair import PairConfig
 from appliance.show.show import Show
 from appliance.stage.comparison import Comparison
+from appliance.stage.made_again import maker_of
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.rerun import RecordedNetwork, Rerun
 from appliance.stage.sensor_fit import SensorFit
@@ -89,7 +91,9 @@ class PairedStage:
         reconciler: Reconciler,
         folder: Path,
         say: Callable[[str], None],
+        made: Callable[[str], Loop] | None = None,
     ) -> None:
+        """made: gives the loops that this box's generator has made; it raises ValueError."""
         facts = facts_of_run(show, list(parts.worn))
         self._layout = layout_of(facts)
         self._settings = settings_of(config)
@@ -100,6 +104,8 @@ class PairedStage:
         self._own_link, self._own_live = parts.link, parts.live_inbox
         self._own_latest_start_s = tick.latest_start_s
         self._own_most = [one.iterations.most for one in parts.puppets]
+        if made is not None:
+            parts.make_by(_made_here_or_again(show, parts, made))
         self._part = PartWriter(folder)
         self._carrier = Carrier(config.peer)
         self._items: list[bytes] = []
@@ -188,9 +194,9 @@ class PairedStage:
         if (keyframe := self.pair.take_keyframe()) is not None:
             self._restore(keyframe)
         for _ in range(_AT_ONCE):
-            if (message := self.pair.take_message()) is None:
+            if (next_one := self.pair.take_message()) is None:
                 break
-            self._run(message, clock, pulse)
+            self._run(next_one, clock, pulse)
         else:
             time.sleep(_REST_S)
         follows = self._has_danced and self.pair.behind <= _MOST_BEHIND
@@ -383,6 +389,19 @@ class PairedStage:
                 one.iterations.allow(most)
         self._has_danced = False
         self._write_part(clock.now())
+
+
+def _made_here_or_again(show: Show, parts: StageParts, made: Callable[[str], Loop]) -> Callable[[str], Loop]:
+    """Loops of recipes: those of this box's generator, else made again as a replay does."""
+    again = maker_of(show, parts.led.motion)
+
+    def loop(recipe: str) -> Loop:
+        try:
+            return made(recipe)
+        except ValueError:
+            return again(recipe)
+
+    return loop
 
 
 def _items_of(message: bytes) -> Iterator[tuple[int, bytes]]:

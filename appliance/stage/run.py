@@ -216,7 +216,7 @@ class Stage:
             return None  # what the other box would follow is what the recorder notes; it was said why not
         paired = PairedStage(
             *(self.box.pair, self.show, self.parts, self.wearing, self.tick, self.reconciler),
-            *(self.sharing.folder, self._say_and_note),
+            *(self.sharing.folder, self._say_and_note, self.made[0].loop if self.made else None),
         )
         self.recorder.tap = paired.note
         return paired
