@@ -137,21 +137,21 @@ mkdir -p build && cmake -S firmware -B build/$(1) $(3) >build/$(1).log 2>&1 || {
 cmake --build build/$(1) --target $(2) --parallel 2 -- --silent --no-print-directory
 endef
 
-boot-figures: $(VENV)/.ready-to-test debian-for-boot ## boot the box, harm it, cut its power; times in out/boot (root)
+boot-figures: $(VENV)/.ready-to-test debian-for-boot ## boot the box, break it, cut its power; times in out/boot (root)
 	@BUNRAKU_FIGURES=out/boot $(BIN)/pytest tests/boot --long -rs $(TEST_ARGS)
 
 image: debian-for-image deb ## the box's disk image, out/bunraku-amd64.img (ARCH=arm64: a Raspberry Pi's card; root)
 	@rm -rf build/image-$(ARCH) && deploy/image/mkroot.sh --arch $(ARCH) --deb out/bunraku_$(VERSION)_$(ARCH).deb build/image-$(ARCH)
 	@deploy/image/mkimage.sh build/image-$(ARCH) out/bunraku-$(ARCH).img
 
-test-vm: $(VENV)/.ready-to-test debian-for-vm ## start the image in a machine in software, harm it, cut its power (an hour)
+test-vm: $(VENV)/.ready-to-test debian-for-vm ## start the image in an emulated machine, break it, cut its power (an hour)
 	@[ -f out/bunraku-$(ARCH).img ] || $(MAKE) image ARCH=$(ARCH)
 	@BUNRAKU_IMAGE=out/bunraku-$(ARCH).img $(BIN)/pytest tests/vm -rs -s $(TEST_ARGS)
 
-soak: $(VENV)/.ready-to-run debian-for-soak ## the whole box under load and trouble for MINUTES; figures and picture in out/soak
+soak: $(VENV)/.ready-to-run debian-for-soak ## the whole box under load and faults for MINUTES; figures and picture in out/soak
 	@exec $(BIN)/python -m hw_sim.soak --minutes $(MINUTES) --out out/soak
 
-lint: $(VENV)/.ready-to-test ## style, types and import contracts alone
+lint: $(VENV)/.ready-to-test ## only style, types and import contracts
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy --strict -p appliance -p hw_sim -p tools
