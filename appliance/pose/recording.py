@@ -61,7 +61,7 @@ class Recording:
             return self
         return self.between(np.interp(np.arange(frames[0], frames[-1] + 1), frames, np.arange(len(frames))))
 
-    def between(self, at: NDArray[np.float64]) -> Recording:
+    def between(self, at: Array) -> Recording:
         """Poses at places among the frames: rotations by SLERP, positions straight between two."""
         before = np.minimum(at.astype(int), len(self) - 2)
         share = at - before
