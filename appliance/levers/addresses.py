@@ -163,6 +163,15 @@ PROJECTOR = (
     ),
     _once("projector", "corners/reset", "/projector/corners/reset", "the whole picture again"),
     _once(
+        "projector",
+        "warp",
+        "/projector/warp",
+        "pulls one point of the 5 by 5 mesh by these shares; the corners are `/projector/corner`'s",
+        *(Number("point", 1, 25, is_whole=True), *_WAY),
+        arguments="1 to 25 row by row, dx, dy",
+    ),
+    _once("projector", "warp/reset", "/projector/warp/reset", "no mesh any more; the corners stay"),
+    _once(
         *(
             "projector",
             "brightness",
@@ -205,6 +214,17 @@ SENSORS = (
         "reread the key file: new sensors may join, removed ones are dropped at once",
     ),
     Address("/sensors/list", Form(), "tells the state of all sensors"),
+)
+GESTURES = (
+    Address(
+        "/gesture/record",
+        Form("name", also="cue"),
+        "the next three movements of a hand between stillnesses are a gesture: whenever it makes that one "
+        "again, the cue is called",
+    ),
+    Address("/gesture/stop", Form(), "nothing is recorded"),
+    Address("/gesture/forget", Form("name"), "the gesture calls nothing any more"),
+    Address("/gesture/rename", Form("name", also="new name"), "gives it another name"),
 )
 MADE_AHEAD = (
     *(one for one in _levers_at(*_MOTION)),
@@ -270,6 +290,13 @@ QUESTIONS = (
         ),
     ),
     Question(
+        "/gestures",
+        (
+            ("/gestures/gesture", ",sss", "name; the cue that it calls; joint of its hand"),
+            ("/gestures/recording", ",sii", "name; repetitions that have come; how many it takes"),
+        ),
+    ),
+    Question(
         "/fallbacks",
         (
             (
@@ -282,7 +309,7 @@ QUESTIONS = (
     ),
 )
 ADDRESSES: dict[str, Address] = {
-    one.address: one for one in (*THE_SHOW, *PLAYBACK, *PROJECTOR, *SENSORS, *MADE_AHEAD)
+    one.address: one for one in (*THE_SHOW, *PLAYBACK, *PROJECTOR, *SENSORS, *GESTURES, *MADE_AHEAD)
 }
 NAMED: dict[str, str] = {  # questions for names, and the address that each of these names comes with
     one.address: answer for one in QUESTIONS for answer, tags, _ in one.answers if tags == ",si"

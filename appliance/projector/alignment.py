@@ -16,6 +16,8 @@ from appliance.box.durable import write_whole
 from appliance.pose.foreign_file import TooLargeError, content
 from appliance.pose.foreign_yaml import plain_values
 from appliance.projector.corners import WHOLE, Corners, complaint
+from appliance.projector.warp import NOT_WARPED, Warp
+from appliance.projector.warp import complaint as warp_complaint
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
 
@@ -30,11 +32,13 @@ MOST_BRIGHT = 2.0
 @dataclass(frozen=True)
 class Alignment:
     """corners: where the picture's corners lie, clockwise from its top left as the audience sees it, in
-    shares of the display's width and height, y down; mirror: for rear projection; brightness: a factor."""
+    shares of the display's width and height, y down; mirror: for rear projection; brightness: a factor;
+    warp: how far each point of the mesh is pulled from there, row by row, () for none."""
 
     corners: Corners = WHOLE
     mirror: bool = False
     brightness: float = 1.0
+    warp: Warp = NOT_WARPED
 
 
 def alignment_folder(box: BoxConfig, environment: Mapping[str, str] = os.environ) -> Path:
@@ -79,6 +83,8 @@ class AlignmentFile:
         sentences = []
         if chosen.corners != WHOLE:
             sentences.append("The corners lie as they were last put by hand.")
+        if chosen.warp:
+            sentences.append("The picture is warped as it was last warped by hand.")
         if chosen.mirror != box_file.mirror:
             facing = "mirrored" if chosen.mirror else "not mirrored"
             sentences.append(f"The picture is {facing}, as last chosen by hand, against the box file.")
@@ -160,9 +166,11 @@ class AlignmentFile:
 def _text(alignment: Alignment, from_box: Alignment) -> str:
     """Beside each value that the box file sets as well stands the box file's value of that time."""
     corners = ", ".join(f"[{x!r}, {y!r}]" for x, y in alignment.corners)
+    warp = ", ".join(f"[{x!r}, {y!r}]" for x, y in alignment.warp)
     mirror, box_mirror = str(alignment.mirror).lower(), str(from_box.mirror).lower()
     return (
         f"{_HEADER}corners: [{corners}]\n"
+        f"warp: [{warp}]\n"
         f"mirror: {{chosen: {mirror}, box_file: {box_mirror}}}\n"
         f"brightness: {{chosen: {alignment.brightness!r}, box_file: {from_box.brightness!r}}}\n"
     )
@@ -176,7 +184,12 @@ def _read(values: Any, from_box: Alignment) -> Alignment:
         (a, b, c, d),
         bool(mirror["chosen"]) if mirror["box_file"] == from_box.mirror else from_box.mirror,
         float(brightness["chosen"]) if brightness["box_file"] == from_box.brightness else from_box.brightness,
+        tuple((float(x), float(y)) for x, y in values.get("warp", ())),
     )
-    if complaint(chosen.corners) or not 0.0 <= chosen.brightness <= MOST_BRIGHT:
+    if (
+        complaint(chosen.corners)
+        or warp_complaint(chosen.warp, chosen.corners)
+        or not 0.0 <= chosen.brightness <= MOST_BRIGHT
+    ):
         raise ValueError("no alignment")
     return chosen

@@ -9,6 +9,8 @@ from typing import Any
 from appliance.box.orders import Order
 from appliance.projector.alignment import MOST_BRIGHT, Alignment
 from appliance.projector.corners import WHOLE, Corners, Point, complaint
+from appliance.projector.warp import NOT_WARPED, moved
+from appliance.projector.warp import complaint as warp_complaint
 
 _CORNER_NAMES = ("top left", "top right", "bottom right", "bottom left")
 
@@ -76,16 +78,33 @@ class Controls:
 
     def place_all(self, corners: Corners) -> tuple[bool, str]:
         """Put all four corners; whether it was done, and a sentence."""
-        refused = complaint(corners)
+        refused = complaint(corners) or warp_complaint(self.alignment.warp, corners)
         if refused:
             return False, refused
         self._set_alignment(replace(self.alignment, corners=corners))
         places = ", ".join(f"({x:.4f}, {y:.4f})" for x, y in corners)
         return True, f"The picture's corners are at {places}."
 
+    def pull(self, point: int, dx: float, dy: float) -> tuple[bool, str]:
+        """Pull a point of the mesh, 0 to 24 row by row, by shares of the display; whether it was done."""
+        try:
+            warp = moved(self.alignment.warp, point, (dx, dy))
+        except ValueError as error:
+            return False, str(error)
+        if refused := warp_complaint(warp, self.alignment.corners):
+            return False, refused
+        self._set_alignment(replace(self.alignment, warp=warp))
+        x, y = warp[point]
+        return True, f"Point {point + 1} of the mesh is pulled by ({x:.4f}, {y:.4f})."
+
+    def flatten(self) -> str:
+        """No mesh warp any more; the corners stay."""
+        self._set_alignment(replace(self.alignment, warp=NOT_WARPED))
+        return "The picture is flat again between its corners."
+
     def reset(self) -> str:
         """The picture fills the display again."""
-        self._set_alignment(replace(self.alignment, corners=WHOLE))
+        self._set_alignment(replace(self.alignment, corners=WHOLE, warp=NOT_WARPED))
         return "The picture fills the display."
 
     def set_mirror(self, mirror: bool) -> str:
@@ -119,6 +138,7 @@ class Controls:
         corners, brightness = self.alignment.corners, self.alignment.brightness
         return {
             "corners": corners,
+            "warp": self.alignment.warp,
             "brightness": brightness,
             "grid": self.has_grid,
             "info": self.shows_info,
@@ -136,6 +156,10 @@ class Controls:
             case "corners", 8:
                 a, b, c, d = ((values[k], values[k + 1]) for k in range(0, 8, 2))
                 return self.place_all((a, b, c, d))
+            case "warp", 3 if values[0] % 1 == 0:
+                return self.pull(int(values[0]) - 1, values[1], values[2])
+            case "warp/reset", _:
+                return True, self.flatten()
             case "corners/reset", _:
                 return True, self.reset()
             case "brightness", 1:

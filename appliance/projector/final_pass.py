@@ -15,6 +15,7 @@ from appliance.projector.masks import Masks
 from appliance.projector.page import page
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.wall import DETAILS, FLAT, Detail, Wall, flat
+from appliance.projector.warp import FINE, Warp, fine
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 
@@ -66,6 +67,10 @@ class FinalPass:
             Drawing(gl, "final", "final", parts=parts)
             for parts in ([], [*fixed, "DIM"], [*fixed, "DIM", "MARKS"])
         )
+        self._warped = Drawing(gl, "final", "final", parts=[*fixed, "DIM", "MARKS", "WARP"])
+        self._offsets = gl.texture((FINE, FINE), 4, dtype="f2")
+        self._offsets.repeat_x = self._offsets.repeat_y = False
+        self._offset_by: Warp | None = None
         self._masks = Masks(gl, config.masks)
         self._text = gl.texture((1, 1), 1)
         self._written: tuple[object, ...] = ()
@@ -89,7 +94,8 @@ class FinalPass:
         """
         scale, gamma = level * controls.alignment.brightness, self._config.gamma
         toe = _TOE[self._config.wall]
-        self._is_graded = self._config.edge_blend is None and not lines and not controls.shows_grid
+        has_marks = bool(lines) or controls.shows_grid or bool(controls.alignment.warp)
+        self._is_graded = self._config.edge_blend is None and not has_marks
         if self._is_graded and size == display:
             self.resize(_NO_SIZE)
             clip_from_picture = self._clip_from_part(controls) @ _Y_UP
@@ -123,7 +129,8 @@ class FinalPass:
     ) -> None:
         """Lay the picture onto the display. level 0..1; `lines`: figures to show, maybe none."""
         scale = level * controls.alignment.brightness
-        has_marks = bool(lines) or controls.shows_grid
+        warp = controls.alignment.warp
+        has_marks = bool(lines) or controls.shows_grid or bool(warp)
         self.black(screen, display)
         if scale == 0.0 and not has_marks:
             return
@@ -135,7 +142,10 @@ class FinalPass:
         }
         if has_marks:
             inputs |= self._place(display, controls) | self._mark(lines, display, controls)
-            self._marked.draw(inputs)
+            if warp:
+                self._warped.draw(inputs | {"offsets": self._fine_offsets(warp)})
+            else:
+                self._marked.draw(inputs)
         else:
             inputs["clip_from_part"] = self._clip_from_part(controls)
             drawing = self._unchanged if self._is_graded else self._dimmed
@@ -154,8 +164,25 @@ class FinalPass:
     def release(self) -> None:
         """Give the GPU's memory back."""
         self._release_picture()
-        for owned in (self._masks, self._text, self._unchanged, self._dimmed, self._marked):
+        for owned in (
+            self._masks,
+            self._text,
+            self._offsets,
+            self._unchanged,
+            self._dimmed,
+            self._marked,
+            self._warped,
+        ):
             owned.release()
+
+    def _fine_offsets(self, warp: Warp) -> moderngl.Texture:
+        """The warp between its points too, as a texture of shares of the display."""
+        if warp != self._offset_by:
+            offsets = np.zeros((FINE, FINE, 4), np.float16)
+            offsets[..., :2] = fine(warp)
+            self._offsets.write(offsets.tobytes())
+            self._offset_by = warp
+        return self._offsets
 
     def _clip_from_part(self, controls: Controls) -> NDArray[np.float64]:
         """(3, 3) from the unit square of this display's part of the picture (y down) to clip space."""

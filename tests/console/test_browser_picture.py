@@ -147,6 +147,29 @@ def test_a_corner_follows_the_finger_on_the_wall(
     assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+def test_a_point_of_the_mesh_follows_the_finger_on_the_wall(
+    context: BrowserContext, hall: tuple[Box, Page, Node], wall: Projection
+) -> None:
+    box, page, _ = hall
+    tab = unlocked_tab(context, page, "picture")
+    point = tab.locator('[data-point="12"]')
+    expect(point).to_be_hidden()
+    press(tab, "#mesh")
+    pad, handle = tab.locator("#corners").bounding_box(), point.bounding_box()
+    assert pad is not None and handle is not None
+    drag(tab, handle["x"] + 20, handle["y"] + 20, 0.1 * pad["width"], -0.1 * pad["height"])
+
+    def pulled() -> tuple[float, float]:
+        file = box.box_file.with_name("projector.alignment")
+        warp = yaml.safe_load(file.read_text())["warp"] if file.is_file() else []
+        x, y = warp[12] if warp else (0.0, 0.0)
+        return x, y
+
+    wait_until(lambda: pulled() == pytest.approx((0.1, -0.1), abs=0.01), lambda: tab.inner_text("#said"))
+    wall.await_picture(lambda picture: bool(picture.any()))
+    wait_until(lambda: hold(tab, "#mesh-reset") or pulled() == (0.0, 0.0), lambda: tab.inner_text("#said"))
+
+
 def hold(tab: Tab, where: str) -> None:
     """Long enough for a button that asks for it."""
     tab.locator(where).dispatch_event("pointerdown")

@@ -16,6 +16,7 @@ from appliance.projector.controls import Controls
 from appliance.projector.corners import Corners
 from appliance.projector.final_pass import FinalPass, part_of, picture_size
 from appliance.projector.info import letters
+from appliance.projector.warp import FINE, on_display
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 from tests.projector.stage_double import pixels
 
@@ -225,3 +226,41 @@ def is_written(message: str, white: np.ndarray, x: int, y: int) -> bool:
     top, left = y - wanted.shape[0] // 2, x - wanted.shape[1] // 2
     near = spots[max(0, top - 2) : top + 3, max(0, left - 2) : left + 3]
     return bool((near == wanted).all(axis=(2, 3)).any())
+
+
+WARP = tuple(
+    (0.03 * (k % 3 - 1), 0.02 * (k % 4 - 1.5)) if k not in (0, 4, 20, 24) else (0.0, 0.0) for k in range(25)
+)
+
+
+@pytest.mark.parametrize("corners", [None, ((10, 4), (150, 2), (156, 86), (6, 80))])
+def test_a_mesh_pulls_the_picture(show: Show, corners: Any) -> None:
+    """A picture whose colours are its places shows where each of them is. Null: without the mesh they are off."""
+    across, down = np.meshgrid(np.linspace(0, 255, SIZE[0]), np.linspace(0, 255, SIZE[1]))
+    places = np.dstack([across, down, np.zeros_like(down)]).round().astype(np.uint8)
+    pinned = Alignment(warp=WARP)
+    if corners is not None:
+        shares = tuple((x / SIZE[0], y / SIZE[1]) for x, y in corners)
+        pinned = Alignment(shares, warp=WARP)  # type: ignore[arg-type]
+    wanted = on_display(WARP, pinned.corners)
+    share = np.linspace(0, 1, FINE)
+
+    def errors(alignment: Alignment) -> np.ndarray:
+        found = show(places, alignment).astype(float) / 255
+        off = []
+        for row, column in ((6, 9), (16, 16), (20, 25), (27, 12)):
+            x, y = wanted[row, column] * SIZE
+            seen = found[int(y), int(x), :2]
+            off.append(np.abs(seen - (share[column], share[row])).max())
+        return np.array(off)
+
+    assert errors(pinned).max() < 0.015
+    assert errors(Alignment(pinned.corners)).max() > 0.02
+
+
+def test_a_mesh_is_mirrored_with_the_picture_and_lies_under_the_grid(show: Show) -> None:
+    warped, mirrored = Alignment(warp=WARP), Alignment(warp=WARP, mirror=True)
+    assert np.abs(show(noise(), mirrored)[:, ::-1].astype(int) - show(noise(), warped)).max() <= 2
+    controls = Controls(warped, lambda _: None)
+    controls.set_grid(True)
+    assert show(flat(0), controls=controls).max() > 200

@@ -8,7 +8,18 @@ const SWITCHES = ["grid", "test_card", "info"]; // what the projector calls them
 const STEP_S = 0.12, NUDGE = 0.002;
 const OWN_MS = 2500; // the projector tells once a second: until then this page's own change is the newest
 const before = []; // corners before each change made here, for undo
-let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]);
+const MESH = 5; // points across and down
+const INNER = [...Array(MESH * MESH).keys()].filter((place) => ![0, MESH - 1, MESH * (MESH - 1), MESH * MESH - 1].includes(place));
+let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]), pulls = [];
+
+// What a handle moves: where it is, how it is shown while a finger is on it, and the order for a step.
+const CORNER = {
+  address: "/projector/nudge",
+  at: (place) => shown[place],
+  show: (place, point) => put(shown.map((one, other) => other === place ? point : one)),
+  remember,
+};
+const POINT = { address: "/projector/warp", at: meshPoint, show: layPoint, remember: () => {} };
 
 export function initPicture() {
   for (const id of SWITCHES) {
@@ -23,7 +34,20 @@ export function initPicture() {
     ownUntil = performance.now() + OWN_MS;
     brightness.blur();
   });
-  CORNERS.forEach((_, place) => byId("corners").append(handle(place)));
+  CORNERS.forEach((_, place) => byId("corners").append(handle(place, CORNER)));
+  for (const place of INNER) {
+    const point = handle(place, POINT);
+    point.className = "point";
+    point.dataset.point = String(place);
+    byId("corners").append(point);
+  }
+  byId("mesh").addEventListener("click", () => {
+    const isOn = byId("corners").classList.toggle("meshed");
+    byId("mesh").setAttribute("aria-pressed", String(isOn));
+  });
+  held(byId("mesh-reset"), async () => {
+    if (await command("/projector/warp/reset")) lay([]);
+  }, (sentence) => say(sentence));
   put(shown);
 }
 
@@ -38,6 +62,7 @@ export function showPicture(value) {
   if (document.activeElement !== byId("brightness")) byId("brightness").value = Math.round(100 * wall.brightness);
   tellBrightness();
   for (const id of SWITCHES) byId(id).setAttribute("aria-pressed", String(wall[id] === true));
+  pulls = wall.warp ?? [];
   put(wall.corners);
 }
 
@@ -77,9 +102,32 @@ function put(corners) {
     button.style.left = `clamp(4px, ${100 * x}% - 32px, 100% - 68px)`;
     button.style.top = `clamp(4px, ${100 * y}% - 32px, 100% - 68px)`;
   });
+  lay(pulls);
 }
 
-function handle(place) {
+// The mesh hangs between the corners; each of its points is pulled from there.
+function meshPoint(place) {
+  const u = place % MESH / (MESH - 1), v = Math.floor(place / MESH) / (MESH - 1), [dx, dy] = pulls[place] ?? [0, 0];
+  const mixed = [0, 1].map((axis) => {
+    const [a, b, c, d] = shown.map((corner) => corner[axis]);
+    return (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * c);
+  });
+  return [mixed[0] + dx, mixed[1] + dy];
+}
+
+function lay(warp) {
+  pulls = warp;
+  for (const place of INNER) layPoint(place, meshPoint(place));
+}
+
+function layPoint(place, [x, y]) {
+  const button = byId("corners").querySelector(`[data-point="${place}"]`);
+  if (!button) return;
+  button.style.left = `calc(${100 * x}% - 20px)`;
+  button.style.top = `calc(${100 * y}% - 20px)`;
+}
+
+function handle(place, what) {
   const button = document.createElement("button");
   button.type = "button";
   button.textContent = place + 1;
@@ -98,7 +146,7 @@ function handle(place) {
       return;
     }
     isSending = true;
-    const done = await command("/projector/nudge", place + 1, dx, dy);
+    const done = await command(what.address, place + 1, dx, dy);
     isSending = false;
     ownUntil = performance.now() + OWN_MS;
     if (done) sent = [sent[0] + dx, sent[1] + dy];
@@ -108,7 +156,7 @@ function handle(place) {
     button.setPointerCapture(event.pointerId);
     if (!wall?.grid && byId("grid").getAttribute("aria-pressed") !== "true") switchOn("grid", "/projector/grid", true);
     from = [event.clientX, event.clientY];
-    start = [...shown[place]];
+    start = [...what.at(place)];
     ownUntil = Infinity;
     [sent, at, misses] = [[sent[0] - at[0], sent[1] - at[1]], [0, 0], 0];
     clearInterval(timer);
@@ -117,9 +165,9 @@ function handle(place) {
   button.addEventListener("pointermove", (event) => {
     if (!from) return;
     const pad = byId("corners").getBoundingClientRect();
-    if (!at[0] && !at[1]) remember();
+    if (!at[0] && !at[1]) what.remember();
     at = [(event.clientX - from[0]) / pad.width, (event.clientY - from[1]) / pad.height];
-    put(shown.map((one, other) => other === place ? [start[0] + at[0], start[1] + at[1]] : one));
+    what.show(place, [start[0] + at[0], start[1] + at[1]]);
   });
   const end = () => {
     if (!from) return;
@@ -134,8 +182,8 @@ function handle(place) {
     const way = ways[event.key];
     if (!way) return;
     event.preventDefault();
-    if (!event.repeat) remember();
-    await command("/projector/nudge", place + 1, NUDGE * way[0], NUDGE * way[1]);
+    if (!event.repeat) what.remember();
+    await command(what.address, place + 1, NUDGE * way[0], NUDGE * way[1]);
   });
   return button;
 }

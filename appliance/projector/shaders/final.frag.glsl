@@ -1,4 +1,5 @@
 // The picture onto the wall: corner-pin, mirror; GAMMA, BLEND for edge blend, DIM for brightness, MARKS.
+// WARP: the picture is pulled by a mesh, and each pixel of the wall looks for its place in it.
 
 uniform sampler2D picture;         // what the looks have drawn; with edge blend wider than this display
 uniform vec2 part;                 // where this part begins in the picture, and how wide it is
@@ -33,6 +34,15 @@ uniform float grid;                // 0 or 1
 uniform vec3 marker;               // the chosen corner, wall pixels; radius, 0: none
 uniform float text_scale;          // wall pixels a text pixel
 uniform float aspect;              // width over height of the whole picture
+
+#ifdef WARP
+uniform sampler2D offsets;         // over the picture's unit square, shares of the display; the square of FINE points
+
+vec2 pulled(vec2 uv) {
+    float points = float(textureSize(offsets, 0).x);
+    return textureLod(offsets, (clamp(uv, 0.0, 1.0) * (points - 1.0) + 0.5) / points, 0.0).rg * display;
+}
+#endif
 
 float lines(vec2 place, vec2 pixel_size) {
     vec2 nearest = abs(fract(place - 0.5) - 0.5) / pixel_size;
@@ -69,6 +79,12 @@ void main() {
     wall = mix(wall, display - wall, flips);
     vec3 projected = picture_from_wall * vec3(wall, 1.0);
     vec2 uv = projected.xy / projected.z;
+#ifdef WARP
+    for (int step = 0; step < 8; step++) {
+        projected = picture_from_wall * vec3(wall - pulled(uv), 1.0);
+        uv = projected.xy / projected.z;
+    }
+#endif
     vec2 pixel_size = max(fwidth(uv), 1e-9);
     float seen = projected.z > 0.0 ? coverage(uv, pixel_size) : 0.0;
     vec2 inside = clamp(uv, 0.0, 1.0);
