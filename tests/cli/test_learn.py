@@ -132,6 +132,17 @@ def test_the_shows_that_come_with_the_box_stand_on_both_sides_of_the_bar() -> No
     assert not all(one["holds"] for one in failed)
 
 
+def test_a_machine_too_slow_for_a_critic_is_judged_by_the_other_figures(tmp_path: Path) -> None:
+    for show, passes in (("default", True), ("martial", False)):
+        report = json.loads(report_of(show, tmp_path).read_text())
+        report["puppetry"]["lShldr"]["10_9"]["critic"] = None
+        figures = figures_of(report)
+        assert "critic" not in [one["name"] for one in figures]
+        assert all(one["holds"] for one in figures) is passes
+        report["puppetry"]["lShldr"]["10_9"]["energy_legs"] = None
+        assert not all(one["holds"] for one in figures_of(report))
+
+
 def test_it_pauses_while_a_show_dances_and_goes_on_from_the_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

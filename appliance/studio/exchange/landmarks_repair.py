@@ -13,6 +13,7 @@ from appliance.pose.quaternion import Array
 from appliance.studio.exchange.fitting import gaps_of
 
 FPS = 50.0
+_GUESSED_S = 2.0  # a limb that is hidden for so long is nearer to a network's guess than to a straight line
 LEAST_SEEN = 0.3  # a network's own doubt: below it the place is a guess
 _LEAP = 0.12  # fraction of the figure's height: a landmark this far from its neighbours in time leapt
 _LEAP_FRAMES = 3  # neighbours on each side
@@ -45,14 +46,15 @@ def repaired(
     """Landmarks (N, P, 3) of these parts at uneven times -> at an even rate.
 
     seen (N, P): 0..1. Gaps up to longest_gap_s are crossed in straight lines. In longer ones a landmark is
-    where the network guessed it, else it is crossed too; they are listed.
+    where the network guessed it, from _GUESSED_S on; else they are crossed too. They are listed.
     """
     found, rate = points.copy(), 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else FPS
     trunk = [part in TRUNK for part in parts]
     found[(seen < LEAST_SEEN) & ~np.array(trunk)] = np.nan
     hidden = [one for one in gaps_of(found) if (one.last - one.first + 1) / rate > longest_gap_s]
-    for gap in hidden:  # a network's guess for long is better than nothing
-        found[gap.first : gap.last + 1, gap.joint] = points[gap.first : gap.last + 1, gap.joint]
+    for gap in hidden:
+        if (gap.last - gap.first + 1) / rate > _GUESSED_S:
+            found[gap.first : gap.last + 1, gap.joint] = points[gap.first : gap.last + 1, gap.joint]
     size = _height(found)
     found, swapped = _sides_put_back(parts, found, size)
     leaps = _leaps(found, size)
