@@ -61,15 +61,15 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     ),
     "remote": ("bunraku remote --box box.yaml",),
     "sound": ("bunraku sound --box box.yaml", "bunraku sound out/tonight --file tonight.wav"),
+    "learn": (
+        "bunraku learn --recordings takes --out tonight",
+        "bunraku learn --recordings takes --out tonight --minutes 120 -- --from my_show",
+    ),
     "emulate": (
         "bunraku emulate --sensor left-wrist --seconds-per-turn 5",
         "bunraku emulate --sensor left-wrist=dance --sensor head=still --network bad",
         "bunraku emulate --motion trace --trace dance.bvh --joint lShldr --serial /dev/ttyUSB0",
         "bunraku emulate --firmware --motion dance",
-    ),
-    "learn": (
-        "bunraku learn --recordings takes --out tonight",
-        "bunraku learn --recordings takes --out tonight --minutes 120 -- --from my_show",
     ),
     "measure": ("bunraku measure --seconds 30 --report out/measure",),
     "filmstrip": (
