@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 BEFORE_STEP_S = 0.1  # the joint's orientation before a step is its mean over this long
 SETTLED_S = (0.3, 0.45)  # and after it over this part
 HEARD_WITHIN_S = 0.1
-_LOUD_WINDOW_S, _HEARD = 0.001, 1e-4  # of full scale: softer than this nobody hears
+_LOUD_WINDOW_S, _HEARD = 0.001, 1e-4  # share of full scale below which nothing is audible
 
 
 class SentReading(NamedTuple):

@@ -1,7 +1,7 @@
 """docs/pictures/page-*.png, by `python -m tools.page_pictures`: the page on a phone, taken by Chromium.
 
-It starts a box with emulated sensors; `--address` takes the pictures from another one. What depends on the
-load of the machine that takes them is left out (`at_rest`), so that each time they show the same evening.
+It starts a box with emulated sensors; `--address` takes the pictures from another one. Figures that depend on
+the load of the machine are replaced (`at_rest`), so that the pictures are the same on every machine.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _LINKED_S = 15.0  # the emulated sensor is on, its neutral pose taken, and no fa
 
 
 def at_rest(told: str, now: float) -> str:
-    """What the server tells each second, as of a box with nothing else to do: no late ticks, no fallbacks,
-    and the server's own verdict on that. now: Unix seconds, which the page shows."""
+    """The status that the server sends each second, as a box with nothing else to do sends it: no late
+    ticks, no fallbacks, and the server's own verdict on that. now: Unix seconds, which the page shows."""
     value = json.loads(told)
     if value.get("status") is None:
         return told
@@ -192,7 +192,7 @@ def main(
     box = contextlib.nullcontext((address, "")) if address else _dancing()
     with box as (found, pin), sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        pages = [page for page in PAGES if measure or page != "prove"]  # of an earlier measurement
+        pages = [page for page in PAGES if measure or page != "prove"]  # its picture needs a measurement
         for path in take_pictures(browser, found, out, pin if measure else "", pages=pages):
             print(path)
         print(take_phone(browser, found, out))

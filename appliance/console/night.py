@@ -23,7 +23,7 @@ from appliance.outputs.frame_layout import BROWSER_HEAD, GHOST
 FOLDER = "night"  # beside PIN and devices
 EVERY_S = 60.0
 KEEP_S = 14 * 3600.0  # a night: 840 pictures of 15 to 35 kB
-MOST_BYTES = 40_000_000  # of all of them: then the oldest go
+MOST_BYTES = 40_000_000  # all pictures together; beyond it the oldest are removed
 _WIDTH, _HEIGHT, _FLOOR, _SCALE = 640, 420, 390.0, 170.0  # pixels; pixels a metre
 _LINES = 5
 

@@ -12,7 +12,7 @@ from PIL import Image
 from appliance.box.wall_file import EVERY_S, WALL
 
 WIDTH = 480  # pixels at least, where the wall has as many; less than twice as many
-_QUALITY = 70  # of a JPEG: 8 to 25 kB
+_QUALITY = 70  # JPEG quality: 8 to 25 kB a picture
 _LAST_S = 1.0
 
 

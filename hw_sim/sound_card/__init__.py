@@ -15,7 +15,7 @@ folder = Path(__file__).parent
 
 
 class Played(NamedTuple):
-    """What a card played: the samples (N,) of all loudspeakers added, each with the monotonic second at which
+    """Output of a card: the samples (N,) of all loudspeakers added, each with the monotonic second at which
     the card's clock plays it (N,). late: blocks that came too late, in whose place there is silence."""
 
     at: NDArray[np.float64]
@@ -30,7 +30,7 @@ def environment(log: Path) -> dict[str, str]:
 
 
 def read_played(log: Path) -> Played:
-    """What a card wrote. Raises OSError; ValueError when it played nothing."""
+    """Reads the log of a card. Raises OSError; ValueError when it played nothing."""
     written, times, samples, late, place = np.fromfile(log, np.float64), [], [], 0, 0
     while place + HEAD <= len(written):
         plays_at, frames, rate, was_late = written[place : place + HEAD]
