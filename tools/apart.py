@@ -1,7 +1,8 @@
 """Measures the personal space of two puppets: `python -m tools.apart [MINUTES]`.
 
 Both dance the default show's phrase, the second one 40 s later in it and from nearly the same place.
-A row each without personal space, with it, and the null product: no space, but one of them set aside by as much.
+A row each without personal space, with it, and the null product: no space, but one of them set aside by as
+much.
 """
 
 from __future__ import annotations

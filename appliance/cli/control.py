@@ -108,6 +108,7 @@ def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
         key_file=str(box.sensors.keys or ""),
         replies=tuple((one.host, one.port) for one in control.replies),
         foreign=foreign_ports(box),
+        state=str(box.state_folder or ""),
     )
     return sys.executable, "-m", "appliance.show_control", settings.packed()
 

@@ -16,7 +16,16 @@ from appliance.levers.addresses import NAMED
 from appliance.levers.lever import Lever
 from appliance.levers.show_state import ShowState
 from appliance.levers.status import Status
-from appliance.levers.table import FEEDBACK, MADE_NUMBERS, PATH_POINTS, SPRINGS, STIFFNESS, STORM, STRINGS
+from appliance.levers.table import (
+    FEEDBACK,
+    GOAL,
+    MADE_NUMBERS,
+    PATH_POINTS,
+    SPRINGS,
+    STIFFNESS,
+    STORM,
+    STRINGS,
+)
 from appliance.show_control.status_messages import hands_of, names_of, status
 
 _NO_BATTERY = 255
@@ -72,6 +81,7 @@ class BoxView:
             "processes": [{"process": one.process, "late": one.late} for one in members],
             "wall": dict(seen.reported("projector", now)),
             "remote": dict(seen.reported("remote", now)),
+            "gestures": reported.get("gestures", {}),
             "hands": [one._asdict() for one in hands_of(seen)] if known else [],
             "generation": self._stage.generation,
             **self._declared(),
@@ -100,6 +110,7 @@ class BoxView:
         turned = {lever.name: state[lever].value for lever in _KNOBS if lever in state}
         return {
             "motion": motion,
+            "goal": list(state[GOAL].value) if GOAL in state else [],
             "springs": turned | {"setting": state[SPRINGS].value, "strings": state[STRINGS].value},
         }
 

@@ -150,4 +150,5 @@ def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:
         "springs": facts.get("springs", []),
         "springs_feedback": facts.get("springs_feedback", {}),
         "has_strings": facts.get("has_strings", False),
+        "goes_on": facts.get("goes_on", False),
     }

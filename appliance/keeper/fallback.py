@@ -25,6 +25,13 @@ SENSORS_NOT_SAVED = Fallback(
     "Neutral poses and calibrations are not kept on {about}. The audience sees nothing of it, but after a "
     "power cut sensors need a moment of stillness. Free some room there, or check the disk.",
 )
+GESTURES_NOT_SAVED = Fallback(
+    "gestures-not-kept",
+    "Recorded gestures are not kept on the disk. The audience sees nothing of it, but after a power cut "
+    "today's are gone. Free some room, or check the disk.",
+    "Recorded gestures are not kept on {about}. The audience sees nothing of it, but after a power cut "
+    "today's are gone. Free some room there, or check the disk.",
+)
 CHOICE_NOT_SAVED = Fallback(
     "choice-not-kept",
     "That a show has danced, or has not, cannot be kept. The audience sees nothing of it; the show is tried "
@@ -41,4 +48,7 @@ SAVED_IN_MEMORY = Fallback(
     "journal are gone at power-off. The audience sees nothing of it tonight. Give /data a separate "
     "partition: bunraku doctor.",
 )
-OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_SAVED, SENSORS_NOT_SAVED, CHOICE_NOT_SAVED, SAVED_IN_MEMORY)
+OF_THE_KEEPER = (
+    *(JOURNAL_STOPPED, PLACE_NOT_SAVED, SENSORS_NOT_SAVED, GESTURES_NOT_SAVED),
+    *(CHOICE_NOT_SAVED, SAVED_IN_MEMORY),
+)

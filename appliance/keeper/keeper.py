@@ -19,7 +19,7 @@ from appliance.keeper.fallback import OF_THE_KEEPER, SAVED_IN_MEMORY
 from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.mirror import LOOK_S, Mirror, Mirrored
 from appliance.keeper.mirror_process import MirrorProcess
-from appliance.keeper.records import mirrored_checkpoint, mirrored_sensor_memory
+from appliance.keeper.records import mirrored_checkpoint, mirrored_gestures, mirrored_sensor_memory
 from appliance.show.box import BoxConfig
 
 # The machine goes down: services that start after the stage end before it (the lights may take 4 s), then the
@@ -60,7 +60,11 @@ def mirrored_by(box: BoxConfig, runtime: Path, journal: Path | None, minutes: fl
     """The mirrors of this box: its journal, if one is wanted, and its records, if it has a state folder."""
     mirrored: list[Mirrored] = []
     if (state := box.state_folder) is not None:
-        mirrored += [mirrored_checkpoint(runtime, state), mirrored_sensor_memory(runtime, state)]
+        mirrored += [
+            mirrored_checkpoint(runtime, state),
+            mirrored_sensor_memory(runtime, state),
+            mirrored_gestures(runtime, state),
+        ]
     if journal is not None:
         mirrored.append(MirroredJournal(runtime, journal, minutes))
     return mirrored

@@ -10,8 +10,9 @@ from appliance.box.block import BlockReader
 from appliance.box.checkpoint import PLACE, unpacked
 from appliance.box.fallback import Fallback
 from appliance.box.record import SlotFile, WholeFile
-from appliance.keeper.fallback import PLACE_NOT_SAVED, SENSORS_NOT_SAVED
+from appliance.keeper.fallback import GESTURES_NOT_SAVED, PLACE_NOT_SAVED, SENSORS_NOT_SAVED
 from appliance.keeper.mirror import reason_of
+from appliance.sensor.gesture_memory import gesture_file, gesture_record
 from appliance.sensor.memory import memory_file, memory_record
 
 
@@ -97,3 +98,14 @@ def mirrored_sensor_memory(runtime: Path, state: Path) -> MirroredRecord:
     )
     block, file = memory_record(state).reader(runtime), memory_file(state)
     return MirroredRecord("The sensors' memory", SENSORS_NOT_SAVED, block, state, file, bytes, message)
+
+
+def mirrored_gestures(runtime: Path, state: Path) -> MirroredRecord:
+    """The same folders."""
+    message = (
+        f"{state}: gestures cannot be kept there ({{reason}}). The show goes on; after a power cut gestures "
+        "that were recorded today are gone. Make the folder writable, or give another one as `state:` in the "
+        "box file."
+    )
+    block, file = gesture_record(state).reader(runtime), gesture_file(state)
+    return MirroredRecord("The memory of gestures", GESTURES_NOT_SAVED, block, state, file, bytes, message)

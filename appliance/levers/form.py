@@ -38,19 +38,20 @@ class Form:
     """The arguments of an address: a text, then numbers.
 
     text: what the first argument names; empty: the address takes no text. may_be_nameless: the text may be
-    left out. optional: how many of the last numbers may be left out.
+    left out. also: what a second text names. optional: how many of the last numbers may be left out.
     """
 
     text: str = ""
     numbers: tuple[Number, ...] = ()
     optional: int = 0
     may_be_nameless: bool = False
+    also: str = ""
 
     def syntax(self) -> str:
         """The arguments, for people."""
         text = f"[{self.text}]" if self.text and self.may_be_nameless else self.text
         fewest = len(self.numbers) - self.optional
-        parts = [*([text] if text else []), *map(str, self.numbers[:fewest])]
+        parts = [*filter(None, (text, self.also)), *map(str, self.numbers[:fewest])]
         parts += [f"[{number}]" for number in self.numbers[fewest:][:_MOST_SAID]]
         parts += ["..."] if self.optional > _MOST_SAID else []
         return ", ".join(parts) or "nothing"

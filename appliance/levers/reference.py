@@ -16,6 +16,7 @@ SECTIONS = {
     "### Playback and joints": addresses.PLAYBACK,
     "### Projector": addresses.PROJECTOR,
     "### Sensors": addresses.SENSORS,
+    "### Gestures": addresses.GESTURES,
     "## Motion that is made ahead": addresses.MADE_AHEAD,
 }
 _COMMANDS = "| address | arguments | what it does |\n|---|---|---|\n"

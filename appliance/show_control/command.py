@@ -20,13 +20,14 @@ LONGEST_NAME = 100
 class Command:
     """One message in a valid form. `text`: what it is about, a joint also by number; "": left out.
 
-    saved: names of motions that were kept, which /phrase may call as well.
+    also: a second name. saved: names of motions that were kept, which /phrase may call as well.
     """
 
     address: str
     values: tuple[float, ...] = ()
     text: str | int = ""
     saved: tuple[str, ...] = ()
+    also: str = ""
 
 
 def command(address: str, arguments: Sequence[object]) -> Command:
@@ -41,10 +42,14 @@ def command(address: str, arguments: Sequence[object]) -> Command:
         meant = f"Did you mean {near}?" if near else "docs/osc.md lists what it takes."
         raise ValueError(f"{address[:LONGEST_NAME]} is no command of this box. {meant}")
     require_read(address, arguments)
+    also = ""
+    if form.also:
+        also = str(_name(form, arguments[1]) or "") if len(arguments) > 1 else ""
+        arguments = [*arguments[:1], *arguments[2:]]
     text, numbers = _text(form, arguments)
-    if text is None or not form.admits(numbers):
+    if text is None or bool(form.also) != bool(also) or not form.admits(numbers):
         raise ValueError(f"{address} takes {form.syntax()}.")
-    return Command(address, tuple(float(number) for number in numbers), text)
+    return Command(address, tuple(float(number) for number in numbers), text, also=also)
 
 
 def require_read(address: str, arguments: Sequence[object]) -> None:

@@ -26,6 +26,7 @@ from appliance.show_control.command import (
 )
 from appliance.show_control.fallback import COMMAND_FAILED, LIVE_PARTIAL, LIVE_REFUSED
 from appliance.show_control.figure_datagram import DATAGRAM, is_figure
+from appliance.show_control.gestures import Gestures
 from appliance.show_control.key_file import KeyFile
 from appliance.show_control.live_input import LiveInput, is_live
 from appliance.show_control.names_of_show import joint_name
@@ -71,6 +72,7 @@ class CommandHandler:
         send: Callable[[Address, Message], None],
         publish: Callable[[ShowState], None],
         live: LiveInput,
+        gestures: Gestures | None = None,
     ) -> None:
         self.show_state = show_state
         self.refused = 0
@@ -79,6 +81,7 @@ class CommandHandler:
         self.acknowledgements = Acknowledgements(observer)
         self._observer, self._dispatch, self._keys = observer, dispatch, keys
         self._send, self._publish, self._live = send, publish, live
+        self.gestures = gestures
         self._trackers = Trackers()
         self.follows = False  # another box leads: what is declared comes from there
         self._generation = -1
@@ -141,7 +144,24 @@ class CommandHandler:
 
     def report(self, strangers: int, now: float) -> dict[str, Any]:
         """The part of the status that only this process knows."""
-        return {"refused": self.refused, "strangers": strangers, "live": self._live.came(now)}
+        told = self.gestures.told() if self.gestures is not None else {}
+        return {
+            "refused": self.refused,
+            "strangers": strangers,
+            "live": self._live.came(now),
+            "gestures": told,
+        }
+
+    def call_cue(self, name: str, now: float) -> None:
+        """A cue that nobody asked for by a command; nothing where the show has none of that name."""
+        facts = self._observer.facts
+        try:
+            command = Command("/cue", (), name)
+            show_state, _ = declare(of_this_show(self.show_state, facts), command, facts, now)
+        except ValueError as error:
+            self._refuse(str(error))
+            return
+        self._publish_changed(show_state)
 
     def status(self, strangers: int, now: float) -> Status:
         """How the box is."""
@@ -173,6 +193,8 @@ class CommandHandler:
             self._send(asker, (PONG,))
         elif text := let_go(command):
             self._send(asker, (REPLY, address, 0, text))  # not done, and nothing was refused
+        elif address.startswith("/gesture"):
+            self._hear_of_gestures(command, asker, now)
         elif address in _QUESTIONS:
             for message in answer_to(address, self.show_state, observer, self.status(0, now), now):
                 self._send(asker, message)
@@ -214,6 +236,28 @@ class CommandHandler:
     def _follow_tracker(self, address: str, arguments: Sequence[object], asker: Address, now: float) -> None:
         for order in self._trackers.orders(address, arguments, self._observer.facts, now):
             self._dispatch.dispatch_order("stage", order, now, partial(self._reply, asker, address))
+
+    def _hear_of_gestures(self, command: Command, asker: Address, now: float) -> None:
+        if (gestures := self.gestures) is None:
+            raise ValueError("This box knows no gestures.")
+        if command.address == "/gestures":
+            told = gestures.told()
+            answers: list[Message] = [
+                ("/gestures/gesture", one["name"], one["cue"], one["hand"]) for one in told["list"]
+            ]
+            if (now_made := told["recording"]) is not None:
+                answers.append(("/gestures/recording", now_made["name"], now_made["come"], told["most"]))
+            for answer in (*answers, (END, command.address, len(answers))):
+                self._send(asker, answer)
+            return
+        name = str(command.text)
+        if command.address == "/gesture/record":
+            message = gestures.record(name, command.also, now)
+        elif command.address == "/gesture/rename":
+            message = gestures.rename(name, command.also)
+        else:
+            message = gestures.stop() if command.address == "/gesture/stop" else gestures.forget(name)
+        self._reply(asker, command.address, True, message)
 
     def _send_roster(self, asker: Address, now: float) -> None:
         if not self._observer.lives(now):

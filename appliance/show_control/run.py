@@ -22,6 +22,7 @@ from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.fallback import LIVE_DROPPED, SENDER_NOT_LISTED
 from appliance.show_control.foreign_sensors import ForeignSensors
+from appliance.show_control.gestures import Gestures
 from appliance.show_control.heartbeat import Heartbeat
 from appliance.show_control.intake import Intake
 from appliance.show_control.key_file import KeyFile
@@ -78,6 +79,10 @@ class ControlProcess:
             self.handler = CommandHandler(
                 show_state, self.observer, self._dispatch, keys, self._answer, writer.write, live
             )
+            state = Path(settings.state) if settings.state else None
+            self._gestures = Gestures(folder, state, self.observer, self.handler.call_cue, say)
+            opened.callback(self._gestures.close)
+            self.handler.gestures = self._gestures
             self._poll = select.poll()
             for one in (self.port, sender):
                 self._poll.register(one.fileno(), select.POLLIN)
@@ -133,6 +138,7 @@ class ControlProcess:
         self._count(now)
         self._follow_leader(now)
         self.handler.follow_stage(now)
+        self._gestures.look(now)
         self._health.reported = self.handler.report(self.port.strangers, now)
         self._health.publish_health(now)
         if now >= self._heartbeat.due:
@@ -186,6 +192,7 @@ class ControlProcess:
             return 0.0
         due = [self._heartbeat.due, self._dispatch.due(now), self.handler.acknowledgements.due(now)]
         longest_s = _FOLLOWING_SLEEP_S if self.handler.follows else _LONGEST_SLEEP_S
+        longest_s = min(longest_s, self._gestures.sleeps_s)
         return max(min(*due, now + longest_s) - now, 0.0)
 
 

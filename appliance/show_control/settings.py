@@ -13,7 +13,9 @@ Listener = tuple[str, int]  # address and port
 
 @dataclass(frozen=True)
 class Settings:
-    """The port's socket is open already: `descriptor`. `key_file`: empty for none."""
+    """The port's socket is open already: `descriptor`. `key_file`, `state` (the box's folder on the disk):
+    empty for none.
+    """
 
     folder: str
     descriptor: int
@@ -22,6 +24,7 @@ class Settings:
     key_file: str = ""
     replies: tuple[Listener, ...] = ()
     foreign: tuple[ForeignPort, ...] = ()
+    state: str = ""
 
     def packed(self) -> str:
         """As one argument of a command line; there are no secrets in it."""

@@ -10,6 +10,7 @@ from appliance.box.fallback import Fallbacks, Fallen, fallen
 from appliance.box.made_motion import SavedNamesReader
 from appliance.box.process_health import COMMANDS_DROPPED, STAGE_HUNG, ProcessHealth
 from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import Facts
 from appliance.show_control.fallback import OF_CONTROL
 from appliance.show_control.status_messages import StageState
@@ -62,6 +63,10 @@ class StageObserver:
     def reported(self, process: str, now: float) -> Mapping[str, Any]:
         """The report of a process beside the stage; empty where it does not live."""
         return self._process_health.reported(process, now)
+
+    def frames(self, count: int, now: float) -> list[JointFrame]:
+        """At most so many of the newest frames, newest last."""
+        return self._reader.frames(count, now)
 
     @property
     def facts(self) -> Facts | None:

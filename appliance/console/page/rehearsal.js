@@ -4,6 +4,8 @@ import { request } from "./box.js";
 import { ask, command, withPin } from "./device.js";
 import { byId, first } from "./elements.js";
 import { Figure } from "./figure.js";
+import { initFloor, showFloor } from "./floor.js";
+import { initGestures, showGestures } from "./gestures.js";
 import { initLearn, leaveLearn, showLearn } from "./learn.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
@@ -31,6 +33,8 @@ export function initRehearsal(me, box) {
   });
   byId("seed-new").addEventListener("click", () => command("/seed", Math.floor(Math.random() * SEEDS)));
   figure = new Figure(byId("figure"), byId("figure-said"), box, words);
+  initFloor(box);
+  initGestures();
   initMotion();
   initSprings();
   initLearn();
@@ -63,6 +67,8 @@ export function showRehearsal(value, show) {
   tell();
   showMotion(value, show);
   showSprings(value, show);
+  showFloor(value.goal, show);
+  showGestures(value);
   showLearn();
 }
 
