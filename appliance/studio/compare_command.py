@@ -34,7 +34,7 @@ def compare(
     """Compare a student's version of a dance with the teacher's: timing and form, joint by joint.
 
     Both are aligned in time first, so the same dance half a second later, or a tenth faster, has the same
-    form. Delay and tempo are figures of their own, and the worst moments are named and drawn.
+    form. Delay and tempo are separate figures, and the worst moments are named and drawn.
     """
     with clear_errors("compare"):
         from appliance.studio.comparison.versions import CompareOptions, run

@@ -26,6 +26,12 @@ class _Watched:
         written: int = self._stream.write(text)
         return written
 
+    def add(self, text: str) -> None:
+        """Writes text that does not count as the last line."""
+        self._stream.write(text)
+        self._stream.flush()
+        self.last_s = time.monotonic()
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
 
@@ -46,9 +52,8 @@ def heartbeat() -> Iterator[None]:
                 since = watched.last_s
             if time.monotonic() - watched.last_s >= QUIET_S:
                 line = watched.line.rstrip(" .") or "at work"
-                watched.write(f"{line} ... {time.monotonic() - since:.0f} s\n")
-                watched.flush()
-                watched.line, told = line, watched.last_s
+                watched.add(f"{line} ... {time.monotonic() - since:.0f} s\n")
+                told = watched.last_s
 
     thread = threading.Thread(target=beat, name="heartbeat", daemon=True)
     sys.stderr = watched

@@ -22,6 +22,7 @@ from appliance.studio.data.dataset import Dataset, window_starts
 from appliance.studio.data.remembered import remembered_reading
 from appliance.studio.data.takes import load_take
 from appliance.studio.evaluation.coders import MovedJoints
+from appliance.studio.progress import doing
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import open_model
 
@@ -60,7 +61,8 @@ def open_either(
 ) -> OpenedModel:
     """The checkpoint of a model, or a show's network of a source. Raises StudioError, ConfigError."""
     if show is not None:
-        opened = open_show(source, show)
+        with doing("opening the show and its network", console):
+            opened = open_show(source, show)
         return replace(opened, is_dead=say_if_dead(opened.network, opened.dataset, console))
     assert checkpoint is not None, "the command asks for one of both"
     coder, dataset = open_model(MODELS[source], checkpoint, recordings, console, reading)

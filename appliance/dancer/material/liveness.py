@@ -15,7 +15,9 @@ from appliance.pose.quaternion import Array
 
 SAMPLES = 48  # windows of the dance, and latents of the prior
 DEAD = 0.35  # fraction of the usual difference between two windows; less counts as none. Alive: 1.1 to 1.3
-UNLEARNED = 0.7  # of it: as far off is a network that gives the mean pose; a trained one 0.05 to 0.34
+UNLEARNED = (
+    0.7  # fraction of it; giving the mean pose is that far off, a trained network 0.05 to 0.34
+)
 ACTIVE = 0.1  # standard deviation over the dance from which on a number of the latent says something
 
 Encode = Callable[[Array], Latents]
@@ -45,7 +47,7 @@ class Liveness:
         return "unlearned" if not self.coded <= UNLEARNED * self.usual else ""
 
     def sentence(self) -> str:
-        """What is dead, why, and what to do; '' if it is alive."""
+        """Says which part is dead, why, and what to do; '' if it is alive."""
         return {
             "": "",
             "collapsed": (
@@ -85,7 +87,7 @@ def liveness_of(windows: Array, latent: int, encode: Encode, decode: Decode) -> 
 
 
 def network_liveness(network: MotionNetwork, poses: Array) -> Liveness:
-    """Of a network's file. poses (T, M, 4): a dance of its joints."""
+    """Liveness of a network's file. poses (T, M, 4): a dance of its joints."""
     length = network.window
     starts = np.linspace(0, max(0, len(poses) - length), SAMPLES).round().astype(int)
     windows = quaternion.continuous(poses)[np.minimum(starts[:, None] + np.arange(length), len(poses) - 1)]

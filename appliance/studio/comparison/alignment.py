@@ -20,7 +20,7 @@ COARSE = 5  # ticks from one pose to the next in the first search
 BAND = 15  # ticks on either side of what it found that the second one searches
 REACH_S = 10.0  # by which one of the dances may begin or end before the other
 DETOUR_DEGREES = 0.25  # what a step off the diagonal and a tick left out cost: of equal ways the straight one
-SMOOTH_S = 0.8  # of tempo: shorter changes are the ticks' own steps
+SMOOTH_S = 0.8  # shorter changes of tempo are only the ticks' steps
 AT_ONCE = 64  # rows of costs: 64 by 1,500 of 20 joints take 60 MB
 EDGE_S = 0.5  # left out of the tempo at both ends, where the smoothing has one side only
 
@@ -112,7 +112,7 @@ def _warped(costs: Array, lows: Places, columns: int, skip: float, most: float) 
     nothing = np.full(width, np.inf)
 
     def before(values: Array, row: int, up: int, left: int) -> Array:
-        """Of the row `up` above, as many columns to the left."""
+        """Values of the row `up` above, `left` columns to the left."""
         if row < up:
             return nothing
         at = lows[row] + np.arange(width) - left - lows[row - up]

@@ -45,8 +45,8 @@ from appliance.studio.progress import doing, shown
 from appliance.studio.studio_error import StudioError
 
 EVERY = 10  # ticks from one second of dance to the next
-USUAL_PERCENT = 90.0  # of a period's seconds are as near as that to another take of it
-BODY_CM = 170.0  # of the body on which distances are measured
+USUAL_PERCENT = 90.0  # percent of a period's seconds that are as near as that to another take
+BODY_CM = 170.0  # height of the body on which distances are measured
 LEAST_SECONDS = 40  # seconds of dance of a period, at 0.2 s from one to the next: 9 s
 PARTS_S = 10.0  # a period of one recording is cut into parts, each a take
 MOST_NEW = 2000
@@ -193,7 +193,7 @@ def usual_cm(one: Period, other: Period) -> float:
 
 
 def movements(period: Period, other: Period, usual: float, count: int) -> list[Movement]:
-    """What the other period has nothing like, the most frequent first, each for all seconds like it."""
+    """Movements that the other period has nothing like, the most frequent first, each with all alike."""
     apart = distances(period.rows, other.rows)
     away, nearest = apart.min(axis=1), apart.argmin(axis=1)
     new = np.flatnonzero(away > usual)
@@ -221,7 +221,7 @@ def movements(period: Period, other: Period, usual: float, count: int) -> list[M
 
 
 def _takes(path: Path, reading: ReadingOptions) -> list[Take]:
-    """Of a show its phrases; a single recording in parts, so that they can be compared with each other."""
+    """A show gives its phrases; a single recording is cut into parts that are compared with each other."""
     show = named_show(path) or path
     if (show / "show.yaml").is_file():
         kept = Catalogue(keep={"*": (ALWAYS,)})
@@ -284,7 +284,7 @@ def _draw_movements(path: Path, both: tuple[Period, Period], found: dict[str, li
         label = f"{period.name}, never in {other.name}"
         rows.append(Row(poses, roots, chosen, label, behind=ghost, stamps=stamps))
     if rows:
-        draw_rows(path, skeleton, rows, FPS, "What one does and the other never does", "")
+        draw_rows(path, skeleton, rows, FPS, "Movements that one has and the other never", "")
 
 
 def _draw_shares(

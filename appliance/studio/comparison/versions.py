@@ -31,11 +31,11 @@ from appliance.studio.progress import doing
 from appliance.studio.studio_error import StudioError
 
 MOMENTS, MOMENTS_APART_S = 6, 1.5
-SMOOTH_S = 0.3  # of the joints' differences, before the worst moments are chosen
+SMOOTH_S = 0.3  # the joints' differences are smoothed before the worst moments are chosen
 TOGETHER_S, SAME_TEMPO, SAME_FORM_DEGREES = 0.1, 0.02, 5.0
 OTHER_DANCE_DEGREES = 15.0  # two takes of one dancer, aligned: 19 to 26 degrees
-MIRRORED_FITS = 0.7  # of the difference as it is: then the student is probably the teacher's mirror image
-SHIFT_S, FASTER = 0.4, 1.1  # of the teacher's copies with which the figures are compared
+MIRRORED_FITS = 0.7  # fraction of the difference; less means that the student is probably the mirror image
+SHIFT_S, FASTER = 0.4, 1.1  # how the teacher's copies differ, with which the figures are compared
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Comparison:
         return {self.name(place): float(means[place]) for place in np.argsort(-means)}
 
     def name(self, place: int) -> str:
-        """What a compared joint is, else its name."""
+        """The role of a compared joint, else its name."""
         joint, skeleton = self.joints[place], self.teacher.skeleton
         return next((role for role, one in skeleton.roles.items() if one == joint), skeleton.names[joint])
 
@@ -285,7 +285,7 @@ def _excerpt(file: Path, options: CompareOptions) -> Recording:
 
 
 def _joints(teacher: Recording, student: Recording) -> list[int]:
-    """Of the teacher's joints that move in either, those that both have. Raises StudioError."""
+    """The teacher's joints that move in either and that both have. Raises StudioError."""
     moving = _moving(teacher)
     if student.skeleton.same_joints(teacher.skeleton):
         return sorted(moving | _moving(student))

@@ -35,11 +35,9 @@ from appliance.studio.studio_error import StudioError
 LEAST_TICKS = 200  # of a stretch from which accord is learned
 COPY_LATE = 25  # ticks by which the null product copies
 FOLLOWS_NAME, STRANGERS_NAME = "follow 1, lead 0", "the same beside dancers of other couples (null)"
-STANDS = 0.3  # of a dancer's energy
-LISTENS, LEAST_DEPENDENCE = (
-    2.0,
-    0.005,
-)  # times a stranger's dependence, and above it: the default 0.048 to 0.006
+COPY_NAME = f"a copy {COPY_LATE / 50:g} s later (null)"
+STANDS = 0.3  # fraction of a dancer's energy
+LISTENS, LEAST_DEPENDENCE = 2.0, 0.005  # times a stranger's dependence, and above it
 MANY = 8  # couples, two of which say which networks are best
 _FOLLOWS, _LEADS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.25, 0.5, 0.75, 1.0)
 Pairs = Sequence[tuple[Take, Take]]
@@ -71,10 +69,10 @@ class Row:
     lag_s: float
     leads: float
     likeness: float
-    accord: float = float("nan")
-    error: float = float("nan")
     critic: float = float("nan")
     energy: float = float("nan")
+    accord: float = float("nan")
+    error: float = float("nan")
 
 
 def run(options: DuetOptions, device: str = "cpu") -> list[Row]:
@@ -166,11 +164,6 @@ def _rows(
                 [likeness(one, two, pairs) for one, two in both],
             )
         ]
-        if accords:  # every other duet is led by the second of its couple, but where all are led by the first
-            found = [accords[n % 2 if len(both) == len(couples) else 0](*one) for n, one in enumerate(both)]
-            figures += [float(np.mean(found)), float(np.std(found) / np.sqrt(max(1, len(found) - 1)))]
-        else:
-            figures += [float("nan")] * 2
         if recorded:
             made, real = [two for _, two in both], [whole[take.name] for take in recorded]
             figures.append(_critic(recorded, made, moving))
@@ -182,7 +175,11 @@ def _rows(
                 if name.startswith("energy")
             ]
             figures.append(float(np.mean(energies)))
-        return Row(name, *figures)
+        # The first of a couple leads in every other duet; in all where there is one for each couple.
+        roles = [n % 2 if len(both) == len(couples) else 0 for n in range(len(both))]
+        accord = [accords[role](*one) for role, one in zip(roles, both, strict=True)]
+        error = float(np.std(accord) / np.sqrt(max(1, len(accord) - 1)))
+        return Row(name, *figures, accord=float(np.mean(accord)), error=error)
 
     yield row("recorded couples", [(whole[one.name], whole[two.name]) for one, two in apart])
     others = couples[2:] + couples[:2]
@@ -192,7 +189,7 @@ def _rows(
         ]
         yield row("dancers of different couples (null)", shuffled)
     copies = [(whole[one.name], np.roll(whole[one.name], COPY_LATE, 0)) for one, _ in apart]
-    yield row(f"a copy {COPY_LATE / 50:g} s later (null)", copies)
+    yield row(COPY_NAME, copies)
     dials = [(follow, 0.0) for follow in _FOLLOWS] + [(1.0, lead) for lead in _LEADS]
     for follow, lead in dials:
         told(f"dances with follow {follow:g}, lead {lead:g}")
@@ -218,15 +215,19 @@ def _rows(
             )
 
 
-def _accords(dataset: Dataset, moving: Sequence[int]) -> list[Accord]:
-    """Accord with the first of a couple, and with the second; none where no couple has been learned from."""
+def _unknown(first: Array, second: Array) -> float:
+    return float("nan")
+
+
+def _accords(dataset: Dataset, moving: Sequence[int]) -> Sequence[Callable[[Array, Array], float]]:
+    """Accord with the first of a couple, and with the second; unknown where no couple was learned from."""
     sound = []
     for first, second in couples_of(dataset.training).values():
         for start, end in runs(first.sound & second.sound):
             if end - start >= LEAST_TICKS:
                 sound.append([_seen(one.recording, moving)[start:end] for one in (first, second)])
     if not sound:
-        return []
+        return [_unknown, _unknown]
     return [Accord([(one, two) for one, two in sound]), Accord([(two, one) for one, two in sound])]
 
 
@@ -267,5 +268,26 @@ def _print(rows: Sequence[Row]) -> None:
             *("" if value != value else f"{value:.{n}f}" for value, n in zip(values, digits, strict=True)),
         )
     Console().print(table)
-    real, own = rows[0].accord, next(row.accord for row in rows if row.name == "follow 1, lead 0")
+    real, own = rows[0].accord, _named(rows, FOLLOWS_NAME).accord
     print(f"The partner dances in accord with the other dancer by {own:.3f}; recorded couples by {real:.3f}.")
+    print(what_is_dead(rows))
+
+
+def what_is_dead(rows: Sequence[Row]) -> str:
+    """Whether the partner stands, copies, does not listen, or answers: a sentence."""
+    partner, copied = _named(rows, FOLLOWS_NAME), _named(rows, COPY_NAME)
+    if partner.energy < STANDS:
+        return f"The partner moves with {partner.energy:.2f} of the dancers' energy: it is a statue."
+    if partner.likeness < (1 + copied.likeness) / 2:
+        return "The partner copies the other dancer, or is its mirror image."
+    strangers = [row.dependence for row in rows if row.name == STRANGERS_NAME] or [0.0]
+    if partner.dependence < max(LISTENS * strangers[0], strangers[0] + LEAST_DEPENDENCE):
+        return (
+            "The partner does not listen: it depends on the other dancer hardly more than on a stranger. "
+            "Train it longer, or on more couples."
+        )
+    return "The partner answers: it moves, it does not copy, and it depends on the other dancer."
+
+
+def _named(rows: Sequence[Row], name: str) -> Row:
+    return next(row for row in rows if row.name == name)

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from appliance.studio.coded_windows import Network
 
 COLUMNS = 8  # in the strip
-LASTING_S = 2.0  # of the phrase's movement, what is slower gives way to the region
-MOVEMENT = 0.5  # of the quicker movement: at 0.8 the legs leave what they ever did twice as often
+LASTING_S = 2.0  # slower movement of the phrase gives way to the region
+MOVEMENT = 0.5  # share of the quicker movement; at 0.8 the legs leave their known poses twice as often
 LEAST_S = 4.0  # seconds for each region
 CRITIC_TAKE = "phrase"
 
@@ -147,7 +147,7 @@ def run(options: ExploreOptions) -> None:
 def exploring(latents: Latents, regions: Latents) -> Latents:
     """A phrase's path (T, Z) that begins and ends as it is and goes through regions (R, Z) between.
 
-    What is slower than LASTING_S gives way to the region; the quicker movement is danced there.
+    Movement slower than LASTING_S gives way to the region; the quicker part is danced there.
     """
     count, width = len(latents), round(LASTING_S * FPS)
     weights = np.hanning(2 * width + 3)[1:-1]
@@ -166,7 +166,7 @@ def exploring(latents: Latents, regions: Latents) -> Latents:
 
 
 def figures(known: Known, poses: Poses, phrase: Poses) -> Figures:
-    """Of poses (T, M, 4), beside a phrase's."""
+    """Figures of poses (T, M, 4), beside a phrase's."""
     shapes = known.shapes_of(poses)
     unseen, plausible = known.unseen(shapes), known.plausible(shapes)
     pair = [without_heading(phrase)], [without_heading(poses)]

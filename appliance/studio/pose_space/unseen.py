@@ -1,7 +1,7 @@
 """Poses that a dancer never had although each of its limbs had them: where the space of poses is unexplored.
 
-A pose is unseen if no recorded one is as near to it as takes usually are to each other, and plausible if each
-limb is as near to a recorded one as that, and the network codes the pose as well as recorded ones.
+A pose is unseen if it is farther from all recorded ones than takes usually are from each other. It is
+plausible if each limb is no farther than that from a recorded one, and the network codes it as well.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from appliance.studio.coded_windows import Network
 
 EVERY = 5  # ticks from one known pose to the next
-USUAL_PERCENT = 95.0  # of the known poses are as near as that to another take
-UNSEEN_PERCENT = 80.0  # of them; a pose farther than that from all of them is unseen
+USUAL_PERCENT = 95.0  # percent of the known poses that are as near as that to another take
+UNSEEN_PERCENT = 80.0  # percent as well; a pose that is farther from all known ones is unseen
 CANDIDATES = 2000
 MOST_KNOWN = 6000
 
