@@ -138,6 +138,8 @@ class Learner:
                     self._await_rest()
                 result = self._checked()
             except _StoppedError:
+                if self._learning.wanted() is None:
+                    self._tell(state="ended")
                 self._say(_STOPPED)
                 return 2
             except (NotLearnedError, OSError) as error:

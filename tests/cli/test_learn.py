@@ -194,6 +194,7 @@ def test_what_the_page_ends_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     box.beside(script)
     assert box.run() == 2 and len(box.begun()) == 1
+    assert box.learning.told() == {"state": "ended"}
 
 
 @pytest.mark.parametrize(
