@@ -67,10 +67,13 @@ def write_improviser_network(path: Path) -> None:
 
 
 def write_partner_network(path: Path) -> None:
-    """A move scores by how alike its last step and the other's are; an answer goes where the other went."""
-    chance, steps, code, mixtures = np.random.default_rng(3), LATENT + 4, 3, 2
+    """A move scores by how alike its last step and the other's are, and is natural by how near it is to
+    `who`; a code goes where the other went, as its noise says.
+    """
+    chance, steps, code, dancers = np.random.default_rng(3), LATENT + 4, 3, 2
     stored: dict[str, np.ndarray[Any, Any]] = {
-        "see": 0.3 * chance.standard_normal((steps, mixtures * (2 * code + 1))),
+        "see": 0.3 * chance.standard_normal((steps, code)),
+        "name": chance.standard_normal((steps, dancers)),
         "newest": np.array([15]),
         "end": np.array([10]),
         "flat": np.array([-1, steps]),
@@ -81,17 +84,24 @@ def write_partner_network(path: Path) -> None:
         helper.make_node("Gather", ["led", "newest"], ["last_led"], axis=1),
         helper.make_node("Reshape", ["last_led", "flat"], ["other"]),
         helper.make_node("Gather", ["moves", "end"], ["last_move"], axis=1),
-        helper.make_node("Reshape", ["last_move", "flat"], ["own"]),
+        helper.make_node("Reshape", ["last_move", "flat"], ["last_own"]),
         helper.make_node("Transpose", ["other"], ["upright"], perm=[1, 0]),
-        helper.make_node("MatMul", ["own", "upright"], ["product"]),
+        helper.make_node("MatMul", ["last_own", "upright"], ["product"]),
         helper.make_node("Reshape", ["product", "list"], ["scores"]),
-        helper.make_node("ReduceMean", ["before", "turn"], ["stood"], keepdims=0),
-        helper.make_node("Add", ["other", "stood"], ["seen"]),
-        helper.make_node("MatMul", ["seen", "see"], ["mixture"]),
+        helper.make_node("MatMul", ["last_own", "name"], ["names"]),
+        helper.make_node("Mul", ["names", "who"], ["of_who"]),
+        helper.make_node("ReduceMean", ["of_who", "turn"], ["natural"], keepdims=0),
+        helper.make_node("ReduceMean", ["own", "turn"], ["stood"], keepdims=0),
+        helper.make_node("MatMul", ["stood", "name"], ["alike"]),
+        helper.make_node("Mul", ["other", "heard"], ["heard_of"]),
+        helper.make_node("Add", ["heard_of", "stood"], ["seen"]),
+        helper.make_node("MatMul", ["seen", "see"], ["aim_at"]),
+        helper.make_node("Add", ["noise", "aim_at"], ["codes"]),
     ]
-    inputs: Ports = {"led": ["l", 16, steps], "moves": ["n", 11, steps], "before": ["b", 3, steps]}
-    outputs: Ports = {"scores": ["n"], "mixture": ["b", mixtures * (2 * code + 1)]}
-    _write(path, nodes, stored, inputs, outputs, kind="partner", window=8, mixtures=mixtures)
+    inputs: Ports = {"led": ["l", 16, steps], "moves": ["n", 11, steps], "own": ["o", 11, steps]}
+    inputs |= {"heard": ["h", 1], "who": ["w", dancers], "noise": ["c", code]}
+    outputs: Ports = {"scores": ["n"], "natural": ["n"], "alike": ["o", dancers], "codes": ["c", code]}
+    _write(path, nodes, stored, inputs, outputs, kind="partner", window=8)
 
 
 Ports = dict[str, list[Any]]

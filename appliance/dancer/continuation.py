@@ -1,8 +1,8 @@
 """Continuation: a figure goes on from what it has just danced, by choosing among its own moves.
 
-Every 0.32 s it draws moves from the show's improviser and dances the one that suits best: that answers
-another dancer, leads to a place, or any. So it always dances as its improviser does, and the choice says what
-about. The work of a choice is spread over three ticks.
+Every 0.32 s it draws moves from the show's improviser, or from its partner network, and dances one that
+suits: that answers another dancer, leads to a place, or any. So it always dances as these do, and the choice
+says what about. The work of a choice is spread over three ticks.
 """
 
 from __future__ import annotations
@@ -24,14 +24,13 @@ from appliance.pose.quaternion import Array
 CANDIDATES = 24
 DANCED = 4  # steps of a move that are danced before the next choice
 FIRST = 6  # danced of the first move: some have passed until it is made
-ANSWERING = 5.0  # how much an answer counts at most, in deviations among the candidates
+ANSWERING = 5.0  # how much an answer counts at most, a deviation among the candidates
+NATURAL = 1.0  # how much it counts that a move is the dancer's; 1: drawn anew by how likely it is
 WHERE = 4.0  # how much a metre nearer to the goal counts
 ROAM_M = 1.2  # how far from where it began it goes without a goal
-LED_M_S = 0.3  # how fast the path is led to the goal besides the steps' own way
 TEMPERATURE, TOP_P, FREE = 1.0, 0.95, 0.5
 _ROWS = 40
 _HOME = 0.001  # metres a tick, by which it comes back to the phrase's own path
-_STEP_M = HOP * 0.02 * LED_M_S
 
 
 class Continuation(Takeover):
@@ -45,7 +44,7 @@ class Continuation(Takeover):
         *("temperature", "top_p", "follow", "delay_steps", "goal"),
         *("_leaves", "_left", "_is_going", "_signs"),
         *("_rows", "_roots", "_head", "_end", "_steps", "_cells", "_turn", "_place", "_slope", "_home"),
-        *("_work", "_codes", "_move", "_decoded"),
+        *("_work", "_codes", "_move", "_decoded", "_who"),
     )
 
     def __init__(
@@ -74,6 +73,7 @@ class Continuation(Takeover):
         self._codes = np.zeros((CANDIDATES, network.code_size), np.float32)
         self._move = np.zeros((MOVE, features), np.float32)
         self._decoded = np.zeros((WINDOW, moving, 4), np.float32)
+        self._who = np.zeros(0 if partner is None else partner.dancers, np.float32)
         self._window = np.zeros((window, joints, 4), np.float32)
         self._path = np.zeros((window, 3), np.float32)
         # Between two dances that turn more than half a turn apart, the short way would change sides.
@@ -149,7 +149,7 @@ class Continuation(Takeover):
             self._slope[:] = _way(heard[-1], own.place[2] - heard[-1, -ROOT + 2])
             self._slope[1] = heard[-1, -1] - heard[-2, -1]
         self._home[:] = own.place[:2]
-        self._cells[:], self._turn, self._work = 0.0, 0, 0
+        self._cells[:], self._turn, self._work, self._who[:] = 0.0, 0, 0, 0.0
         self._rows[:] = window[0, self._network.places]
         self._head, self._end = own.age, 0
         self._is_going = True
@@ -158,23 +158,33 @@ class Continuation(Takeover):
     def _work_on(self, led: StepMemory | None, rng: np.random.Generator | None) -> None:
         """A third of a choice."""
         network, before = self._network, self._steps[-BEFORE:]
-        if self._work == 0:
+        rng = rng or np.random.default_rng(0)
+        if self._work == 0 and self._partner is not None:
+            self._draw_answers(self._partner, self._seen(led), rng)
+        elif self._work == 0:
             code = network.code_of(self._steps[None, :BEFORE], self._steps[None, BEFORE:])
             mixture, self._cells[self._turn] = network.forecast(before[None], code, self._cells[self._turn])
             self._turn = 1 - self._turn
-            rng = rng or np.random.default_rng(0)
             self._codes[:] = self._drawn(mixture, network.mixtures, CANDIDATES, rng)
-            seen = self._seen(led)
-            answers = round(CANDIDATES * max(0.0, 2 * (self.follow - FREE)))
-            if seen is not None and answers and self._partner is not None:
-                mixture = self._partner.answers(before, seen)
-                self._codes[-answers:] = self._drawn(mixture, self._partner.mixtures, answers, rng)
         elif self._work == 1:
             moves = network.move_of(np.repeat(before[None], CANDIDATES, 0), self._codes)
-            self._move[:] = moves[self._suits(before, moves, led).argmax()]
+            self._move[:] = moves[self._suits(before, moves, led, rng).argmax()]
         else:
             self._dance(self._move)
         self._work = (self._work + 1) % 3
+
+    def _draw_answers(
+        self, partner: PartnerNetwork, led: FloatArray | None, rng: np.random.Generator
+    ) -> None:
+        """Codes of moves after the other's steps, and of moves that do not look at them, by the dial."""
+        if not self._who.any():  # of a couple it is the other one
+            who = partner.recognised(self._steps) if led is None else partner.recognised(led[-SEEN:]) ^ 1
+            self._who[who] = 1.0
+        answers = 0 if led is None else round(CANDIDATES * max(0.0, 2 * (self.follow - FREE)))
+        for seen, rows in ((led, slice(0, answers)), (None, slice(answers, CANDIDATES))):
+            if len(self._codes[rows]):
+                noise = self.temperature * rng.standard_normal(self._codes[rows].shape)
+                self._codes[rows] = partner.answers(self._steps, seen, self._who, noise.astype(np.float32))
 
     def _drawn(self, mixture: FloatArray, mixtures: int, count: int, rng: np.random.Generator) -> FloatArray:
         logits, means, log_scales = parts_of(mixture, mixtures)
@@ -185,18 +195,23 @@ class Continuation(Takeover):
     def _seen(self, led: StepMemory | None) -> FloatArray | None:
         return None if led is None else led.recent(LED_STEPS, self.delay_steps)
 
-    def _suits(self, before: FloatArray, moves: FloatArray, led: StepMemory | None) -> FloatArray:
+    def _suits(
+        self, before: FloatArray, moves: FloatArray, led: StepMemory | None, rng: np.random.Generator
+    ) -> FloatArray:
         """(N,): how well each of the moves (N, 8, F) suits."""
         suits = np.zeros(CANDIDATES, np.float32)
         suits[0] = 1e-6  # the first one where nothing matters
-        seen = self._seen(led)
-        if self._partner is not None and seen is not None and self.follow != FREE:
-            score = self._partner.scores(
-                seen, np.concatenate([np.repeat(before[None], CANDIDATES, 0), moves], axis=1)
-            )
-            suits += 2 * (self.follow - FREE) * ANSWERING * (score - score.mean()) / (score.std() + 1e-6)
-        ends = np.array([_ends(self._place, move)[-1] for move in moves[:, :, -ROOT:]])
-        away = np.hypot(*(ends - (self._home if self.goal is None else self.goal)).T)
+        if self._partner is not None:
+            whole = np.concatenate([np.repeat(before[None], CANDIDATES, 0), moves], axis=1)
+            suits = nucleus(NATURAL * self._partner.natural(whole, self._who)[None], self.top_p)[0]
+            suits += self.temperature * rng.gumbel(size=CANDIDATES).astype(np.float32)
+            seen = self._seen(led)
+            if seen is not None and self.follow != FREE:
+                score = self._partner.scores(seen, whole)
+                suits += 2 * (self.follow - FREE) * ANSWERING * (score - score.mean()) / (score.std() + 1e-6)
+        ways = np.array([_ends(self._place, move) for move in moves[:, :, -ROOT:]])
+        away = np.linalg.norm(ways - (self._home if self.goal is None else self.goal), axis=-1)
+        away = away[:, -1] if self.goal is None else away.mean(axis=1)
         near = ROAM_M if self.goal is None else 0.0
         suits -= (WHERE * np.maximum(away - near, 0.0)).astype(np.float32)
         return suits
@@ -210,11 +225,6 @@ class Continuation(Takeover):
         knots[0] = x, self._steps[-1, -1], z
         knots[1:, [0, 2]] = _ends(self._place, move[: count + 1, -ROOT:])
         knots[1:, 1] = move[: count + 1, -1]
-        if self.goal is not None:
-            off = np.array(self.goal) - knots[count, [0, 2]]
-            far = math.hypot(*off)
-            led = off / max(far, 1e-6) * min(far / count, _STEP_M)
-            knots[:, [0, 2]] += np.minimum(np.arange(count + 2), count)[:, None] * led
         made = self._facing(self._network.decode(move[:count, :-ROOT]), headings[:count])
         windows = np.concatenate([self._decoded[None], made])
         earlier, later = windows[:-1, MIDDLE:], windows[1:, :MIDDLE]

@@ -20,7 +20,7 @@ class PartnerNetwork(MotionNetwork):
     that it learned from: `who` (W,) is 1 for that one, 0 for the others. Couples are numbered 0, 1; then the
     same in the mirror.
 
-    mixtures: Gaussians of an answer. dancers: W.
+    dancers: W.
     """
 
     kind = "partner"
@@ -37,22 +37,21 @@ class PartnerNetwork(MotionNetwork):
         """
         return self._run(["natural"], moves=moves, who=who[None])[0]
 
-    def answers(self, own: Numbers, led: Numbers | None, who: Numbers) -> Numbers:
-        """After its own last steps (11, F) and the other's (16, F), None: nobody's: the mixture
-        (1, K * (2 C + 1)) of the code of the next move.
+    def answers(self, own: Numbers, led: Numbers | None, who: Numbers, noise: Numbers) -> Numbers:
+        """After its own last steps (11, F) and the other's (16, F), None: nobody's: a code (N, C) of the next
+        move for each row of noise (N, C), which is standard Gaussian.
         """
-        if led is None:
-            return self._run(["mixture"], own=own[None], who=who[None])[0]
-        heard = np.ones((1, 1), np.float32)
-        return self._run(["mixture"], own=own[None], led=led[None], heard=heard, who=who[None])[0]
+        seen = {"own": own[None], "who": who[None], "noise": noise}
+        if led is not None:
+            seen |= {"led": led[None], "heard": np.ones((1, 1), np.float32)}
+        return self._run(["codes"], **seen)[0]
 
     def recognised(self, steps: Numbers) -> int:
         """Number of the dancer that steps (11, F) are most like."""
         return int(self._run(["alike"], own=steps[None])[0].argmax())
 
     def _take_facts(self, facts: Mapping[str, str]) -> None:
-        self.features, self.mixtures = self._idle["led"].shape[2], int(facts["bunraku.mixtures"])
-        self.dancers = self._idle["who"].shape[1]
+        self.features, self.dancers = self._idle["led"].shape[2], self._idle["who"].shape[1]
         shapes = (1, LED_STEPS, self.features), (1, SEEN, self.latent + ROOT)
         if (self._idle["led"].shape, self._idle["moves"].shape) != shapes or self.dancers % 2:
             raise ValueError("its steps are not those of an improviser")

@@ -5,22 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import onnx
 import torch
+from onnx import helper, numpy_helper
 from torch import nn
 
 from appliance.dancer.material.improviser_network import ImproviserNetwork
 from appliance.dancer.material.partner_network import LED_STEPS, SEEN, PartnerNetwork
 from appliance.studio.export.graph import Graph, Layers
 from appliance.studio.export.motion_network import Port, checked_model, sizes_of
-from appliance.studio.partner.training import EMBEDDING, Partner, Scale
+from appliance.studio.partner.training import EMBEDDING, FLOW_STEPS, Answers, Partner, Scale, times_of
 from appliance.studio.studio_error import StudioError
 
 FILE = "partner.onnx"
-_ROUNDING = 0.05  # most that 16-bit weights may change of a score or of a mixture's number
+_ROUNDING = 0.1  # most that 8-bit weights may change of a score or of a code's number
 
 
 def export_partner(partner: Partner, network: ImproviserNetwork, path: Path) -> None:
-    """Write the networks' file, weights in 16 bits. Raises StudioError where it is not what was trained."""
+    """Write the networks' file, weights in 8 bits. Raises StudioError where it is not what was trained."""
     partner = Partner(*(part.cpu().eval() for part in partner))
     write_partner_network(partner, network, path)
     generator, scale = torch.Generator().manual_seed(1), partner.answers.scale
@@ -29,20 +31,21 @@ def export_partner(partner: Partner, network: ImproviserNetwork, path: Path) -> 
         for size in (LED_STEPS, SEEN)
     )
     who, heard = torch.eye(partner.answers.dancers)[:1], torch.ones(1, 1)
+    noise = torch.randn(5, network.code_size, generator=generator)
     with torch.no_grad():
         trained = (
             partner.scorer(led[None], moves[None, None])[0],
             partner.natural(moves[None], who),
-            partner.answers(moves[None], led[None], who, heard),
-            partner.answers(moves[None], led[None], who, 0 * heard),
+            partner.answers(moves[None], led[None], who, heard, noise),
+            partner.answers(moves[None], led[None], who, 0 * heard, noise),
         )
     played = PartnerNetwork(path, network.joints)
     known = moves.numpy(), led.numpy(), who[0].numpy()
     found = (
         played.scores(known[1], known[0][None]),
         played.natural(known[0][None], known[2]),
-        played.answers(*known),
-        played.answers(known[0], None, known[2]),
+        played.answers(*known, noise.numpy()),
+        played.answers(known[0], None, known[2], noise.numpy()),
     )
     apart = max(float(np.abs(own.numpy() - other).mean()) for own, other in zip(trained, found, strict=True))
     if not apart <= _ROUNDING:
@@ -55,7 +58,7 @@ def export_partner(partner: Partner, network: ImproviserNetwork, path: Path) -> 
 
 def write_partner_network(partner: Partner, network: ImproviserNetwork, path: Path) -> None:
     """led (1, 16, F), moves (N, 11, F) -> scores (N,); moves, who (1, W) -> natural (N,); own (1, 11, F),
-    led, heard (1, 1), who -> mixture; own -> alike (1, W).
+    led, heard (1, 1), who, noise (N, C) -> codes (N, C); own -> alike (1, W).
     """
     graph, layers, features = Graph(), Layers(int8=False), network.features
     answers, natural, scorer, alike = partner
@@ -82,10 +85,9 @@ def write_partner_network(partner: Partner, network: ImproviserNetwork, path: Pa
         scaled(name, answers.scale, "answers", steps) for name, steps in (("own", SEEN), ("led", LED_STEPS))
     )
     seen = graph.op("Concat", own, graph.op("Mul", other, "heard"), "who", "heard", axis=1)
-    graph.op("Identity", _dense(graph, layers, answers.network, seen, "answers"), out="mixture")
+    _flow(graph, layers, answers, _dense(graph, layers, answers.context, seen, "answers"))
     names = _dense(graph, layers, alike.network, scaled("own", alike.scale, "alike", SEEN), "alike")
     graph.op("Identity", names, out="alike")
-    numbers = answers.mixtures * (2 * network.code_size + 1)
     ports = (
         [
             Port("led", "l", [LED_STEPS, features]),
@@ -93,11 +95,12 @@ def write_partner_network(partner: Partner, network: ImproviserNetwork, path: Pa
             Port("own", "o", [SEEN, features]),
             Port("heard", "h", [1]),
             Port("who", "w", [answers.dancers]),
+            Port("noise", "c", [answers.code]),
         ],
         [
             Port("scores", "n", []),
             Port("natural", "n", []),
-            Port("mixture", "o", [numbers]),
+            Port("codes", "c", [answers.code]),
             Port("alike", "o", [answers.dancers]),
         ],
     )
@@ -107,9 +110,48 @@ def write_partner_network(partner: Partner, network: ImproviserNetwork, path: Pa
         "window": str(network.window),
         "latent": str(network.latent),
         "rest": str(np.round(network.rest.astype(float), 7).tolist()),
-        "mixtures": str(answers.mixtures),
     }
-    path.write_bytes(checked_model(graph, ports, facts).SerializeToString())
+    path.write_bytes(in_eight_bits(checked_model(graph, ports, facts)).SerializeToString())
+
+
+def in_eight_bits(model: onnx.ModelProto) -> onnx.ModelProto:
+    """The same model, each large matrix stored in 8 bits with a scale a column; widened when loaded."""
+    stored = {one.name: one for one in model.graph.initializer}
+    widened = {node.input[0]: node for node in model.graph.node if node.op_type == "Cast"}
+    nodes = []
+    for name, node in widened.items():
+        weight = numpy_helper.to_array(stored[name]).astype(np.float32) if name in stored else np.zeros(0)
+        if weight.ndim != 2:
+            continue
+        scale = np.maximum(np.abs(weight).max(axis=0, keepdims=True), 1e-9) / np.float32(127)
+        small, out = np.round(weight / scale).astype(np.int8), node.output[0]
+        stored[name].CopyFrom(numpy_helper.from_array(small, name))
+        model.graph.initializer.append(numpy_helper.from_array(scale, f"{out}.scale"))
+        node.output[0] = f"{out}.wide"
+        nodes.append(helper.make_node("Mul", [f"{out}.wide", f"{out}.scale"], [out]))
+    rest = list(model.graph.node)
+    casts = [node for node in rest if node.op_type == "Cast"]
+    others = [node for node in rest if node.op_type != "Cast"]
+    del model.graph.node[:]
+    model.graph.node.extend([*casts, *nodes, *others])
+    onnx.checker.check_model(model)
+    return model
+
+
+def _flow(graph: Graph, layers: Layers, answers: Answers, context: str) -> None:
+    """Answers.forward after its context, as codes."""
+    seen, codes = layers.elu(graph, context), "noise"
+    told = [layers.linear(graph, seen, layer, f"told.{n}") for n, layer in enumerate(answers.told)]
+    for number in range(FLOW_STEPS):
+        times, hidden = times_of(torch.full((1, 1), number / FLOW_STEPS)), codes
+        for n, (step, when) in enumerate(zip(answers.steps, answers.when, strict=True)):
+            weight = graph.constant(f"flow.{n}", step.weight.detach().numpy().T)
+            moved = graph.op("Add", graph.op("MatMul", hidden, weight), told[n])
+            shift = graph.constant(f"when.{n}.{number}", when(times).detach().numpy())
+            hidden = layers.elu(graph, graph.op("Add", moved, shift))
+        way = layers.linear(graph, hidden, answers.last, "last")
+        way = graph.op("Mul", way, graph.constant("pace", 1 / FLOW_STEPS))
+        codes = graph.op("Add", codes, way, out="codes" if number == FLOW_STEPS - 1 else None)
 
 
 def _first(graph: Graph) -> list[str]:

@@ -1,6 +1,6 @@
 """Trains a partner: to dance as one of a couple, after the other one or alone, and to tell what answers.
 
-Four networks, in this order. Answers: the mixture of the next move's code. Then it dances along the recorded
+Four networks, in this order. Answers: codes of the next move. Then it dances along the recorded
 takes, and Natural learns to tell its moves from the dancer's: the logarithm of a ratio of densities, by which
 moves are drawn anew on the stage. Scorer: which move answers? Its loss is InfoNCE (Oord et al. 2018), the
 own move among 12 that Answers could have danced at that moment without the other one, and among the moves of
@@ -13,6 +13,7 @@ import copy
 import math
 import time
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -22,16 +23,16 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from appliance.dancer.material.improviser_network import ImproviserNetwork
-from appliance.dancer.material.improvising import BEFORE, Numbers, drawn, parts_of
+from appliance.dancer.material.improvising import BEFORE, Numbers
 from appliance.dancer.material.partner_network import LED_STEPS, SEEN
-from appliance.studio.improviser.improviser import Mixture
 from appliance.studio.partner.couples import DANCED, Moments, Stretch, led_of, moments_of, together
 
 BATCH, EMBEDDING, NOISE, DECAY, RATE = 256, 32, 0.3, 0.1, 1e-3
+OWN_NOISE, WIDTH, DROPPED = 0.6, 512, 0.5  # of Answers
 ALONE = 0.3  # share of the moments at which the other one is not heard
 OTHERS = 12  # moves drawn at a moment
 _MOST = 12_000  # moments for which they are
-NARROWEST_ANSWER = math.log(0.2)
+TIMES, FLOW_STEPS, DEEP = 4, 6, (192, 192, 192)  # of the flow
 LOOK_EVERY = 100  # steps between two looks at the take that is kept apart
 Told = Callable[[str], None]
 Side = tuple[Tensor, Tensor]  # moves with the steps before them (N, 11, F), and who (N, W)
@@ -88,33 +89,54 @@ class Scorer(nn.Module):
 
 
 class Answers(nn.Module):
-    """A dancer's last steps (N, 11, F), those of the other one (N, 16, F), which dancer it is (N, W) and
-    whether the other one is heard (N, 1) -> the numbers of the mixture of its next move's code.
+    """Codes of moves (N, C) from noise (N, C), by flow matching (Lipman et al. 2023), after a dancer's last
+    steps (N, 11, F), those of the other one (N, 16, F), which dancer it is (N, W) and whether the other one
+    is heard (N, 1); one row of these serves all noise.
     """
 
     def __init__(
-        self,
-        features: int,
-        code: int,
-        dancers: int,
-        mixtures: int = 8,
-        width: int = 384,
-        dropped: float = 0.4,
+        self, features: int, code: int, dancers: int, width: int = WIDTH, dropped: float = DROPPED
     ) -> None:
         super().__init__()
-        self.scale, self.mixtures, self.dancers = Scale(features), mixtures, dancers
+        self.scale, self.dancers, self.code = Scale(features), dancers, code
         size = (SEEN + LED_STEPS) * features + dancers + 1
-        self.network = _dense(size, width, width, mixtures * (2 * code + 1), dropped)
+        self.context = _dense(size, width, width, width, dropped)
+        sizes = (code, *DEEP)
+        self.steps = nn.ModuleList([nn.Linear(into, out, bias=False) for into, out in pairwise(sizes)])
+        self.told = nn.ModuleList([nn.Linear(width, out) for out in DEEP])
+        self.when = nn.ModuleList([nn.Linear(TIMES, out, bias=False) for out in DEEP])
+        self.last = nn.Linear(DEEP[-1], code)
 
-    def forward(self, own: Tensor, led: Tensor, who: Tensor, heard: Tensor) -> Tensor:
-        seen = torch.cat([self.scale(own), self.scale(led) * heard, who, heard], 1)
-        out: Tensor = self.network(seen)
+    def seen(self, own: Tensor, led: Tensor, who: Tensor, heard: Tensor) -> Tensor:
+        """What the flow is told (N, width)."""
+        out: Tensor = self.context(torch.cat([self.scale(own), self.scale(led) * heard, who, heard], 1))
+        return functional.elu(out)
+
+    def way(self, codes: Tensor, time: Tensor, seen: Tensor) -> Tensor:
+        """Where codes (N, C) flow at a time (N, 1) or (1, 1), 0..1."""
+        hidden, times = codes, times_of(time)
+        for step, told, when in zip(self.steps, self.told, self.when, strict=True):
+            hidden = functional.elu(step(hidden) + told(seen) + when(times))
+        out: Tensor = self.last(hidden)
         return out
 
-    def of(self, moments: _Batch, heard: Tensor) -> Mixture:
-        """Mixtures at moments."""
-        numbers = self(moments.own, moments.led, moments.who, heard)
-        return Mixture.of(numbers, self.mixtures, NARROWEST_ANSWER)
+    def forward(self, own: Tensor, led: Tensor, who: Tensor, heard: Tensor, noise: Tensor) -> Tensor:
+        seen, codes = self.seen(own, led, who, heard), noise
+        for number in range(FLOW_STEPS):
+            time = torch.full((1, 1), number / FLOW_STEPS, device=noise.device)
+            codes = codes + self.way(codes, time, seen) / FLOW_STEPS
+        return codes
+
+    def error(self, moments: _Batch, heard: Tensor, noise: Tensor, time: Tensor) -> Tensor:
+        """Mean squared error of where the flow leads from noise to the recorded codes."""
+        seen = self.seen(moments.own, moments.led, moments.who, heard)
+        between = (1 - time) * noise + time * moments.codes
+        return (self.way(between, time, seen) - (moments.codes - noise)).square().mean()
+
+
+def times_of(time: Tensor) -> Tensor:
+    """(N, 1), 0..1 -> (N, 4)."""
+    return torch.cat([time, time.square(), torch.cos(math.pi * time), torch.sin(math.pi * time)], 1)
 
 
 class Natural(nn.Module):
@@ -202,7 +224,7 @@ def train(
 
 
 def train_answers(training: _Batch, apart: _Batch, descent: _Descent) -> Answers:
-    """The network of the least negative log likelihood of the moves that were danced."""
+    """The network of the least error on the moves that were danced."""
     answers = Answers(training.own.shape[-1], training.codes.shape[-1], training.who.shape[1])
     answers.scale.learn(training.own.float())
     answers.to(training.own.device)
@@ -211,28 +233,30 @@ def train_answers(training: _Batch, apart: _Batch, descent: _Descent) -> Answers
         some = training.rows(_some(training.own))
         heard = some.heard * (torch.rand_like(some.heard) >= ALONE)
         scale = network.scale
-        shaken = some._replace(own=scale.shaken(some.own, NOISE), led=scale.shaken(some.led, NOISE))
-        return network.of(shaken, heard).negative_log_likelihood(some.codes).mean()
+        shaken = some._replace(own=scale.shaken(some.own, OWN_NOISE), led=scale.shaken(some.led, NOISE))
+        time = torch.rand_like(heard)
+        return network.error(shaken, heard, torch.randn_like(some.codes), time)
 
     def look(network: Answers) -> tuple[float, str]:
-        own, other, alone = nats_of(network, apart)
-        return own, f"{own:.3f} nats; {other:.3f} with another moment's steps, {alone:.3f} alone"
+        own, other, alone = errors_of(network, apart)
+        return own, f"error {own:.3f}; {other:.3f} with another moment's steps, {alone:.3f} alone"
 
-    return descent.learn(answers, loss_of, look)
+    return descent.learn(answers, loss_of, look, keeps_last=True)
 
 
 @torch.no_grad()
-def nats_of(answers: Answers, moments: _Batch) -> tuple[float, float, float]:
-    """Negative log likelihood of the moves' codes, nats a number: with the couple's steps, with another
-    moment's, and with nobody's.
-    """
+def errors_of(answers: Answers, moments: _Batch) -> tuple[float, float, float]:
+    """Errors on the moves: with the couple's steps, with another moment's, and with nobody's."""
     every = slice(None, None, max(1, len(moments.own) // 4096))
     known = moments.rows(every)
     is_heard = known.heard[:, 0] > 0
     some = _Batch(*(part[is_heard] for part in known))
     wrong = some._replace(led=some.led.roll(len(some.led) // 3, 0))
+    generator = torch.Generator().manual_seed(1)
+    noise = torch.randn(some.codes.shape, generator=generator).to(some.codes.device)
+    time = torch.rand(some.heard.shape, generator=generator).to(some.codes.device)
     found = [
-        float(answers.of(one, heard).negative_log_likelihood(some.codes).mean())
+        float(answers.error(one, heard, noise, time))
         for one, heard in ((some, some.heard), (wrong, some.heard), (some, 0 * some.heard))
     ]
     return found[0], found[1], found[2]
@@ -394,15 +418,16 @@ def _codes(
     device: str,
 ) -> Numbers:
     """(N * count, C) drawn."""
-    numbers = answers(
+    noise = rng.standard_normal((len(own) * count, answers.code)).astype(np.float32)
+    told = (
         _tensor(own, device),
         _tensor(led, device),
         _one_hot(who, answers.dancers, device),
         _tensor(heard.astype(np.float32)[:, None], device),
     )
-    parts = parts_of(numbers.float().cpu().numpy(), answers.mixtures)
-    logits, means, log_scales = (np.repeat(part, count, 0) for part in parts)
-    return drawn(logits, means, log_scales, 1.0, rng)
+    repeated = (part.float().repeat_interleave(count, 0) for part in told)
+    codes: Numbers = answers(*repeated, _tensor(noise, device)).cpu().numpy()
+    return codes
 
 
 def _moved(moments: Moments, dancers: int, device: str) -> _Batch:
@@ -461,7 +486,13 @@ class _Descent:
         self._seconds, self._name = seconds, name
         return self
 
-    def learn(self, network: N, loss_of: Callable[[N], Tensor], look: Callable[[N], tuple[float, str]]) -> N:
+    def learn(
+        self,
+        network: N,
+        loss_of: Callable[[N], Tensor],
+        look: Callable[[N], tuple[float, str]],
+        keeps_last: bool = False,
+    ) -> N:
         """The running mean of the least value that `look` gave; with what it says."""
         average = copy.deepcopy(network).eval().requires_grad_(False)
         optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
@@ -483,4 +514,4 @@ class _Descent:
                 self._told(f"{self._name}, step {step}: loss {float(loss.detach()):.3f}; kept apart: {said}")
                 if value < least:
                     best, least = copy.deepcopy(average), value
-        return best
+        return average if keeps_last else best
