@@ -86,7 +86,7 @@ def _check(directory: Path, box_file: Path | None) -> None:
     found = (
         *reach(list(parts.worn), box),
         *out_of_phones_reach(box),
-        *unwired(show, box),
+        *unwired(show.config, box),
         *too_many,
         *_dead_networks(show),
         *_no_mesh(show),

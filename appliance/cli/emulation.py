@@ -14,7 +14,7 @@ from appliance.box.own_command import BUNRAKU
 from appliance.cli.distributions import absent_commands
 from appliance.sensor.keys import create_keys
 from appliance.show.box import BoxConfig, UdpConfig
-from appliance.show.show import Show
+from appliance.show.show import ShowConfig
 from appliance.stage.stage_error import StageError
 
 _LAST_OUTPUT_S = 2.0
@@ -25,7 +25,7 @@ _OUTPUT = "emulator.txt"
 
 
 @contextmanager
-def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
+def emulated(show: ShowConfig, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     """Run `bunraku emulate` as the show's sensors; yields the box with their key file.
 
     The venue's own sensors are not admitted meanwhile, and what the box learns about the emulated ones is
@@ -33,7 +33,7 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     the sensors that they are. Raises StageError.
     """
     others = {one.name for one in box.sensors.foreign}
-    worn = dict.fromkeys(hand.sensor for _, hand in show.config.hands_at if hand.sensor)
+    worn = dict.fromkeys(hand.sensor for _, hand in show.hands_at if hand.sensor)
     names = [name for name in worn if name not in others]
     journal = box.journal.model_copy(update={"folder": None})
     if worn and not names:

@@ -15,7 +15,7 @@ from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
-    from appliance.show.show import Show
+    from appliance.show.show import ShowConfig
 
 _HOST, _MOST_NETWORKS = "0.0.0.0", 32
 
@@ -42,7 +42,7 @@ def out_of_phones_reach(box: BoxConfig) -> list[str]:
     return []
 
 
-def with_phone(show: Show, box: BoxConfig) -> BoxConfig:
+def with_phone(show: ShowConfig, box: BoxConfig) -> BoxConfig:
     """The box with a phone as the show's first sensor, and with a page that phones in this machine's networks
     can open.
 
@@ -50,7 +50,7 @@ def with_phone(show: Show, box: BoxConfig) -> BoxConfig:
     """
     from appliance.show.foreign_sensors import ForeignSensorConfig
 
-    worn = [hand.sensor for _, hand in show.config.hands_at if hand.sensor]
+    worn = [hand.sensor for _, hand in show.hands_at if hand.sensor]
     if not worn:
         raise StageError("This show has no sensor that a phone could be. Leave --phone out.")
     if box.console is None:

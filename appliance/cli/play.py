@@ -20,7 +20,7 @@ from appliance.sensor.memory import forget_memory
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path, named_show
 from appliance.show.control import ControlConfig
-from appliance.show.show import Show, load_show
+from appliance.show.show import ShowConfig, load_show
 from appliance.show.venue_rig import unwired
 from appliance.stage.open_sensors import reach
 from appliance.stage.run import Stage
@@ -64,7 +64,7 @@ def play_show(
     if phone:
         from appliance.cli.phones import with_phone
 
-        box = with_phone(show, box)
+        box = with_phone(show.config, box)
     message = ""
     if directory is not None and chosen is None:  # a network that never ends would block every signal
         from appliance.cli.network_proof import prove_network
@@ -76,7 +76,7 @@ def play_show(
         if emulate and scratch:
             from appliance.cli.emulation import emulated, wait_until_calling
 
-            box = opened.enter_context(emulated(show, box, scratch))
+            box = opened.enter_context(emulated(show.config, box, scratch))
         keeps, minutes = journal is not None, box.journal.minutes
         journal = _new_folder(journal) if journal is not None else box.journal.folder
         if (filmstrip or rehearse) is not None and scratch and not keeps and (alone or journal is None):
@@ -104,10 +104,10 @@ def play_show(
         with closing(stage):
             keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
             keeper = _keeper(keepers_box, journal, minutes) if keeps else None
-            unlit = () if alone or show.config.lights.fixtures else unwired(show, box)
+            unlit = () if alone or show.config.lights.fixtures else unwired(show.config, box)
             for line in (*message.splitlines(), *_introduction(stage, emulate, control), *unlit):
                 speaker.say(line)
-            companions = () if alone else tuple(_companions(show, box, control, window or shown))
+            companions = () if alone else tuple(_companions(show.config, box, control, window or shown))
             if page is not None:
                 companions += (page_companion(box, page, control, speaker.say, emulate, journal),)
             if emulate and scratch:
@@ -194,7 +194,7 @@ def _running(
 
 
 def _companions(
-    show: Show, box: BoxConfig, control: socket.socket | None, window: bool
+    show: ShowConfig, box: BoxConfig, control: socket.socket | None, window: bool
 ) -> Iterator[Companion]:
     """The processes beside the stage."""
     from appliance.box.notify import WATCHDOG_S
@@ -210,21 +210,21 @@ def _companions(
             watchdog_s=WATCHDOG_S["control"],
         )
     named = () if box.path is None else ("--box", str(box.path))
-    if show.config.motion.made_sources:
+    if show.motion.made_sources:
         yield Companion(
             "The generator",
             (*BUNRAKU, "generate", *named),
             "The last phrase plays on.",
             watchdog_s=WATCHDOG_S["generator"],
         )
-    if box.outputs.dmx and show.config.lights.fixtures:
+    if box.outputs.dmx and show.lights.fixtures:
         yield Companion(
             "The process for the lights",
             (*BUNRAKU, "lights", *named),
             "The lights stay as they are for a moment.",
             watchdog_s=WATCHDOG_S["lights"],
         )
-    if window and show.config.strings and (box.path is None or box.sound):
+    if window and show.strings and (box.path is None or box.sound):
         yield Companion(
             "The process for the sound",
             (*BUNRAKU, "sound", *named),

@@ -11,6 +11,7 @@ from appliance.dancer.phrase_cache import PhraseCache
 from appliance.levers.sources import MAIN, PATH
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
 from appliance.show.show import Show
 
 ACROSS = 5  # figures
@@ -39,7 +40,7 @@ def pose_map(show: Show) -> dict[str, Any]:
     steps = (np.arange(ACROSS) + 0.5) / ACROSS
     places = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     decoded = network.decode((middle + (low + (high - low) * places) @ directions).astype(np.float32))[:, 0]
-    bones = [_bones(show, network, pose) for pose in decoded]
+    bones = [_bones(show.skeleton, network, pose) for pose in decoded]
     tallest = max(float(np.ptp(one[..., 1])) for one in bones)
     return {
         "path": np.round(path, 3).tolist(),
@@ -51,9 +52,8 @@ def pose_map(show: Show) -> dict[str, Any]:
     }
 
 
-def _bones(show: Show, network: MotionNetwork, moving: Array) -> Array:
+def _bones(skeleton: Skeleton, network: MotionNetwork, moving: Array) -> Array:
     """From the front, (B, 2, 2): x to the right and y up of both ends."""
-    skeleton = show.skeleton
     pose = np.tile(quaternion.IDENTITY, (len(skeleton), 1)).astype(np.float64)
     pose[network.places] = quaternion.normalize(moving.astype(np.float64))
     positions, world = skeleton.forward_kinematics(pose, np.zeros(3))

@@ -48,7 +48,7 @@ def print_rig(
     patch = Patch(config.fixtures, show.directory)
     config = with_usual_mapping(config, patch, show.skeleton)
     Console().print(_table(config, show, box))
-    for sentence in unwired(show, box):
+    for sentence in unwired(show.config, box):
         say(sentence)
     phrase = read_bvh(show.phrase)
     for sentence in dazzling(config, patch, phrase):
@@ -67,14 +67,14 @@ def _table(config: LightsConfig, show: Show, box: BoxConfig) -> Table:
     for heading in ("fixture", "profile", "universe", "channels", "place x, y, z (m)", "pose"):
         table.add_column(heading, overflow="fold")
     for fixture in sorted(config.fixtures, key=lambda one: (one.universe, one.address)):
-        table.add_row(*_row(fixture, show, box))
+        table.add_row(*_row(fixture, show.directory, box))
     return table
 
 
-def _row(fixture: FixtureConfig, show: Show, box: BoxConfig) -> tuple[str, ...]:
+def _row(fixture: FixtureConfig, directory: Path, box: BoxConfig) -> tuple[str, ...]:
     wires = [wire.wire for wire in box.outputs.dmx if wire.universe == fixture.universe]
     mode = f" ({fixture.mode})" if fixture.mode else ""
-    last = fixture.address + channel_count(fixture, show.directory) - 1
+    last = fixture.address + channel_count(fixture, directory) - 1
     turned = ", turned " + _numbers(fixture.turn) if any(fixture.turn) else ""
     return (
         fixture.name,

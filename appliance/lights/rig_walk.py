@@ -46,7 +46,7 @@ def walk_rig(
             time.sleep(1.0 / box.lights.rate_hz)
             return time.monotonic()
 
-        for sentence in unwired(show, box):
+        for sentence in unwired(show.config, box):
             say(sentence)
         say(f"{len(to_see)} steps of {step_s:g} s or more; Ctrl-C ends the walk, and all goes dark.")
         walk(patch, to_see, step_s, box.lights.rate_hz, send_levels, say, stopped)

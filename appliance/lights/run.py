@@ -74,7 +74,7 @@ class Lights:
         wires = " and ".join(universe.wire.name for universe in self.universes)
         rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: each lamp follows a limb"
         self._say(f"Lights: {counted(len(self.rig.patch.fixtures), 'fixture')} by {wires}; {rules}.")
-        for sentence in unwired(self.show, self.box):
+        for sentence in unwired(self.show.config, self.box):
             self._say(sentence)
 
     def run(self, stopped: Callable[[], bool], pulse: Callable[[float], None]) -> None:

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import Problem, did_you_mean
 from appliance.show.lights import FixtureConfig, LightsConfig, channel_count, overlaps
-from appliance.show.show import Show
+from appliance.show.show import Show, ShowConfig
 from appliance.show.venue_lights import UNIVERSE_CHANNELS, VenueLightsConfig
 
 
-def unwired(show: Show, box: BoxConfig) -> list[str]:
+def unwired(show: ShowConfig, box: BoxConfig) -> list[str]:
     """A sentence for each universe that the show's fixtures are on and the box file has no wire for; one for
     wires that no fixture of the show is on."""
     wired = {wire.universe for wire in box.outputs.dmx}
-    fixtures = at_venue(show.config.lights, box.lights).fixtures
+    fixtures = at_venue(show.lights, box.lights).fixtures
     if wired and not fixtures:
         return [
             "The box file has wires for lights, but this show has no fixtures, so all lamps stay dark. Add "

@@ -239,6 +239,6 @@ def test_wires_without_fixtures_are_told(tmp_path: Path) -> None:
     from appliance.show.show import load_show
     from appliance.show.venue_rig import unwired
 
-    [sentence] = unwired(load_show(default_show_path()), load_box(box(tmp_path, 9)))
+    [sentence] = unwired(load_show(default_show_path()).config, load_box(box(tmp_path, 9)))
     assert "wires for lights, but this show has no fixtures" in sentence
-    assert unwired(load_show(default_show_path()), load_box(None)) == []
+    assert unwired(load_show(default_show_path()).config, load_box(None)) == []

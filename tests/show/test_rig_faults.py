@@ -184,7 +184,7 @@ def test_a_venue_may_change_the_rig(bundle: Path) -> None:
     (bundle / "box.yaml").write_text("lights: {places: [{fixture: wash, universe: 7, address: 1}]}\n")
     show, box = load_show(bundle), load_box(bundle / "box.yaml")
     assert misplaced(show, box) == []
-    assert [sentence[:23] for sentence in unwired(show, box)] == [
+    assert [sentence[:23] for sentence in unwired(show.config, box)] == [
         "Universe 1 has no wire,",
         "Universe 7 has no wire,",
     ]
