@@ -66,7 +66,7 @@ def secret(
 
 
 def pair_told(config: BoxConfig) -> dict[str, Any] | None:
-    """What the stage of this box says of its pair; None where none dances."""
+    """The stage's report about its pair; None where no stage dances."""
     reader = FrameReader(runtime_folder(config))
     try:
         if not reader.is_alive(time.monotonic()):

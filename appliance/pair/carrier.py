@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _ROUTES, _CARDS = Path("/proc/net/route"), Path("/sys/class/net")
-_SETTLE_S = 0.08  # a box that led alone hears the other one within that
+_SETTLE_S = 0.08  # a box hears the other one within that time
 
 
 class Carrier:

@@ -18,10 +18,10 @@ from appliance.pair.stream import Incoming, Outgoing, Parts, body_of, numbers_in
 from appliance.pair.wire import Codec
 
 _AT_ONCE = 256  # datagrams in one look
-_PARTS_A_TICK = 12  # of a keyframe: it is over within some 5 ticks
+_PARTS_A_TICK = 12  # a keyframe is sent within some 5 ticks
 _ASK_KEYFRAME_S = 0.06
 _BUFFER_BYTES = 1 << 20
-REPEATS = 2  # of each message, in the ticks after it
+REPEATS = 2  # each message is sent again in the two ticks after it
 _TRY_AGAIN_S = 1.0
 _KEYFRAME = 0  # first number of a question for a keyframe; messages are numbered from 1
 

@@ -1,4 +1,4 @@
-"""What a paired stage tells its box's other processes: whether they may speak; the leader's show state."""
+"""A paired stage's message to its box's other processes: may they send; the leader's show state."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ PATIENCE_FOR_S = 10.0
 
 
 class Role(IntEnum):
-    """What a box does; all but LEADS are silent."""
+    """The part of a box; all but LEADS are silent."""
 
     WAITS = 0
     FOLLOWS = 1
@@ -25,7 +25,7 @@ class Role(IntEnum):
 
 
 class Heard(NamedTuple):
-    """What a datagram of the other box says of its part. is_ready: it could take over at any moment."""
+    """The part of the other box, as its datagram says. is_ready: it could take over at any moment."""
 
     role: Role
     epoch: int
@@ -103,7 +103,7 @@ class Roles:
         self._since = now
 
     def look(self, now: float, is_ready: bool) -> None:
-        """What time alone brings; call it at least once a tick."""
+        """Changes that are due by time; call it at least once a tick."""
         if now - self._deposed_at > PATIENCE_FOR_S:
             self.patience_s = self.silent_s
         if self.role is Role.WAITS:

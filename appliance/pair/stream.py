@@ -28,7 +28,7 @@ class Outgoing:
     """The leader's end: messages are numbered from 1 and kept for a while."""
 
     def __init__(self) -> None:
-        self.number = 0  # of the newest message
+        self.number = 0  # the newest message's number
         self._kept: dict[int, bytes] = {}
 
     def put(self, message: bytes) -> Iterator[bytes]:
@@ -73,7 +73,7 @@ class Parts:
 
 
 def part_in(body: bytes) -> tuple[int, int, int, bytes] | None:
-    """Number, part, parts and payload of a body; None where it is none."""
+    """Number, part, parts and payload of a body; None for anything else."""
     if len(body) < _PART.size:
         return None
     number, part, parts = _PART.unpack_from(body)

@@ -148,7 +148,7 @@ class SensorLink:
             sensor.pairing.owe_nothing()
 
     def heard_at(self, now: float) -> dict[str, tuple[int, str, int]]:
-        """Of each linked wearable in the network: its power-on, and its address and port."""
+        """Power-on, address and port of each linked wearable in the network."""
         found = {}
         for name, known in self._by_name.items():
             session, route = known.pairing.session, known.pairing.route(now)

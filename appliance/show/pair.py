@@ -40,7 +40,7 @@ class PairConfig(Section):
         within=(0, 50),
     )
     picture: Literal["dance", "black"] = key(
-        "What the projector of the box that follows shows: the same dance, or black (both projectors on "
+        "The picture of the box that follows: the same dance, or black (both projectors on "
         "one wall, without a switch).",
         "dance",
     )

@@ -51,7 +51,7 @@ TOLERANCE_DEGREES = 0.5  # between processors of two kinds; beyond it the leader
 
 
 def settings_of(config: PairConfig) -> PairSettings:
-    """From the box file. Raises ConfigError where the secret is none."""
+    """From the box file. Raises ConfigError for a missing or malformed secret."""
     try:
         key = bytes.fromhex(config.secret.read_text().strip())
     except (OSError, ValueError):
@@ -66,7 +66,7 @@ def settings_of(config: PairConfig) -> PairSettings:
 
 
 def fingerprint_of(show: Show, facts: dict[str, Any]) -> bytes:
-    """What two boxes need alike to dance alike: show file, network, phrases, the layout of a tick."""
+    """A digest of all that two boxes need alike to dance alike: show file, network, phrases, the layout of a tick."""
     digest = hashlib.blake2s(digest_size=8)
     digest.update(json.dumps({name: facts[name] for name in sorted(facts.keys() - _OTHERS)}).encode())
     for path in (show.file.path, show.network, *dict.fromkeys(show.phrases.values())):
@@ -268,7 +268,7 @@ class PairedStage:
         self._write_part(now)
 
     def _sentence(self, role: Role) -> str:
-        """What this box does from now on, and why, for people and the journal."""
+        """The new part of this box and the reason for it, for people and the journal."""
         roles, name = self.pair.roles, self._settings.name
         if role is Role.LEADS:
             return f"This box leads the pair from now on ({roles.why}; change {roles.epoch})."
@@ -322,7 +322,9 @@ class PairedStage:
                 elif kind == ROUTES:
                     self._routes = json.loads(item)
             except DAMAGED as error:
-                self._lose_step(f"What the leader sent does not fit here ({type(error).__name__}: {error}).")
+                self._lose_step(
+                    f"A message of the leader does not fit here ({type(error).__name__}: {error})."
+                )
                 return
 
     def _run_tick(self, item: bytes, clock: TickClock, pulse: Callable[[float, float], None]) -> None:

@@ -22,6 +22,7 @@ from appliance.sensor.keys import create_keys
 from tests.bundles import write_show
 from tests.pair.hall import FIRST, SECOND, Hall
 from tests.system.lit import RIG
+from tests.system.processes import wait_until
 
 SPLIT_S = 0.1
 WATCHED_S = 1.2
@@ -119,8 +120,7 @@ def lost_in(hall: Hall, since: float, until: float) -> dict[str, float]:
         changes = [b[0] - a[0] for a, b in itertools.pairwise(sacn) if a[1] != b[1]]
         found["dmx_taken_ms"] = 1000.0 * max([0.0, *changes])  # unchanged levels repeat once in 0.85 s
         found["dmx_overlap_ms"] = _overlap([one[:2] for one in sacn])
-    poses = [one for one in list(seen.poses) if since <= one[0] <= until]
-    found["jump_degrees"] = _jump(poses, int(found["osc_lost"]))
+    found["jump_degrees"] = _jump(seen.poses(since, until), int(found["osc_lost"]))
     return found
 
 
@@ -176,7 +176,9 @@ def run(count: int, seed: int, folder: Path, names: list[str]) -> list[dict[str,
             time.sleep(WATCHED_S)
             undo()
             time.sleep(WATCHED_S)
-            found = lost_in(hall, since, time.time())
+            until = time.time()
+            wait_until(lambda: hall.seen.psn and hall.seen.psn[-1][0] > until, "nobody speaks")  # noqa: B023
+            found = lost_in(hall, since, until)
             results.append({"fault": fault.__name__, "led": leader == hall.leader, **found})
             print(number, json.dumps(results[-1]), flush=True)
             if "--trace" in sys.argv and (found["osc_lost"] > 1 or found["osc_twice"]):
@@ -184,8 +186,7 @@ def run(count: int, seed: int, folder: Path, names: list[str]) -> list[dict[str,
                     print(
                         address, "\n".join(one for one in box.output.splitlines()[-40:] if "This box" in one)
                     )
-            for seen in (hall.seen.osc, hall.seen.psn, hall.seen.sacn, hall.seen.poses):
-                seen.clear()
+            hall.seen.clear()
         if "--words" in sys.argv:
             for box in hall.boxes.values():
                 print(box.output)

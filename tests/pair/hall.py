@@ -87,7 +87,7 @@ class Seen:
 
     def __init__(self, network: Namespace) -> None:
         self.osc: list[tuple[float, str, list[Any]]] = []  # arrival, box, arguments of the frame message
-        self.poses: list[tuple[float, str, str, list[float]]] = []
+        self._bundles: list[tuple[float, str, bytes]] = []
         self.psn: list[tuple[float, str]] = []
         self.sacn: list[tuple[float, str, int, bytes]] = []  # arrival, box, priority, levels
         self.artnet: list[tuple[float, str, bytes]] = []
@@ -109,6 +109,8 @@ class Seen:
             one.close()
 
     def _run(self) -> None:
+        with contextlib.suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), -19)  # what comes is noted in time
         names = {one.fileno(): name for name, one in self._sockets.items()}
         poll = select.epoll()
         for descriptor in names:
@@ -131,12 +133,25 @@ class Seen:
             self.sacn.append((at, host, data[108], data[126:]))
         elif name == "artnet":
             self.artnet.append((at, host, data[18:]))
+        elif data.startswith(b"/bunraku/frame"):
+            self.osc.append((at, host, _messages(data)[0][1]))
         else:
-            for address, arguments in _messages(data):
-                if "frame" in address:
-                    self.osc.append((at, host, arguments))
-                elif address.endswith("/rot"):
-                    self.poses.append((at, host, address, arguments))
+            self._bundles.append((at, host, data))
+
+    def poses(self, since: float, until: float) -> list[tuple[float, str, str, list[float]]]:
+        """Orientations of joints that came between two moments: arrival, box, address, quaternion."""
+        bundles = [one for one in list(self._bundles) if since <= one[0] <= until]
+        return [
+            (at, host, address, arguments)
+            for at, host, data in bundles
+            for address, arguments in _messages(data)
+            if address.endswith("/rot")
+        ]
+
+    def clear(self) -> None:
+        """Forget what came."""
+        for one in (self.osc, self._bundles, self.psn, self.sacn, self.artnet):
+            one.clear()
 
 
 def _messages(data: bytes) -> list[tuple[str, list[Any]]]:

@@ -40,7 +40,7 @@ class ArtDmx:
 
 
 def cancel_merge() -> bytes:
-    """ArtAddress that changes nothing of a node, and ends its merge: the next ArtDmx counts alone."""
+    """ArtAddress that changes nothing of a node, and ends its merge: it takes the next ArtDmx only."""
     switches = bytes([_KEEP] * 9 + [255, _CANCEL_MERGE])  # input, output, sub-net; sACN priority; command
     head = struct.pack("<8sH", _ID, _OP_ADDRESS) + struct.pack(">HBB", _PROTOCOL_VERSION, _KEEP, 1)
     return head + bytes(18 + 64) + switches
