@@ -15,9 +15,7 @@ from appliance.pose.quaternion import Array
 
 SAMPLES = 48  # windows of the dance, and latents of the prior
 DEAD = 0.35  # fraction of the usual difference between two windows; less counts as none. Alive: 1.1 to 1.3
-UNLEARNED = (
-    0.7  # fraction of it; giving the mean pose is that far off, a trained network 0.05 to 0.34
-)
+UNLEARNED = 0.7  # fraction of it; giving the mean pose is that far off, a trained network 0.05 to 0.34
 ACTIVE = 0.1  # standard deviation over the dance from which on a number of the latent says something
 
 Encode = Callable[[Array], Latents]
