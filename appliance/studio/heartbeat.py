@@ -7,9 +7,11 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from textwrap import shorten
 from typing import Any
 
 QUIET_S = 8.0
+LONGEST = 48  # characters of a line that are repeated
 
 
 class _Watched:
@@ -51,7 +53,7 @@ def heartbeat() -> Iterator[None]:
             if watched.last_s > told:
                 since = watched.last_s
             if time.monotonic() - watched.last_s >= QUIET_S:
-                line = watched.line.rstrip(" .") or "at work"
+                line = shorten(watched.line, LONGEST, placeholder="").rstrip(" .") or "at work"
                 watched.add(f"{line} ... {time.monotonic() - since:.0f} s\n")
                 told = watched.last_s
 
