@@ -73,21 +73,6 @@ def adopt_show(
     return box_file.adopt_show(_chosen(chosen), Path(folder), source)
 
 
-def recordings(folders: list[str]) -> Any:
-    """The folders with recordings in these places, the box's and the stick's, and how long they are."""
-    from appliance.exchange.recorded_minutes import recorded_minutes
-
-    found = []
-    for place, root in zip(("box", "stick"), map(Path, folders), strict=True):
-        inside = sorted(one for one in root.glob("*") if one.is_dir()) if root.is_dir() else []
-        for folder in [root, *inside]:
-            files, minutes = recorded_minutes(folder)
-            if files:
-                name = place if folder == root else f"{place}/{folder.name}"
-                found.append({"name": name, "files": files, "minutes": round(minutes, 1)})
-    return found
-
-
 def use_rehearsal(journal: str, into: str) -> Any:
     """Write a live dancer's dance from the journal as recordings to learn from."""
     import shutil
@@ -165,7 +150,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     one.__name__: one
     for one in (
         *(about, pose_map, keep_cue, box_file, change_box_file, dance_again, adopt_show),
-        *(timelines, stretch, help_file, recordings, use_rehearsal),
+        *(timelines, stretch, help_file, use_rehearsal),
     )
 }
 

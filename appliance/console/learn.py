@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import shutil
 import sys
 import time
@@ -19,9 +18,10 @@ from appliance.console.body import said
 from appliance.console.child import answer_of
 from appliance.console.guard import Guard
 from appliance.console.learning import FOLDER, RECORDINGS, STUDIO_MISSING, USUAL_MIN, Learning, Wanted
+from appliance.pose.recorded_minutes import recorded_minutes
 
 STICK = Path("/media/bunraku/bunraku") / RECORDINGS
-_LISTED_S, _EXPORTED_S, _ENDS_WITHIN_S = 20.0, 120.0, 10.0
+_EXPORTED_S, _ENDS_WITHIN_S = 120.0, 10.0
 _RUNS = "Something is being learned already. Wait for its end, or end it."
 
 
@@ -65,8 +65,7 @@ class Learn:
 
     async def _state(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
-        folders = [str(self._recordings), str(STICK)]
-        listed = json.loads(await answer_of("recordings", _LISTED_S, folders=folders))
+        listed = await asyncio.to_thread(self._listed)
         return web.json_response(
             {
                 "studio": "" if has_studio() else STUDIO_MISSING,
@@ -117,6 +116,19 @@ class Learn:
         return web.Response(
             body=await answer_of("use_rehearsal", _EXPORTED_S, **places), content_type="application/json"
         )
+
+    def _listed(self) -> list[dict[str, Any]]:
+        """The folders with recordings on the box and on the stick."""
+        found = []
+        for place, root in (("box", self._recordings), ("stick", STICK)):
+            with contextlib.suppress(OSError):
+                inside = sorted(one for one in root.iterdir() if one.is_dir())
+                for folder in (root, *inside):
+                    files, minutes = recorded_minutes(folder)
+                    if files:
+                        name = place if folder == root else f"{place}/{folder.name}"
+                        found.append({"name": name, "files": files, "minutes": round(minutes, 1)})
+        return found
 
     def _folder(self, name: Any) -> Path | None:
         """A folder of recordings by the name that the page was given: only those that it lists."""

@@ -12,10 +12,10 @@ import pytest
 
 from appliance.box.clock import TICK_S
 from appliance.box.live_pose import LivePoseReader, LivePoseWriter
-from appliance.exchange.recorded_minutes import recorded_minutes
 from appliance.exchange.training_set import write_training_set
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
+from appliance.pose.recorded_minutes import recorded_minutes
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import read_journal
 from appliance.studio.data.catalogue import read_catalogue

@@ -6,7 +6,7 @@ import { byId } from "./elements.js";
 import { twice } from "./hold.js";
 import { number, translated, words } from "./words.js";
 
-const LOOK_MS = 2000, ADOPTED_WITHIN_MS = 120_000;
+const LOOK_MS = 2000, LISTED_WITHIN_MS = 20_000, ADOPTED_WITHIN_MS = 120_000;
 let timer = 0, chosen = "", isRead = false;
 
 export function initLearn() {
@@ -35,7 +35,7 @@ export function leaveLearn() {
 async function read() {
   clearTimeout(timer);
   isRead = true;
-  const answer = await request("/api/learn");
+  const answer = await request("/api/learn", undefined, LISTED_WITHIN_MS);
   if (answer.status !== 200) return say(translated(answer.message) || words("no_page"));
   const { studio, recordings, journal, runs, progress, can_dance: canDance, show } = answer.value;
   byId("learn-part").hidden = false;
