@@ -21,7 +21,7 @@ _FEWEST_SECONDS = 0.1
 INTERRUPTED = 130  # as shells say it
 _PARAMETERS = {"show": "directory", "box": "box_file"}
 
-Wishes = dict[str, Path | float | bool]
+Options = dict[str, Path | float | bool]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -34,8 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
         sys.exit(preflight(given[1:]))
     spare_the_collector()
-    wishes = wishes_to_play(given)
-    if wishes is None:
+    options = options_of_play(given)
+    if options is None:
         from appliance.cli.app import main as any_command
 
         any_command(given)
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     end_with_parent()
     prepare_environment()
     try:
-        sys.exit(_play(wishes))
+        sys.exit(_play(options))
     except KeyboardInterrupt:  # before there was anything to stop
         sys.exit(INTERRUPTED)
     except Exception as error:
@@ -52,35 +52,35 @@ def main(arguments: Sequence[str] | None = None) -> None:
         refuse(error)
 
 
-def wishes_to_play(given: Sequence[str]) -> Wishes | None:
+def options_of_play(given: Sequence[str]) -> Options | None:
     """The options of a plain `play`, by their names; None where the whole parser must look."""
     if not given or given[0] != "play":
         return None
-    wishes: Wishes = {}
+    options: Options = {}
     rest = list(given[1:])
     while rest:
         option, separator, value = rest.pop(0).partition("=")
         if option == _ALONE and not separator:
-            wishes["alone"] = True
+            options["alone"] = True
             continue
         if not separator and rest:
             value = rest.pop(0)
         if not value or value.startswith("-"):
             return None
         if option in _PATHS:
-            wishes[option[2:]] = Path(value)
+            options[option[2:]] = Path(value)
         elif option == _SECONDS and (seconds := _number(value)) >= _FEWEST_SECONDS:
-            wishes["seconds"] = seconds
+            options["seconds"] = seconds
         else:
             return None
-    return None if "chosen" in wishes and {"show", "box"} & wishes.keys() else wishes
+    return None if "chosen" in options and {"show", "box"} & options.keys() else options
 
 
-def _play(wishes: Wishes) -> int:
+def _play(options: Options) -> int:
     from appliance.cli.play import play_show
 
-    named = {_PARAMETERS.get(name, name): wish for name, wish in wishes.items()}
-    return play_show(**named)  # type: ignore[arg-type]  # wishes_to_play gives each name its type
+    named = {_PARAMETERS.get(name, name): value for name, value in options.items()}
+    return play_show(**named)  # type: ignore[arg-type]  # options_of_play gives each name its type
 
 
 def _number(text: str) -> float:

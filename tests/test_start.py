@@ -12,7 +12,7 @@ import typer.main
 
 from appliance.cli import app as cli
 from appliance.cli.play import play_show
-from appliance.start import wishes_to_play
+from appliance.start import options_of_play
 
 
 def play_command() -> typer.main.TyperCommand:  # type: ignore[name-defined]
@@ -21,7 +21,7 @@ def play_command() -> typer.main.TyperCommand:  # type: ignore[name-defined]
 
 
 @pytest.mark.parametrize(
-    ("given", "wishes"),
+    ("given", "understood"),
     [
         (["play"], {}),
         (["play", "--alone"], {"alone": True}),
@@ -33,8 +33,8 @@ def play_command() -> typer.main.TyperCommand:  # type: ignore[name-defined]
         (["play", "--seconds", "2.5", "--journal", "j"], {"seconds": 2.5, "journal": Path("j")}),
     ],
 )
-def test_plain_options_of_play_are_understood(given: list[str], wishes: dict[str, object]) -> None:
-    assert wishes_to_play(given) == wishes
+def test_plain_options_of_play_are_understood(given: list[str], understood: dict[str, object]) -> None:
+    assert options_of_play(given) == understood
 
 
 @pytest.mark.parametrize(
@@ -60,14 +60,14 @@ def test_plain_options_of_play_are_understood(given: list[str], wishes: dict[str
     ],
 )
 def test_everything_else_is_left_to_the_full_parser(line: str) -> None:
-    assert wishes_to_play(line.split()) is None
+    assert options_of_play(line.split()) is None
 
 
 def test_every_plain_option_is_one_of_the_command_and_of_play_show() -> None:
     line = "play --show a --box b --journal c --seconds 1 --alone"
-    wishes = wishes_to_play(line.split()) or {}
+    given = options_of_play(line.split()) or {}
     options = {parameter.name for parameter in play_command().params}
-    assert wishes.keys() | {"chosen"} <= options
+    assert given.keys() | {"chosen"} <= options
     parameters = inspect.signature(play_show).parameters
     assert {"directory", "box_file", "journal", "seconds", "alone"} <= parameters.keys()
 

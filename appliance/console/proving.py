@@ -35,7 +35,7 @@ class Proving:
         self._wanted, self.progress = self.folder / "wanted", self.folder / "progress"
 
     def want(self, wanted: Wanted) -> None:
-        """Begin: an empty progress, then the wish. Raises OSError."""
+        """Begin: an empty progress, then the request. Raises OSError."""
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.progress.write_bytes(b"")
         part = self.folder / ".wanted"

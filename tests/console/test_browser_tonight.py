@@ -115,7 +115,7 @@ def test_panic_is_in_reach_while_the_pin_is_asked_for(tab: Tab, venue: tuple[Box
     tab.fill("#pin-input", page.pin)
     press(tab, "#pin-send")
     wait_until(lambda: declared(box).panic, "PANIC was lost behind the question")
-    assert declared(box).going, "the first wish gave way to it"
+    assert declared(box).going, "the first request gave way to it"
     press(tab, "#stop")
     wait_until(lambda: not declared(box).going)
     press(tab, "#resume")

@@ -144,14 +144,14 @@ def test_a_show_that_is_no_person_takes_no_figure(tmp_path: Path) -> None:
 
 
 def test_a_damaged_file_is_refused_and_never_crashes(tmp_path: Path) -> None:
-    chance = random.Random(5)
+    rng = random.Random(5)
     path = figure(tmp_path / BODY_FILE, skeletons.mixamo())
     whole = path.read_bytes()
     for _ in range(40):
-        spoilt = bytearray(whole[: chance.randrange(len(whole))] if chance.random() < 0.3 else whole)
-        for _ in range(chance.randrange(1, 9)):
+        spoilt = bytearray(whole[: rng.randrange(len(whole))] if rng.random() < 0.3 else whole)
+        for _ in range(rng.randrange(1, 9)):
             if spoilt:
-                spoilt[chance.randrange(min(2000, len(spoilt)))] = chance.randrange(256)
+                spoilt[rng.randrange(min(2000, len(spoilt)))] = rng.randrange(256)
         path.write_bytes(spoilt)
         try:
             mesh = body_of(path, skeletons.dancer())

@@ -58,7 +58,7 @@ class Wearables:
         if cable is not None:
             senders[0][Lane.CABLE] = SerialSender(str(cable))
         self.emulator = Emulator(self.sensors, senders, network=VenueNetwork(VENUE, 1), on_sent=on_sent)
-        self._wishes: queue.SimpleQueue[Callable[[float], None]] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[Callable[[float], None]] = queue.SimpleQueue()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -75,14 +75,14 @@ class Wearables:
         for wearer in self._wearers:
             self.do(wearer.start_moving)
 
-    def do(self, wish: Callable[[float], None]) -> None:
-        """Call `wish` in the sensors' own thread, with the current time."""
-        self._wishes.put(wish)
+    def do(self, request: Callable[[float], None]) -> None:
+        """Call `request` in the sensors' own thread, with the current time."""
+        self._requests.put(request)
 
     def _run(self) -> None:
         with closing(self.emulator):
             self.emulator.run(None, self._ended.is_set, self._fulfil)
 
     def _fulfil(self) -> None:
-        while not self._wishes.empty():
-            self._wishes.get()(time.monotonic())
+        while not self._requests.empty():
+            self._requests.get()(time.monotonic())
