@@ -47,7 +47,6 @@ def test_two_touches_begin_and_it_waits_for_the_show(tab: Tab, venue: tuple[Box,
     wait_until(lambda: learning.told().get("share") == 0.0)
     assert learning.wanted() is not None and not learning.show.exists(), "nothing is trained"
     press(tab, "#learn-end")
-    press(tab, "#learn-end")
     expect(tab.locator("#learn-said")).to_contain_text("The show stays as it is")
     assert learning.wanted() is None
 

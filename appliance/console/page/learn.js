@@ -12,7 +12,7 @@ let timer = 0, chosen = "", isRead = false;
 export function initLearn() {
   byId("learn-open").addEventListener("click", () => withPin(read));
   byId("learn-begin").addEventListener("click", async () => tell(await ask("/api/learn", { recordings: chosen })));
-  twice(byId("learn-end"), async () => tell(await ask("/api/learn/end", {})), "sure_now");
+  byId("learn-end").addEventListener("click", async () => tell(await ask("/api/learn/end", {})));
   twice(byId("learn-dance"), dance, "sure_now");
   byId("learn-rehearsal").addEventListener("click", async () => {
     const answer = await ask("/api/learn/rehearsal", {}, ADOPTED_WITHIN_MS);
