@@ -66,7 +66,7 @@ def settings_of(config: PairConfig) -> PairSettings:
 
 
 def fingerprint_of(show: Show, facts: dict[str, Any]) -> bytes:
-    """A digest of all that two boxes need alike to dance alike: show file, network, phrases, the layout of a tick."""
+    """A digest of all that both need alike to dance alike: show file, network, phrases, layout of a tick."""
     digest = hashlib.blake2s(digest_size=8)
     digest.update(json.dumps({name: facts[name] for name in sorted(facts.keys() - _OTHERS)}).encode())
     for path in (show.file.path, show.network, *dict.fromkeys(show.phrases.values())):
