@@ -107,7 +107,7 @@ def trained(folder: Path, monkeypatch: pytest.MonkeyPatch, steps: int) -> tuple[
 def test_it_learns_what_answers_and_who_dances_and_its_file_gives_what_was_trained(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    network, partner = trained(tmp_path, monkeypatch, 150)
+    network, partner = trained(tmp_path, monkeypatch, 90)
     export_partner(partner, network, tmp_path / FILE)
     played = PartnerNetwork(tmp_path / FILE, MOVING)
     assert played.dancers == 2

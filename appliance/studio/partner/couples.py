@@ -64,8 +64,8 @@ def stretches_of(network: ImproviserNetwork, dataset: Dataset, takes: Sequence[T
     """Sound stretches of all couples among the takes, of either dancer, and in the mirror."""
     found = []
     for number, both in enumerate(couples_of(takes).values()):
-        sound = np.array([take.sound for take in both])
-        for start, end in runs(sound.all(axis=0)):
+        sound = [take.sound for take in both]
+        for start, end in runs(sound[0] & sound[1]):
             for mirror, pair in _recorded(both, start, end, dataset.mirrors):
                 steps = [steps_of(network, one, dataset.moving).features for one in pair]
                 for own, led in permutations((0, 1)):

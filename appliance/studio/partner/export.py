@@ -23,7 +23,8 @@ _ROUNDING = 0.1  # most that 8-bit weights may change of a score or of a code's 
 
 def export_partner(partner: Partner, network: ImproviserNetwork, path: Path) -> None:
     """Write the networks' file, weights in 8 bits. Raises StudioError where it is not what was trained."""
-    partner = Partner(*(part.cpu().eval() for part in partner))
+    for part in partner:
+        part.cpu().eval()
     write_partner_network(partner, network, path)
     generator, scale = torch.Generator().manual_seed(1), partner.answers.scale
     led, moves = (
@@ -65,7 +66,7 @@ def write_partner_network(partner: Partner, network: ImproviserNetwork, path: Pa
 
     def scaled(value: str, of: Scale, name: str, steps: int) -> str:
         middle, scale = (
-            graph.constant(f"{name}.{one}", getattr(of, one).numpy()) for one in ("middle", "scale")
+            graph.constant(f"{name}.{one}", of.get_buffer(one).numpy()) for one in ("middle", "scale")
         )
         level = graph.op("Mul", graph.op("Sub", value, middle), scale)
         return graph.op("Reshape", level, sizes_of(graph, -1, steps * features))
@@ -141,11 +142,15 @@ def in_eight_bits(model: onnx.ModelProto) -> onnx.ModelProto:
 def _flow(graph: Graph, layers: Layers, answers: Answers, context: str) -> None:
     """Answers.forward after its context, as codes."""
     seen, codes = layers.elu(graph, context), "noise"
-    told = [layers.linear(graph, seen, layer, f"told.{n}") for n, layer in enumerate(answers.told)]
+    told = [
+        layers.linear(graph, seen, layer, f"told.{n}")
+        for n, layer in enumerate(answers.told)
+        if isinstance(layer, nn.Linear)
+    ]
     for number in range(FLOW_STEPS):
         times, hidden = times_of(torch.full((1, 1), number / FLOW_STEPS)), codes
         for n, (step, when) in enumerate(zip(answers.steps, answers.when, strict=True)):
-            weight = graph.constant(f"flow.{n}", step.weight.detach().numpy().T)
+            weight = graph.constant(f"flow.{n}", step.get_parameter("weight").detach().numpy().T)
             moved = graph.op("Add", graph.op("MatMul", hidden, weight), told[n])
             shift = graph.constant(f"when.{n}.{number}", when(times).detach().numpy())
             hidden = layers.elu(graph, graph.op("Add", moved, shift))

@@ -155,7 +155,7 @@ def _rows(
 
     def row(name: str, both: Sequence[tuple[Array, Array]], recorded: Sequence[Take] = ()) -> Row:
         found = [dependence(one, two, joints) for one, two in both]
-        figures = [
+        above, lag_s, leads, alike = (
             float(np.mean(values))
             for values in (
                 [one.above for one in found],
@@ -163,10 +163,11 @@ def _rows(
                 [share_led_by_second(one, two, joints) for one, two in both],
                 [likeness(one, two, pairs) for one, two in both],
             )
-        ]
+        )
+        told_apart = energy = float("nan")
         if recorded:
             made, real = [two for _, two in both], [whole[take.name] for take in recorded]
-            figures.append(_critic(recorded, made, moving))
+            told_apart = _critic(recorded, made, moving)
             limbs = limbs_of(joints)
             energies = [
                 value
@@ -174,12 +175,12 @@ def _rows(
                 for name, value in limb_figures(one, two, limbs).items()
                 if name.startswith("energy")
             ]
-            figures.append(float(np.mean(energies)))
+            energy = float(np.mean(energies))
         # The first of a couple leads in every other duet; in all where there is one for each couple.
         roles = [n % 2 if len(both) == len(couples) else 0 for n in range(len(both))]
         accord = [accords[role](*one) for role, one in zip(roles, both, strict=True)]
         error = float(np.std(accord) / np.sqrt(max(1, len(accord) - 1)))
-        return Row(name, *figures, accord=float(np.mean(accord)), error=error)
+        return Row(name, above, lag_s, leads, alike, told_apart, energy, float(np.mean(accord)), error)
 
     yield row("recorded couples", [(whole[one.name], whole[two.name]) for one, two in apart])
     others = couples[2:] + couples[:2]

@@ -212,14 +212,14 @@ def train(
     rng = np.random.default_rng(seed)
     descent = _Descent(steps, told)
     began = time.monotonic()
-    both = [_moved(moments_of(network, part, rng), dancers, device) for part in (stretches, apart)]
+    learned, asked = (_moved(moments_of(network, part, rng), dancers, device) for part in (stretches, apart))
     seconds = max(seconds - (time.monotonic() - began), 1.0)
-    answers = train_answers(*both, descent.within(0.45 * seconds, "answers"))
-    danced = [dances(network, answers, part, rng, device) for part in (stretches, apart)]
-    natural = train_natural(*both, *danced, descent.within(0.2 * seconds, "natural"))
-    beside = [others(network, answers, part, rng, device) for part in both]
-    scorer = train_scorer(*beside, descent.within(0.3 * seconds, "scores"))
-    alike = train_alike(*both, descent.within(0.05 * seconds, "alike"))
+    answers = train_answers(learned, asked, descent.within(0.45 * seconds, "answers"))
+    danced, danced_apart = (dances(network, answers, part, rng, device) for part in (stretches, apart))
+    natural = train_natural(learned, asked, danced, danced_apart, descent.within(0.2 * seconds, "natural"))
+    beside, beside_apart = (others(network, answers, part, rng, device) for part in (learned, asked))
+    scorer = train_scorer(beside, beside_apart, descent.within(0.3 * seconds, "scores"))
+    alike = train_alike(learned, asked, descent.within(0.05 * seconds, "alike"))
     return Partner(answers, natural, scorer, alike)
 
 
@@ -284,7 +284,7 @@ def train_natural(
         for moves, who in (recorded[0], danced):
             chosen = _some(moves)
             sides.append((moves[chosen], who[chosen]))
-        return of(network, *sides, NOISE)
+        return of(network, sides[0], sides[1], NOISE)
 
     def look(network: Natural) -> tuple[float, str]:
         with torch.no_grad():
