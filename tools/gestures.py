@@ -23,7 +23,7 @@ from appliance.sensor.gestures import AGAIN_S, RATE_HZ, Gesture, TurningPoint, l
 from tools.heading_drift import TRUE_FPS
 
 WRISTS = ("lHand", "rHand")
-REPEATS, EXCERPTS = 16, 6
+REPEATS, EXCERPTS = 12, 5
 TILT, NOISE = 12.0, 3.0  # degrees
 NEAR_S = 0.6  # after the end of a gesture, by which it counts as found
 JOIN = 8  # orientations from dance into a gesture and back

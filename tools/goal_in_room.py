@@ -1,4 +1,4 @@
-"""Measures the goal in the room: `python -m tools.goal_in_room [SECONDS]`, for each of four goals 20 s.
+"""Measures the goal in the room: `python -m tools.goal_in_room [SECONDS]`, for each of two goals 20 s.
 
 Rows: how far the figure's root is from the goal once it has had 8 s to get there (at each moment, and its
 mean over two seconds, in which a step sways forth and back), and how fast the feet that carry it slide. Null
