@@ -97,12 +97,13 @@ def measure(
                 print(f"Listening to the strings for {free_s:g} s ...", flush=True)
                 page.tell(phase="sound", seconds=free_s)
                 heard = run(setting, sound_course(free_s))
-            seen: tuple[Run, Run] | tuple[None, None] = (None, None)
+            light_steps: Run | None = None
+            light_dance: Run | None = None
             if light:
                 print(f"Watching the projector's pictures for {free_s:g} s ...", flush=True)
                 steps, dance = light_courses(free_s)
-                seen = run(setting, steps), run(setting, dance)
-            evidence = Evidence(locked, free, power_ons, restarts, firmware, *seen, heard)
+                light_steps, light_dance = run(setting, steps), run(setting, dance)
+            evidence = Evidence(locked, free, power_ons, restarts, firmware, light_steps, light_dance, heard)
     except (ProbeError, OSError, ValueError) as error:
         message = sentence(error) if isinstance(error, OSError) else None
         print(f"bunraku measure: {message or error}", file=sys.stderr)
