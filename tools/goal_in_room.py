@@ -1,8 +1,8 @@
 """Measures the goal in the room: `python -m tools.goal_in_room [SECONDS]`, for each of two goals 20 s.
 
-Rows: how far the figure's root is from the goal once it has had 8 s to get there (at each moment, and its
-mean over two seconds, in which a step sways forth and back), and how fast the feet that carry it slide. Null
-product: the same dance without a goal; and beside it the phrase itself.
+Rows: the root's distance from the goal after 8 s, at each moment and as a mean over two seconds (a step sways
+forth and back), and how fast the feet that carry the figure slide. Null product: the same dance without a
+goal; and beside it the phrase itself.
 """
 
 from __future__ import annotations

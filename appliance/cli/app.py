@@ -235,7 +235,9 @@ def _require_known(given: Sequence[str], commands: Sequence[str]) -> None:
 
 def refuse(error: Exception) -> NoReturn:
     """Exit with one clear line for an error that the user can correct; raise any other."""
-    message = sentence(error) if isinstance(error, OSError) else str(error) if _is_correctable(error) else None
+    message = str(error) if _is_correctable(error) else None
+    if isinstance(error, OSError):
+        message = sentence(error)
     if message is None:
         raise error
     print(f"bunraku: {message}", file=sys.stderr)

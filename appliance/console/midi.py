@@ -21,7 +21,7 @@ _FULL = "The binding cannot be saved ({reason}). What was bound before still is.
 
 
 class Midi:
-    """The bindings of the process that hears MIDI, which tells where it has them."""
+    """The bindings of the process that hears MIDI; its report has their folder."""
 
     def __init__(self, guard: Guard, stage: StageView, box: BoxView) -> None:
         self._guard, self._stage, self._box = guard, stage, box

@@ -177,7 +177,7 @@ class Continuation(Takeover):
         self, partner: PartnerNetwork, led: FloatArray | None, rng: np.random.Generator
     ) -> None:
         """Codes of moves after the other's steps, and of moves that do not look at them, by the dial."""
-        if not self._who.any():  # of a couple it is the other one
+        if not self._who.any():  # the other dancer of a couple
             who = partner.recognised(self._steps) if led is None else partner.recognised(led[-SEEN:]) ^ 1
             self._who[who] = 1.0
         answers = 0 if led is None else round(CANDIDATES * max(0.0, 2 * (self.follow - FREE)))

@@ -6,7 +6,7 @@ from appliance.pose.ease import ease
 
 
 class Takeover:
-    """What a source and its fade have in common, once a tick."""
+    """The common part of a source and its fade, once a tick."""
 
     SNAPSHOT: tuple[str, ...] = ("_chosen", "_share", "_step")
 

@@ -106,8 +106,10 @@ class Dance:
 
     @cached_property
     def eyes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """The dancer's eyes, (3,) metres, and where they look, a unit vector; None: there is no head. Computed
-        once a pass: `take_frame` begins one."""
+        """The dancer's eyes, (3,) metres, and where they look, a unit vector; None: there is no head.
+
+        Computed once a pass: `take_frame` begins one.
+        """
         if self._head is None:
             return None
         turned = self.world[self._head]

@@ -11,7 +11,7 @@ from appliance.projector.corners import Corners, Point, homography
 
 POINTS = 5  # across and down; those in the corners are the corner-pin's
 FINE = 33  # points across and down of the grid that is drawn with
-FARTHEST = 0.25  # of the display, from where the corners put the point
+FARTHEST = 0.25  # share of the display, from the point between the corners
 NOT_WARPED: tuple[Point, ...] = ()
 _CORNERS = (0, POINTS - 1, POINTS * (POINTS - 1), POINTS * POINTS - 1)
 
@@ -35,7 +35,7 @@ def complaint(warp: Warp, corners: Corners) -> str:
     if len(warp) != POINTS**2 or not np.isfinite(warp).all():
         return "This is no mesh of 25 points. The picture stays as it is."
     if np.abs(warp).max() > FARTHEST:
-        return "A point of the mesh is too far from its place. The picture stays as it is. Move the corners first."
+        return "A point of the mesh is too far off. The picture stays as it is. Move the corners first."
     places = on_display(warp, corners)
     right, down = np.diff(places, axis=1)[:-1], np.diff(places, axis=0)[:, :-1]
     turns = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]

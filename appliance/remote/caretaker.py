@@ -19,7 +19,7 @@ from appliance.show_control.packet import Message
 FILE = "opening-hours"
 _LARGEST = 1024
 _LOOK_S = 1.0
-_FADE_S = 5.0  # of the strings
+_FADE_S = 5.0  # for the strings
 
 
 class Memory(NamedTuple):

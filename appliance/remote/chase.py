@@ -11,10 +11,10 @@ from appliance.show_control.packet import Message
 
 _FADE_IN_S = 3.0  # after a jump the phrase is left alone for so long: its crossfade runs
 _CLOSES_S = 10.0  # in which a small error is taken away
-_MOST = 0.03  # of the speed, for that: nobody sees it
+_MOST = 0.03  # share of the speed: nobody sees it
 _SAME = 2e-4  # speeds that differ by less are one
 _FAR_S, _NEAR_S = 0.02, 0.005  # further than a frame of the dance: is brought as near as this
-_LEARNS, _MOST_LEARNED = 0.004, 0.01  # of the error a second: the drift of the box's clock against the code
+_LEARNS, _MOST_LEARNED = 0.004, 0.01  # share of the error a second: the box's clock drifts against the code
 
 
 def timed_cues(cues: Sequence[Mapping[str, Any]], rate: Rate) -> list[tuple[float, str]]:

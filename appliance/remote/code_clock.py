@@ -10,7 +10,7 @@ CodeState = Literal["absent", "locking", "running", "standing", "freewheeling"]
 _GAIN, _RATE_GAIN = (
     0.05,
     0.0013,
-)  # of an alpha-beta filter with critical damping: beta = alpha^2 / (2 - alpha)
+)  # alpha-beta filter, critically damped: beta = alpha^2 / (2 - alpha)
 _SPEEDS = 0.5, 2.0
 _STANDS_AFTER = 3  # times the same label, over as many frames
 _GAP_FRAMES = 8  # without any label: MIDI timecode tells a whole one in every second frame

@@ -20,7 +20,7 @@ _RETRY_S = 2.0
 _SILENT_S = 1.0
 SAMPLE_RATE = 48_000
 _BLOCK = 256
-_MAY_DIFFER = 0.02  # of the samples of a frame: a track is played this much too fast or too slow
+_MAY_DIFFER = 0.02  # share of a frame's samples: a track is played this much too fast or too slow
 
 
 class _Frame(ctypes.Structure):

@@ -69,8 +69,8 @@ class OpeningHours:
     def _openings(
         self, moment: datetime.datetime, days: int = 0
     ) -> Iterator[tuple[datetime.datetime, datetime.datetime]]:
-        """Of yesterday, which may reach into today, of today and of days after it. A day counts by when it
-        opened.
+        """Openings of yesterday, which may reach into today, and of the days from today on. A day counts by
+        when it opened.
         """
         for number in range(-1, days + 1):
             day = moment.date() + datetime.timedelta(days=number)

@@ -26,7 +26,7 @@ class _Cable:
             self.descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
 
     def messages(self) -> Iterator[bytes]:
-        """What has come. Raises OSError when the device is unplugged."""
+        """Messages that have come. Raises OSError when the device is unplugged."""
         try:
             received = os.read(self.descriptor, _AT_ONCE)
         except BlockingIOError:

@@ -55,7 +55,7 @@ _NETWORK_NAME = "Bunraku"
 
 
 class Follower:
-    """What follows the code: cues and, where it is asked for, the phrase."""
+    """Cues that follow the code and, where it is asked for, the phrase."""
 
     def __init__(self, config: TimecodeConfig, give: Callable[[Message], None]) -> None:
         self._config, self._give = config, give
@@ -171,8 +171,8 @@ class Midi:
                 self.trouble = ""
             except OSError as error:
                 self.trouble = (
-                    f"MIDI by network cannot be heard ({error.strerror}): its ports are taken. What is in "
-                    "force stays in force. Give another `port` under midi: network: in the box file."
+                    f"MIDI by network cannot be heard ({error.strerror}): its ports are taken. All that is "
+                    "in force stays. Give another `port` under midi: network: in the box file."
                 )
 
     def turn(self, cues: tuple[str, ...], now: float) -> Iterator[bytes]:
@@ -295,7 +295,7 @@ class Remote:
         self._senders.turn(self._own_time_s(health, is_alive, now), now)
 
     def report(self, now: float) -> dict[str, Any]:
-        """What the page and the status tell, and what stands in the way."""
+        """The report for page and status; notes the fallbacks too."""
         clock = self.follower.clock
         label = self.follower.time_s(now)
         state = clock.state(now) if self._timecode.source else ""

@@ -21,7 +21,7 @@ _PLAIN: dict[int, Message] = {
 
 
 def command_of(message: bytes, device: int, cues: Sequence[str]) -> Message | None:
-    """The command that a system exclusive message is, for this device number; None: it is none for the box.
+    """The command in a system exclusive message for this device number; None: there is none for the box.
 
     GO names the cue by its number (`name: "12"` in the show), else its place in the list; without a number it
     is the next one. RESET is the first cue. A timed GO fades as the cue says.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 DAY_S = 24 * 3600.0
-_ROUNDING = 1e-3  # of a frame: it has begun where rounding says that it is just about to
+_ROUNDING = 1e-3  # share of a frame: one that begins now has begun
 _TEXT = re.compile(r"(\d{1,2}):(\d{2}):(\d{2})(?:[:;.](\d{2}))?")
 
 

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 
-RATE_HZ = 25.0  # of the orientations that are looked at
+RATE_HZ = 25.0  # orientations that are looked at
 LOOK_EVERY = 3  # orientations
 POINTS = 20
 BAND = 3  # points by which two repetitions may be out of step
-TEMPI = (0.82, 1.0, 1.22)  # of the repetitions, in which a gesture is looked for
+TEMPI = (0.82, 1.0, 1.22)  # times the repetitions' tempo
 REPETITIONS = 3
 SHORTEST_S, LONGEST_S = 0.4, 4.0
 MOVES_RAD_S, RESTS_RAD_S, RESTS_S = 0.7, 0.4, 0.4  # where a repetition begins and ends
@@ -29,9 +29,9 @@ TURNING, UP = 0.25, 0.7  # weights beside how far the hand has turned
 LOOSE, LEAST_LOOSE = (
     2.0,
     1.25,
-)  # of the distance between the repetitions: what still counts, at most and least
-MOST_UNLIKE = 0.6  # repetitions that are farther apart are none
-CLEAR = 0.8  # of the nearest that ordinary motion came
+)  # times the distance between repetitions: the bound, at most and least
+MOST_UNLIKE = 0.6  # repetitions that are farther apart are refused
+CLEAR = 0.8  # times the least distance of ordinary motion
 AGAIN_S = 1.0  # after a gesture nothing counts for so long
 
 Floats = NDArray[np.float32]
@@ -102,7 +102,7 @@ def points_of(stretches: Floats) -> Floats:
 
 
 def distances(points: Floats, templates: Floats) -> Floats:
-    """Of points (B, POINTS, F) from each of the templates (K, POINTS, F): (B, K), in sizes of a template."""
+    """Distances of points (B, POINTS, F) from templates (K, POINTS, F): (B, K), in sizes of a template."""
     apart = (
         np.sum(points**2, axis=-1)[:, None, :, None]
         + np.sum(templates**2, axis=-1)[None, :, None, :]

@@ -110,7 +110,7 @@ class HoursConfig(Section):
     )
     warm_up_s: float = key("How long before it opens projectors are switched on.", 60.0, within=(0, 900))
     quiet: list[QuietConfig] = key("Hours in which the strings are quieter.", [], length=(0, 8))
-    attract: AttractConfig | None = key("What is danced while nobody is there; null: the same.", None)
+    attract: AttractConfig | None = key("Dances while nobody is there; null: the same as ever.", None)
     projectors: list[ProjectorPowerConfig] = key("Projectors to switch on and off.", [], length=(0, 8))
 
     @model_validator(mode="after")

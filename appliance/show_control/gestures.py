@@ -82,7 +82,7 @@ class _Hand:
 class Gestures:
     """Watches the hands of the puppet that cues lead. call: calls a cue by its name.
 
-    What was learned goes into the runtime folder, which is memory; the keeper carries it to the disk.
+    Gestures go into the runtime folder, which is memory; the keeper carries them to the disk.
     """
 
     def __init__(
@@ -282,7 +282,7 @@ class Gestures:
         self._say(f"Gestures cannot be kept ({reason}): they last until show control is started again.")
 
     def _read(self, folder: Path, state: Path) -> None:
-        """What the last show control wrote into memory, or else what is on the disk."""
+        """The last show control's gestures in memory, or else those on the disk."""
         with closing(gesture_record(state).reader(folder)) as reader:
             text = reader.read()
         try:

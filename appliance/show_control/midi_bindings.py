@@ -25,7 +25,7 @@ _HALF = 0.5
 
 
 class Moved(NamedTuple):
-    """What was moved on a device. channel: 1 to 16; number: 0 where the kind has none; value: 0 to 1."""
+    """A movement on a device. channel: 1 to 16; number: 0 for pitch bend; value: 0 to 1."""
 
     device: str
     kind: str
@@ -40,7 +40,7 @@ class Moved(NamedTuple):
 
 
 def moved(device: str, message: bytes) -> Moved | None:
-    """What a MIDI message says was moved; None: it says nothing of that kind."""
+    """The movement in a MIDI message; None: there is none."""
     kind = _KINDS.get(message[0] >> 4)
     if kind is None or len(message) < 2:
         return None
@@ -70,7 +70,7 @@ class Binding(NamedTuple):
 
     @property
     def control(self) -> tuple[str, str, int, int]:
-        """What is moved."""
+        """Without its command."""
         return self.device, self.kind, self.channel, self.number
 
 

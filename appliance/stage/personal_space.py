@@ -21,7 +21,7 @@ _FASTEST_M_S = 3.0  # a root that jumps farther was put there
 class PersonalSpace:
     """Leads puppets that are near each other apart, once a tick before they stand.
 
-    What is kept apart are the roots (hips) on the floor, by the sum of both puppets' `space`.
+    The roots (hips) are kept apart on the floor, by the sum of both puppets' `space`.
     """
 
     SNAPSHOT = ("_places", "_speeds")
@@ -38,7 +38,7 @@ class PersonalSpace:
         self._speeds = [(0.0, 0.0)] * len(puppets)
 
     def keep(self) -> None:
-        """From where the puppets stood in the last tick."""
+        """From the puppets' places in the last tick."""
         places = []
         for one in self._puppets:
             x, _, z = one.frame.root.tolist()

@@ -74,7 +74,7 @@ class StageParts:
     primary: str | None
     link: SensorLink
     outputs: Outputs
-    live_figure: Figure | None = None  # of a live dancer; None: the show takes none
+    live_figure: Figure | None = None  # the live dancer's; None: the show has no live dancer
     live_inbox: LivePoseReader | None = None
     live_refused: int = 0  # poses of another figure, or none
     complaints: tuple[str, ...] = ()

@@ -235,7 +235,7 @@ WARP = tuple(
 
 @pytest.mark.parametrize("corners", [None, ((10, 4), (150, 2), (156, 86), (6, 80))])
 def test_a_mesh_pulls_the_picture(show: Show, corners: Any) -> None:
-    """A picture whose colours are its places shows where each of them is. Null: without the mesh they are off."""
+    """A picture whose colours are its places shows where each of them is. Null: without the mesh."""
     across, down = np.meshgrid(np.linspace(0, 255, SIZE[0]), np.linspace(0, 255, SIZE[1]))
     places = np.dstack([across, down, np.zeros_like(down)]).round().astype(np.uint8)
     pinned = Alignment(warp=WARP)

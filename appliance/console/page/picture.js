@@ -12,7 +12,7 @@ const MESH = 5; // points across and down
 const INNER = [...Array(MESH * MESH).keys()].filter((place) => ![0, MESH - 1, MESH * (MESH - 1), MESH * MESH - 1].includes(place));
 let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]), pulls = [];
 
-// What a handle moves: where it is, how it is shown while a finger is on it, and the order for a step.
+// A handle: its place, how it is drawn under a finger, and the order for a step.
 const CORNER = {
   address: "/projector/nudge",
   at: (place) => shown[place],

@@ -1,4 +1,4 @@
-"""What a network changes in a motion, put on the phrase that the motion was decoded from.
+"""A network's change of a motion, put on the phrase that the motion was decoded from.
 
 A network blurs what it decodes. The difference between two of its motions has none of that: on the phrase,
 whatever the network does not know of it stays.

@@ -15,7 +15,7 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 
 EVERY = 6  # ticks between the moments that are compared
-LAGS = np.arange(0, 13, 2)  # of these, by which the other one is seen: up to 1.4 s
+LAGS = np.arange(0, 13, 2)  # lags at which the other one is seen: up to 1.4 s
 AWAY, SHIFTS = 20, 12  # from the shift `AWAY` on two dances count as unrelated
 KEPT_SEEN, KEPT_DANCED = 60, 24  # principal components
 MOTION, RIDGE = 3.0, 0.3
@@ -47,7 +47,7 @@ class Accord:
 
 
 def _both(first: Array, second: Array) -> tuple[Array, Array]:
-    """What is seen of the first at all lags, and what the second dances, centred, (N, D) each."""
+    """The first at all lags, and the dance of the second, centred, (N, D) each."""
     one, two = _features(first), _features(second)
     count, late = min(len(one), len(two)), int(LAGS[-1])
     seen = np.concatenate([one[late - lag : count - lag] for lag in LAGS], axis=1)

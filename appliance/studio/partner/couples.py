@@ -117,7 +117,7 @@ def moments_of(network: ImproviserNetwork, stretches: Sequence[Stretch], rng: np
 
 
 def led_of(stretch: Stretch, at: int) -> Numbers:
-    """What the other one had danced (16, F) before the step; 0 where it is not known."""
+    """The other one's dance (16, F) before the step; 0 where it is not known."""
     if stretch.led is None:
         return np.zeros((LED_STEPS, stretch.own.shape[1]), np.float32)
     return stretch.led[at - FIRST : at - GAP]

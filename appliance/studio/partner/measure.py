@@ -32,7 +32,7 @@ from appliance.studio.partner.export import FILE, export_partner
 from appliance.studio.partner.training import train
 from appliance.studio.studio_error import StudioError
 
-LEAST_TICKS = 200  # of a stretch from which accord is learned
+LEAST_TICKS = 200  # length of a stretch from which accord is learned
 COPY_LATE = 25  # ticks by which the null product copies
 FOLLOWS_NAME, STRANGERS_NAME = "follow 1, lead 0", "the same beside dancers of other couples (null)"
 COPY_NAME = f"a copy {COPY_LATE / 50:g} s later (null)"
@@ -233,7 +233,7 @@ def _accords(dataset: Dataset, moving: Sequence[int]) -> Sequence[Callable[[Arra
 
 
 def _critic(recorded: Sequence[Take], made: Sequence[Array], moving: Sequence[int]) -> float:
-    """Of the dances against the dancers' own, of which only sound stretches count."""
+    """The critic's value for the dances beside the dancers' own, in which only sound stretches count."""
     real, danced, names = [], [], []
     for take, dance in zip(recorded, made, strict=True):
         stretches = runs(take.sound[: len(dance) + LEAD_IN])

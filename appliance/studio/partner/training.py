@@ -1,4 +1,4 @@
-"""Trains a partner: to dance as one of a couple, after the other one or alone, and to tell what answers.
+"""Trains a partner: to dance as one of a couple, after the other one or by itself, and to know an answer.
 
 Four networks, in this order. Answers: codes of the next move. Then it dances along the recorded
 takes, and Natural learns to tell its moves from the dancer's: the logarithm of a ratio of densities, by which
@@ -28,11 +28,11 @@ from appliance.dancer.material.partner_network import LED_STEPS, SEEN
 from appliance.studio.partner.couples import DANCED, Moments, Stretch, led_of, moments_of, together
 
 BATCH, EMBEDDING, NOISE, DECAY, RATE = 256, 32, 0.3, 0.1, 1e-3
-OWN_NOISE, WIDTH, DROPPED = 0.6, 512, 0.5  # of Answers
+OWN_NOISE, WIDTH, DROPPED = 0.6, 512, 0.5  # for Answers
 ALONE = 0.3  # share of the moments at which the other one is not heard
 OTHERS = 12  # moves drawn at a moment
 _MOST = 12_000  # moments for which they are
-TIMES, FLOW_STEPS, DEEP = 4, 6, (192, 192, 192)  # of the flow
+TIMES, FLOW_STEPS, DEEP = 4, 6, (192, 192, 192)  # for the flow
 LOOK_EVERY = 100  # steps between two looks at the take that is kept apart
 Told = Callable[[str], None]
 Side = tuple[Tensor, Tensor]  # moves with the steps before them (N, 11, F), and who (N, W)
@@ -108,7 +108,7 @@ class Answers(nn.Module):
         self.last = nn.Linear(DEEP[-1], code)
 
     def seen(self, own: Tensor, led: Tensor, who: Tensor, heard: Tensor) -> Tensor:
-        """What the flow is told (N, width)."""
+        """The flow's inputs (N, width)."""
         out: Tensor = self.context(torch.cat([self.scale(own), self.scale(led) * heard, who, heard], 1))
         return functional.elu(out)
 
@@ -168,7 +168,7 @@ class Alike(nn.Module):
 
 
 class Partner(NamedTuple):
-    """What partner.onnx holds."""
+    """The content of partner.onnx."""
 
     answers: Answers
     natural: Natural

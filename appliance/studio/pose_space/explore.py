@@ -212,7 +212,7 @@ def _draw(
     """The regions with the nearest known pose behind each, and the dance with the phrase behind it."""
     pairs = [poses_shown(known, one) for one in regions]
     made, near = (
-        tuple(np.concatenate([getattr(one, field) for one in side]) for field in ("poses", "roots"))
+        (np.concatenate([one.poses for one in side]), np.concatenate([one.roots for one in side]))
         for side in zip(*pairs, strict=True)
     )
     chosen = np.arange(len(regions))
