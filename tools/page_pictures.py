@@ -1,7 +1,8 @@
 """docs/pictures/page-*.png, by `python -m tools.page_pictures`: the page on a phone, taken by Chromium.
 
 It starts a box with emulated sensors; `--address` takes the pictures from another one. Figures that depend on
-the load of the machine are replaced (`at_rest`), so that the pictures are the same on every machine.
+the load of the machine are replaced (`at_rest`), and its name and folders: the pictures are the same on every
+machine.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ _COLOURS = 64  # a third of the bytes, and nothing that is seen
 _WELL_WITHIN_MS = 20_000
 _FADED_MS, _PROVEN_WITHIN_MS = 4_000, 300_000
 _EVENING = 1_767_816_900.0  # 20:15 of an evening
+_INSTALLED = {"host": "bunraku", "box_file": "/etc/bunraku/box.yaml", "addresses": [["eth0", "192.168.0.10"]]}
 _DANCED_S = 45 * 60.0  # the show has danced this long
 _LINKED_S = 15.0  # the emulated sensor is on, its neutral pose taken, and no fallback of the start in force
 
@@ -70,6 +72,11 @@ def _calm(tab: Page, now: float) -> None:
             return route.fulfill(response=answer, json=runs)
         return route.fulfill(response=answer)
 
+    def about(route: Route) -> None:
+        answer = route.fetch()
+        return route.fulfill(response=answer, json=answer.json() | _INSTALLED)
+
+    tab.route("**/api/box", about)
     tab.route_web_socket("**/watch", between)
     tab.route("**/api/happened", journal)
 
