@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import moderngl
 import numpy as np
 import pytest
 
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
-from appliance.projector.picture.led import LAGS, led_by
+from appliance.projector.picture.led import LAGS, coupled, led_by
 from appliance.projector.picture.looks.strings import tied
 from appliance.projector.picture.poses import ROW_S, ROWS, Poses
 from appliance.projector.picture.renderer import Renderer
@@ -81,3 +83,43 @@ def test_strings_run_from_the_held_joint(gl: moderngl.Context, dance: Recording,
     assert led.max() > 200
     assert (led[..., 0] - led[..., 2]).max() > 80 > (free[..., 0] - free[..., 2]).max()
     assert free[:20].max() > 25 > led[:20].max(), "no strings from above, or they stay while a hand holds"
+
+
+def test_partners_are_coupled_where_they_move_alike_and_strangers_are_not() -> None:
+    """Null: another dance. It makes no difference which of the two is late."""
+
+    def later(poses: Poses, rows: int) -> Poses:
+        return Poses(np.roll(poses.positions, rows, axis=0), poses.world)
+
+    def slower(poses: Poses) -> Poses:
+        """In another rhythm: all dances of this test have the same one."""
+        at = 0.6 * np.arange(ROWS)
+        low = at.astype(int)
+        part = (at - low)[:, None, None].astype(np.float32)
+        return Poses((1 - part) * poses.positions[low] + part * poses.positions[low + 1], poses.world)
+
+    seeds = range(20)
+    alike, late, strangers = (
+        np.median([coupled(dance(seed), other(seed))[RANDOM] for seed in seeds])
+        for other in (dance, lambda seed: later(dance(seed), 6), lambda seed: slower(dance(seed + 100)))
+    )
+    assert alike > 0.9
+    assert late > 0.5
+    assert strangers < 0.4 * late, "strangers look like partners"
+    assert np.array_equal(coupled(dance(1), dance(2)), coupled(dance(2), dance(1)))
+
+
+def test_strings_run_between_partners(gl: moderngl.Context, dance: Recording, looks: Renderer) -> None:
+    """Two figures that dance the same are tied to each other; one that stands still is tied to nobody."""
+    here = moment_of(dance, AT_S, None)
+    (one,) = here.puppets
+
+    def beside(trail: bool) -> int:
+        aside = np.float32([1.2, 0.0, 0.0])
+        moved = [(at + aside, turn) for at, turn in one.trail]
+        still = [(one.positions + aside, one.world)] * len(moved)
+        other = replace(one, positions=one.positions + aside, trail=tuple(moved if trail else still))
+        picture = draw_still(gl, looks, replace(here, puppets=(one, other)), "strings", SIZE)
+        return int(picture[:, SIZE[0] // 2 - 3 : SIZE[0] // 2 + 3].astype(int).sum())
+
+    assert beside(trail=True) > 1.5 * beside(trail=False)

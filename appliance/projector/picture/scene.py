@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +22,7 @@ from appliance.projector.picture.body_buffers import BodyBuffers
 from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import read_image, texture_of
-from appliance.projector.picture.led import led_by
+from appliance.projector.picture.led import coupled, led_by
 from appliance.projector.picture.noise import SIDE, noise_pixels
 from appliance.projector.picture.poses import Floats, HoldTexture, Poses, PoseTexture
 from appliance.projector.picture.targets import Target
@@ -146,6 +147,7 @@ class Easel:
         self.body = BodyBuffers(ctx, mesh)
         self._figures = [_FigureTextures(ctx, mesh, len(skeleton))]
         self._mesh, self._shown = mesh, 1
+        self._coupled = HoldTexture(ctx, len(skeleton))
         self._poses: Sequence[Poses] = ()
         self._holds: Sequence[Floats | None] = ()
         self.noise = ctx.texture((SIDE, SIDE), 4, noise_pixels())
@@ -179,6 +181,15 @@ class Easel:
             leaders.append(leader)
         return leaders
 
+    def couplings(self) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Each pair of figures: the first of them, and the inputs with how alike their joints move. The
+        inputs hold until the next pair.
+        """
+        for first, second in itertools.combinations(range(self._shown), 2):
+            self._coupled.write(coupled(self._poses[first], self._poses[second]))
+            others = self._figures[second].inputs["poses"]
+            yield first, {"led": self._coupled.texture, "others": others}
+
     def melt(self, share: float, time_s: float) -> None:
         """How amorphous figures are from now on, 0 to 1; time_s moves their surface."""
         root = tuple(self.bind_positions[0].tolist())
@@ -191,7 +202,7 @@ class Easel:
 
     def draw_figure(self, figure: int, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
         """Draw what belongs to one of the figures. drawn: as Drawing takes it."""
-        drawing.draw({"back": 0.0} | self._melt | inputs | self._figures[figure].inputs, *drawn)
+        drawing.draw({"back": 0.0} | self._melt | self._figures[figure].inputs | inputs, *drawn)
 
     def draw_figures(self, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
         """Draw what belongs to a figure once for each. drawn: as Drawing takes it."""
@@ -319,7 +330,7 @@ class Easel:
             blur.draw({"source": source.texture, "step_uv": step})
 
     def release(self) -> None:
-        shared: list[Any] = [self.body, *self._figures, self.noise]
+        shared: list[Any] = [self.body, *self._figures, self._coupled, self.noise]
         shared += [*self._canvases.values(), *self._backdrops.values(), *self._videos.values()]
         for owned in (*self._drawings, *self._buffers, *shared):
             owned.release()

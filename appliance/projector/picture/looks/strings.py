@@ -1,4 +1,6 @@
-"""Strings: the answer itself. One runs from the held joint to each limb, taut as far as the limb follows."""
+"""Strings: the answer itself. One runs from the held joint to each limb, taut as far as the limb follows;
+between figures from joint to joint, as far as both move alike.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ class Strings:
             "chance": random.random_sample((len(many), 4)).astype(np.float32),
             "joints": np.repeat(many[:, None], 4, axis=1).astype(np.uint8),
         }
-        self._strings = easel.drawing("string", "string", easel.vertices(parts, instanced=True))
+        tied_to = easel.vertices(parts, instanced=True)
+        self._strings = easel.drawing("string", "string", tied_to)
+        self._between = easel.drawing("string", "string", tied_to, parts=("BETWEEN",))
         self._glow = Glow(easel)
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
@@ -79,6 +83,11 @@ class Strings:
             }
             easel.draw_figure(
                 figure, self._strings, inputs, moderngl.TRIANGLE_STRIP, 2 * (STEPS + 1), strands
+            )
+        for first, pair in easel.couplings():
+            easel.draw_figure(
+                *(first, self._between, inputs | pair | {"leader": -1}),
+                *(moderngl.TRIANGLE_STRIP, 2 * (STEPS + 1), strands),
             )
         picture.finish()
         self._glow.finish(scene, look, colours, picture, opacity, wall)
