@@ -17,6 +17,7 @@ from appliance.generator.fallback import OF_THE_GENERATOR
 from appliance.keeper.fallback import OF_THE_KEEPER
 from appliance.lights.fallback import OF_THE_LIGHTS
 from appliance.projector.fallback import OF_THE_PROJECTOR
+from appliance.remote.fallback import OF_THE_REMOTE
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, SerialConfig
@@ -282,6 +283,7 @@ EVERY = {
         *OF_THE_COMPANY,
         *OF_CONTROL,
         *OF_THE_PAGE,
+        *OF_THE_REMOTE,
     )
 }
 
@@ -297,7 +299,7 @@ def test_the_table_for_technicians_has_each_fallback_and_a_test_that_names_it() 
 
 def test_the_table_for_desks_has_each_fallback() -> None:
     page = (ROOT / "docs" / "osc.md").read_text()
-    page = page[page.index("### Fallbacks") : page.index("### MIDI")]
+    page = page[page.index("### Fallbacks") : page.index("### Show controllers")]
     assert sorted(re.findall(r"^\| `([a-z-]+)` \|", page, re.MULTILINE)) == sorted(EVERY)
 
 
