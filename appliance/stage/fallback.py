@@ -145,7 +145,7 @@ PAIR_ALONE = Fallback(
 )
 PAIR_TAKEN = Fallback(
     "pair-taken",
-    "The other box was silent, and this one took over: at most one frame was lost. Look at the other box; "
+    "The other box was silent, and this one took over, as a rule within a frame. Look at the other box; "
     "it follows once it is back, and `bunraku pair back` gives it the lead again.",
 )
 OF_THE_STAGE = (

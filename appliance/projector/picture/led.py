@@ -46,7 +46,7 @@ def coupled(first: Poses, second: Poses) -> Floats:
 
 
 def _speeds(poses: Poses) -> Floats:
-    """Of each joint about the root, (ROWS - 1, J) figure heights a second, newest first."""
+    """Speeds of the joints about the root, (ROWS - 1, J) figure heights a second, newest first."""
     relative = poses.positions - poses.positions[:, :1]
     found: Floats = np.linalg.norm(np.diff(relative, axis=0), axis=2) / ROW_S
     return found

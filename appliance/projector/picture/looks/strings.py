@@ -1,5 +1,6 @@
-"""Strings: the answer itself. One runs from the held joint to each limb, taut as far as the limb follows;
-between figures from joint to joint, as far as both move alike.
+"""Strings: the answer itself, from the held joint to each limb, and between figures that move alike.
+
+Each is taut as far as the limb follows, or as far as both joints move alike.
 """
 
 from __future__ import annotations
