@@ -38,7 +38,7 @@ def test_latency_is_measured_with_the_rights_of_a_stage(dancing: Box, device: De
     finally:
         device.ask("/api/command", {"address": "/go"})
     assert document["figures"]["ticks"] > 100 and document["software"]["bunraku"]
-    assert {limit["message"] for limit in document["limits"]} >= {"transport, median", "late ticks"}
+    assert {limit["label"] for limit in document["limits"]} >= {"transport, median", "late ticks"}
     machine.await_that(lambda: machine.show(PROVE, "ActiveState") == "inactive", "it does not end")
     assert not machine.run("find", "/run/bunraku/prove", "-name", "wanted").strip()
 

@@ -103,4 +103,5 @@ def test_every_command_that_reads_recordings_takes_the_same_options() -> None:
     assert readers == {
         *("filmstrip", "convert", "retarget", "inspect", "train", "evaluate", "export", "experiment"),
         *("granular", "improvise", "vary", "map", "path", "duet", "compare-blind"),
+        *("compare", "periods", "explore"),
     }

@@ -129,7 +129,8 @@ def test_tries_come_ever_later_and_what_waits_is_bounded() -> None:
 
     at = asyncio.run(look())
     assert at[:7] == [0.0, 5.0, 15.0, 35.0, 75.0, 155.0, 315.0] and at[-1] - at[-2] == 300.0
-    assert tries[-1] == tries[-2] < 40 * 20 + 200
+    assert abs(tries[-1] - tries[-2]) <= 1  # the number that were left out
+    assert tries[-1] < 40 * 20 + 200
 
 
 def test_nothing_is_sent_unless_the_box_file_asks_for_it(tmp_path: Path) -> None:

@@ -257,5 +257,12 @@ def test_a_show_that_ends_as_usual_leaves_nothing_in_force(show: Path, tmp_path:
         assert show_state(box) == ShowState()
         assert is_free(box.control)
         left = {"stage.lock", "place", "journal", "prepared", "admission"}  # for the next start
-        left |= {"keeper.lock", "keeper.health", "control.health", "sensors.memory", "said"}
+        left |= {
+            "keeper.lock",
+            "keeper.health",
+            "control.health",
+            "sensors.memory",
+            "gestures.memory",
+            "said",
+        }
         assert set(os.listdir(tmp_path / "runtime")) <= left  # noqa: PTH208
