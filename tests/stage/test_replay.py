@@ -39,7 +39,7 @@ STILL, TURNED, OTHER = (1.0, 0.0, 0.0, 0.0), (0.8, 0.6, 0.0, 0.0), (0.6, 0.0, 0.
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a show and the journal of an eventful night: for reading."""
     folder = tmp_path_factory.mktemp("night")
-    eventful(Night(write_eventful_show(folder / "show"), folder / "runtime")).kept(folder / "journal")
+    eventful(Night(write_eventful_show(folder / "show"), folder / "runtime")).saved(folder / "journal")
     return folder
 
 
