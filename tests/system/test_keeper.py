@@ -172,7 +172,7 @@ def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper
 
 def test_mirrors_end_with_a_keeper_that_is_killed(keeper: Keeper) -> None:
     keeper.follow_place()
-    wait_until(lambda: len(children(keeper.process.pid)) == 3, "not all have started")
+    wait_until(lambda: len(children(keeper.process.pid)) == 4, "not all have started")
     processes = children(keeper.process.pid)
     keeper.kill()
     wait_until(lambda: not any(map(is_alive, processes)), "they outlive their keeper")
