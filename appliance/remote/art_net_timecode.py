@@ -6,30 +6,26 @@ import errno
 import socket
 import struct
 
+from appliance.outputs.dmx.art_net import ID, PORT, PROTOCOL_VERSION
 from appliance.remote.timecode import RATES, Timecode
 from appliance.sensor.transports.udp import bind_early
 
-PORT = 6454
-_PACKET = struct.Struct("<8sH8s")  # identifier, operation code, the bytes below
-_ID, _OP_TIMECODE = b"Art-Net\0", 0x9700
-_VERSION = 14
-LENGTH = 19
+_OP_TIMECODE = 0x9700
+_HEAD = struct.pack("<8sH", ID, _OP_TIMECODE)
+_LENGTH = 19
 
 
 def packed(label: Timecode) -> bytes:
     """A packet with this label."""
-    return struct.pack(
-        "<8sHBB7B",
-        *(_ID, _OP_TIMECODE, 0, _VERSION, 0, 0),
-        *(label.frames, label.seconds, label.minutes, label.hours, RATES.index(label.rate)),
-    )
+    numbers = label.frames, label.seconds, label.minutes, label.hours, RATES.index(label.rate)
+    return _HEAD + bytes([0, PROTOCOL_VERSION, 0, 0, *numbers])
 
 
 def label_in(packet: bytes) -> Timecode | None:
     """The label of a packet; None: it is another one. Raises ValueError for a label that does not exist."""
-    if len(packet) < LENGTH or packet[:10] != _ID + struct.pack("<H", _OP_TIMECODE):
+    if len(packet) < _LENGTH or not packet.startswith(_HEAD):
         return None
-    frames, seconds, minutes, hours, kind = packet[14:LENGTH]
+    frames, seconds, minutes, hours, kind = packet[14:_LENGTH]
     if kind >= len(RATES):
         raise ValueError(f"Art-Net timecode has no type {kind}.")
     return Timecode(hours, minutes, seconds, frames, RATES[kind])

@@ -60,7 +60,6 @@ class DanceChase:
         self._looked_at = -math.inf
         self._drift, self._closes = 0.0, False
         self.error_s = 0.0
-        self.jumps = 0
 
     def follow(
         self, health: Mapping[str, Any], time_at: float | None, speed: float, stands: bool, now: float
@@ -85,7 +84,6 @@ class DanceChase:
         behind = (time_at - (float(led["position_s"]) - begin)) % length
         self.error_s = behind - length if behind > length / 2 else behind
         if abs(self.error_s) > self._tolerance_s:
-            self.jumps += 1
             self._left_alone_until = now + _FADE_IN_S
             ahead_s = 0.0 if stands else now - looked_at
             yield "/player/jump", begin + (time_at + ahead_s) % length

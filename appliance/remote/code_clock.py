@@ -7,10 +7,7 @@ from typing import Literal
 from appliance.remote.timecode import RATES, Rate, Timecode, at
 
 CodeState = Literal["absent", "locking", "running", "standing", "freewheeling"]
-_GAIN, _RATE_GAIN = (
-    0.05,
-    0.0013,
-)  # alpha-beta filter, critically damped: beta = alpha^2 / (2 - alpha)
+_GAIN, _RATE_GAIN = 0.05, 0.0013  # alpha-beta filter, critically damped: beta = alpha^2 / (2 - alpha)
 _SPEEDS = 0.5, 2.0
 _STANDS_AFTER = 3  # times the same label, over as many frames
 _GAP_FRAMES = 8  # without any label: MIDI timecode tells a whole one in every second frame

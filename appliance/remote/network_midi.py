@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ipaddress
 import secrets
 import socket
 import struct
@@ -12,6 +11,7 @@ from dataclasses import dataclass, field
 
 from appliance.remote.midi_messages import MidiParser
 from appliance.sensor.transports.udp import bind_early
+from appliance.show_control.port import Port
 
 _COMMAND = b"\xff\xff"
 _HEAD = struct.Struct(">2s2sIII")  # signature, command, version, initiator's token, sender
@@ -25,7 +25,6 @@ _SILENT_S = (
 )
 _FEEDBACK_S = 1.0
 _MOST_SESSIONS = 8
-_LARGEST = 2048
 _AT_ONCE = 64
 _BYTES = {0x8: 2, 0x9: 2, 0xA: 2, 0xB: 2, 0xC: 1, 0xD: 1, 0xE: 2}
 _SYSTEM_BYTES = {0xF1: 1, 0xF2: 2, 0xF3: 1}
@@ -39,7 +38,6 @@ class _Session:
     heard_at: float
     parser: MidiParser = field(default_factory=MidiParser)
     data: Address | None = None
-    sequence: int = 0
     feedback_at: float = 0.0
     sent: int = 0
 
@@ -53,16 +51,15 @@ class NetworkMidi:
     def __init__(self, host: str, port: int, name: str, senders: Sequence[str] = ()) -> None:
         self._name = name.encode()[:60] + b"\0"
         self._own = secrets.randbits(32)
-        self._networks = [ipaddress.IPv4Network(one, strict=False) for one in ("127.0.0.0/8", *senders)]
         self._sessions: dict[int, _Session] = {}
         self._sockets: list[socket.socket] = []
-        self.strangers = 0
+        self._ports: list[Port] = []
         try:
             for number in (port, port + 1):
                 one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
                 self._sockets.append(one)
-                one.setblocking(False)
                 bind_early(one, (host, number))
+                self._ports.append(Port(one, senders))
         except OSError:
             self.close()
             raise
@@ -71,6 +68,11 @@ class NetworkMidi:
     def names(self) -> tuple[str, ...]:
         """The names of the sessions."""
         return tuple(session.name for session in self._sessions.values() if session.data is not None)
+
+    @property
+    def strangers(self) -> int:
+        """How many datagrams came from others than the senders."""
+        return sum(one.strangers for one in self._ports)
 
     def descriptors(self) -> list[int]:
         """To poll."""
@@ -81,17 +83,12 @@ class NetworkMidi:
         for sender, session in list(self._sessions.items()):
             if now - session.heard_at > _SILENT_S:
                 del self._sessions[sender]
-        for one in self._sockets:
+        for one, port in zip(self._sockets, self._ports, strict=True):
             for _ in range(_AT_ONCE):
-                try:
-                    received, address = one.recvfrom(_LARGEST)
-                except BlockingIOError:
+                if (found := port.take()) is None:
                     break
-                except OSError:
-                    continue
-                if not any(ipaddress.IPv4Address(address[0]) in network for network in self._networks):
-                    self.strangers += 1
-                elif received.startswith(_COMMAND):
+                received, address = found
+                if received.startswith(_COMMAND):
                     with contextlib.suppress(struct.error):
                         self._answer(received, address, one, now)
                 elif one is self._sockets[1]:
@@ -153,7 +150,6 @@ class NetworkMidi:
         session = self._sessions.get(sender)
         if first >> 6 != 2 or kind & 0x7F != _PAYLOAD_TYPE or session is None:
             return
-        session.sequence = sequence
         if now >= session.feedback_at and session.data is not None:  # lets the sender shorten its journal
             session.feedback_at = now + _FEEDBACK_S
             feedback = _FEEDBACK.pack(_COMMAND, b"RS", self._own, sequence, 0)

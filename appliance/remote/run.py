@@ -39,7 +39,7 @@ from appliance.remote.midi_timecode import MidiTimecode
 from appliance.remote.network_midi import NetworkMidi
 from appliance.remote.raw_midi import RawMidi
 from appliance.remote.show_control_messages import command_of
-from appliance.remote.timecode import BY_NAME, at
+from appliance.remote.timecode import BY_NAME, Rate, at
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.remote import MidiConfig, TimecodeConfig
 from appliance.show_control.midi_bindings import MidiBindings, Moved, moved
@@ -61,7 +61,8 @@ class Follower:
         self._config, self._give = config, give
         self.clock = CodeClock(config.freewheel_s)
         self._cues, self._dance = CueChase(), DanceChase(config.tolerance_s)
-        self._was_running = False
+        self._timed_of: tuple[tuple[Mapping[str, Any], ...], Rate] = (), self.clock.rate
+        self._timed: list[tuple[float, str]] = []
 
     @property
     def error_s(self) -> float:
@@ -80,7 +81,10 @@ class Follower:
         time_s = self.time_s(now)
         if is_asleep:
             return
-        if (due := self._cues.due(time_s, timed_cues(cues, self.clock.rate))) is not None:
+        if (cues, self.clock.rate) != self._timed_of:  # the same objects, as long as it is one show
+            self._timed_of = cues, self.clock.rate
+            self._timed = timed_cues(*self._timed_of)
+        if (due := self._cues.due(time_s, self._timed)) is not None:
             self._give(("/cue", due))
         if self._config.chase != "dance":
             return
@@ -92,10 +96,6 @@ class Follower:
             time_at = time_s - self._cues.start(time_s) - speed * (now - looked_at)
         for message in self._dance.follow(health, time_at, self.clock.speed, stands, now):
             self._give(message)
-
-    def begun(self, time_s: float) -> float:
-        """Where in the code the cue in force began."""
-        return self._cues.start(time_s)
 
 
 class Senders:

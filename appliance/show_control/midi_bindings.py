@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from appliance.box.record import WholeFile
 from appliance.levers.addresses import ADDRESSES
@@ -19,7 +19,6 @@ MOST_BINDINGS = 256
 _LARGEST = 1 << 17
 _LONGEST_DEVICE = 64
 
-ControlKind = Literal["note", "controller", "pitch", "program"]
 _KINDS = {0x8: "note", 0x9: "note", 0xB: "controller", 0xC: "program", 0xE: "pitch"}
 _HALF = 0.5
 

@@ -9,10 +9,10 @@ from appliance.outputs.dmx.network_wire import NetworkWire
 from appliance.show.dmx import DmxConfig
 
 PORT = 6454  # at both ends: some nodes take nothing from another one
-_ID = b"Art-Net\0"
+ID = b"Art-Net\0"
 _OP_DMX, _OP_ADDRESS = 0x5000, 0x6000
 _KEEP, _CANCEL_MERGE = 0x7F, 0x01  # ArtAddress: leave as it is; AcCancelMerge
-_PROTOCOL_VERSION = 14
+PROTOCOL_VERSION = 14
 _SEQUENCE = 12  # offsets in the packet
 _DATA = 18
 
@@ -25,8 +25,8 @@ class ArtDmx:
         length = channels + channels % 2  # even
         self._packet = bytearray(_DATA + length)
         # Low byte of the port address first (subnet and universe), then net: little-endian in 15 bits.
-        struct.pack_into("<8sH", self._packet, 0, _ID, _OP_DMX)
-        struct.pack_into(">H", self._packet, 10, _PROTOCOL_VERSION)
+        struct.pack_into("<8sH", self._packet, 0, ID, _OP_DMX)
+        struct.pack_into(">H", self._packet, 10, PROTOCOL_VERSION)
         struct.pack_into("<H", self._packet, 14, port_address)
         struct.pack_into(">H", self._packet, 16, length)
         self._sequence = 0
@@ -42,7 +42,7 @@ class ArtDmx:
 def cancel_merge() -> bytes:
     """ArtAddress that changes nothing of a node, and ends its merge: it takes the next ArtDmx only."""
     switches = bytes([_KEEP] * 9 + [255, _CANCEL_MERGE])  # input, output, sub-net; sACN priority; command
-    head = struct.pack("<8sH", _ID, _OP_ADDRESS) + struct.pack(">HBB", _PROTOCOL_VERSION, _KEEP, 1)
+    head = struct.pack("<8sH", ID, _OP_ADDRESS) + struct.pack(">HBB", PROTOCOL_VERSION, _KEEP, 1)
     return head + bytes(18 + 64) + switches
 
 
