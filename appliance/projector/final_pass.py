@@ -67,7 +67,8 @@ class FinalPass:
             Drawing(gl, "final", "final", parts=parts)
             for parts in ([], [*fixed, "DIM"], [*fixed, "DIM", "MARKS"])
         )
-        self._warped = Drawing(gl, "final", "final", parts=[*fixed, "DIM", "MARKS", "WARP"])
+        self._warped_parts = [*fixed, "DIM", "MARKS", "WARP"]
+        self._warped: Drawing | None = None  # few walls need it
         self._offsets = gl.texture((FINE, FINE), 4, dtype="f2")
         self._offsets.repeat_x = self._offsets.repeat_y = False
         self._offset_by: Warp | None = None
@@ -143,6 +144,7 @@ class FinalPass:
         if has_marks:
             inputs |= self._place(display, controls) | self._mark(lines, display, controls)
             if warp:
+                self._warped = self._warped or Drawing(self._gl, "final", "final", parts=self._warped_parts)
                 self._warped.draw(inputs | {"offsets": self._fine_offsets(warp)})
             else:
                 self._marked.draw(inputs)
@@ -164,16 +166,10 @@ class FinalPass:
     def release(self) -> None:
         """Give the GPU's memory back."""
         self._release_picture()
-        for owned in (
-            self._masks,
-            self._text,
-            self._offsets,
-            self._unchanged,
-            self._dimmed,
-            self._marked,
-            self._warped,
-        ):
+        for owned in (self._masks, self._text, self._offsets, self._unchanged, self._dimmed, self._marked):
             owned.release()
+        if self._warped is not None:
+            self._warped.release()
 
     def _fine_offsets(self, warp: Warp) -> moderngl.Texture:
         """The warp between its points too, as a texture of shares of the display."""

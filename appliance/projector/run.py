@@ -279,10 +279,12 @@ class Run:
             self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self.context.renderer))
 
     def _end_first_start(self, now: float) -> None:
+        if self._first is None or not self._first.is_on:
+            return
         newest = self.reader.newest(now)
         sequence = -1 if newest is None else newest.sensor_sequence
         shown = self._show_state.read(), self._controls.shows_test_card
-        if self._first is not None and self._first.is_over(now, sequence, *shown):
+        if self._first.is_over(now, sequence, *shown):
             self._say(self._controls.set_test_card(False))
 
     def _publish_health(self, now: float, stage: str, share: float) -> None:

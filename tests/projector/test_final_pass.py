@@ -240,8 +240,8 @@ def test_a_mesh_pulls_the_picture(show: Show, corners: Any) -> None:
     places = np.dstack([across, down, np.zeros_like(down)]).round().astype(np.uint8)
     pinned = Alignment(warp=WARP)
     if corners is not None:
-        shares = tuple((x / SIZE[0], y / SIZE[1]) for x, y in corners)
-        pinned = Alignment(shares, warp=WARP)  # type: ignore[arg-type]
+        a, b, c, d = ((x / SIZE[0], y / SIZE[1]) for x, y in corners)
+        pinned = Alignment((a, b, c, d), warp=WARP)
     wanted = on_display(WARP, pinned.corners)
     share = np.linspace(0, 1, FINE)
 

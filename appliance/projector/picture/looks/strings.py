@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 
 from appliance.pose.anatomy import Anatomy
+from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import palette, stored
 from appliance.projector.picture.scene import Easel, Scene, direction
@@ -40,9 +41,9 @@ class Strings:
             "chance": random.random_sample((len(many), 4)).astype(np.float32),
             "joints": np.repeat(many[:, None], 4, axis=1).astype(np.uint8),
         }
-        tied_to = easel.vertices(parts, instanced=True)
-        self._strings = easel.drawing("string", "string", tied_to)
-        self._between = easel.drawing("string", "string", tied_to, parts=("BETWEEN",))
+        self._tied_to = easel.vertices(parts, instanced=True)
+        self._strings = easel.drawing("string", "string", self._tied_to)
+        self._between: Drawing | None = None  # most shows have one figure
         self._glow = Glow(easel)
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
@@ -86,6 +87,8 @@ class Strings:
                 figure, self._strings, inputs, moderngl.TRIANGLE_STRIP, 2 * (STEPS + 1), strands
             )
         for first, pair in easel.couplings():
+            if self._between is None:
+                self._between = easel.drawing("string", "string", self._tied_to, parts=("BETWEEN",))
             easel.draw_figure(
                 *(first, self._between, inputs | pair | {"leader": -1}),
                 *(moderngl.TRIANGLE_STRIP, 2 * (STEPS + 1), strands),
