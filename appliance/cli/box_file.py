@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from appliance.box.durable import alone_in, write_beside, write_whole
+from appliance.box.served import is_loopback
 from appliance.cli.preflight import LATE_TURN_S, candidate_problems, publish
 from appliance.release.adoption import Outcome, Places, adopt, read_choice
 from appliance.release.arrivals import BOX, Arrival, look
@@ -177,7 +178,7 @@ def _questions(before: BoxConfig, after: BoxConfig) -> Iterator[str]:
         yield "console: null takes this page away: only a person at the box brings it back."
     if before.console is not None and after.console is not None:
         was, host = before.console.host, after.console.host
-        if _is_loopback(host) and not _is_loopback(was):
+        if is_loopback(host) and not is_loopback(was):
             yield f"console: host: {host} leaves this page to the box's own screen."
     for name, new, old in (
         ("console", after.console, before.console),
@@ -187,10 +188,6 @@ def _questions(before: BoxConfig, after: BoxConfig) -> Iterator[str]:
         for network in () if new is None else new.viewers:
             if network not in known and ipaddress.ip_network(network).prefixlen == 0:
                 yield f"{name}: viewers: {network} lets every device in that reaches the box."
-
-
-def _is_loopback(host: str) -> bool:
-    return ipaddress.ip_address(host).is_loopback
 
 
 def _places(chosen: Path) -> Places:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from appliance.box.served import is_loopback
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
 from appliance.show.box import BoxConfig, load_box
@@ -62,10 +63,10 @@ def rules(box: BoxConfig, access_points: Sequence[str] = ()) -> str:
 
 def _sensors(box: BoxConfig) -> Iterator[str]:
     udp = box.sensors.udp
-    if udp is not None and udp.port and not _is_loopback(udp.host):
+    if udp is not None and udp.port and not is_loopback(udp.host):
         yield f'{_to(udp.host)}udp dport {udp.port} accept comment "sensors"'
     for one in box.sensors.foreign:
-        if one.program is not None and not _is_loopback(one.host):
+        if one.program is not None and not is_loopback(one.host):
             where = f"{_to(one.host)}ip saddr {{ {', '.join(one.senders)} }}"
             yield f'{where} udp dport {one.usual_port} accept comment "{one.name}"'
 
@@ -73,7 +74,7 @@ def _sensors(box: BoxConfig) -> Iterator[str]:
 def _commands(box: BoxConfig) -> Iterator[str]:
     """From the listed senders; with none listed, only from this machine, which needs no rule."""
     control = box.control
-    if control is None or _is_loopback(control.host):
+    if control is None or is_loopback(control.host):
         return
     if senders := ", ".join(control.senders):
         yield (
@@ -84,10 +85,10 @@ def _commands(box: BoxConfig) -> Iterator[str]:
 def _remote(box: BoxConfig) -> Iterator[str]:
     """Timecode and MIDI, from the listed senders."""
     timecode, network = box.timecode, box.midi and box.midi.network
-    if timecode is not None and timecode.source == "art-net" and not _is_loopback(timecode.host):
+    if timecode is not None and timecode.source == "art-net" and not is_loopback(timecode.host):
         where = f"{_to(timecode.host)}ip saddr {{ {', '.join(timecode.senders)} }}"
         yield f'{where} udp dport {timecode.port} accept comment "timecode"'
-    if network and not _is_loopback(network.host):
+    if network and not is_loopback(network.host):
         where = f"{_to(network.host)}ip saddr {{ {', '.join(network.senders)} }}"
         yield f'{where} udp dport {network.port}-{network.port + 1} accept comment "MIDI"'
 
@@ -95,7 +96,7 @@ def _remote(box: BoxConfig) -> Iterator[str]:
 def _pair(box: BoxConfig) -> Iterator[str]:
     """The other box of a pair."""
     pair = box.pair
-    if pair is not None and not _is_loopback(pair.host):
+    if pair is not None and not is_loopback(pair.host):
         where = f"{_to(pair.host)}ip saddr {{ {', '.join(pair.peer)} }}"
         yield f'{where} udp dport {pair.port} accept comment "the other box"'
 
@@ -103,7 +104,7 @@ def _pair(box: BoxConfig) -> Iterator[str]:
 def _page(box: BoxConfig) -> Iterator[str]:
     """The page, its name by mDNS, and the stream, from the listed viewers, IPv4 and IPv6 apart."""
     for served, name in ((box.console, "the page"), (box.projector.stream, "the stream")):
-        if served is None or _is_loopback(served.host) or not served.port:
+        if served is None or is_loopback(served.host) or not served.port:
             continue
         for family, version in (("ip", 4), ("ip6", 6)):
             networks = [one for one in served.viewers if ipaddress.ip_network(one).version == version]
@@ -123,7 +124,3 @@ def _own_network(access_points: Sequence[str]) -> Iterator[str]:
 
 def _to(host: str) -> str:
     return "" if host == "0.0.0.0" else f"ip daddr {host} "
-
-
-def _is_loopback(host: str) -> bool:
-    return ipaddress.ip_address(host).is_loopback

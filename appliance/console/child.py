@@ -13,6 +13,7 @@ from typing import Any
 from aiohttp import web
 
 LARGEST = 8 << 20  # bytes of an answer
+_awaited: set[asyncio.Task[int]] = set()  # the ends of children; a task that nothing refers to may vanish
 
 
 async def answer_of(function: str, patience_s: float, **keywords: Any) -> bytes:
@@ -56,3 +57,23 @@ async def output_of(
     finally:
         with contextlib.suppress(ProcessLookupError):
             child.kill()
+
+
+async def own_child(
+    module: str, box: Mapping[str, str], env: Mapping[str, str], stdout: int | None = None
+) -> asyncio.subprocess.Process:
+    """Start one of the box's own modules beside the page, and await its end. box: as in Settings.
+
+    Raises OSError.
+    """
+    child = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", module),
+        *(word for name, path in box.items() for word in (f"--{name}", path)),
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=stdout,
+        env=env,
+    )
+    task = asyncio.create_task(child.wait())
+    _awaited.add(task)
+    task.add_done_callback(_awaited.discard)
+    return child

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import shutil
-import sys
 import time
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,7 +14,7 @@ from aiohttp import web
 
 from appliance.box.child import environment
 from appliance.console.body import said
-from appliance.console.child import answer_of
+from appliance.console.child import answer_of, own_child
 from appliance.console.guard import Guard
 from appliance.console.learning import FOLDER, RECORDINGS, STUDIO_MISSING, USUAL_MIN, Learning, Wanted
 from appliance.pose.recorded_minutes import recorded_minutes
@@ -38,7 +37,6 @@ class Learn:
         self._guard, self._journal, self._box, self._is_installed = guard, journal, box, is_installed
         self._recordings, self._learning = state / RECORDINGS, Learning(state / FOLDER)
         self._child: asyncio.subprocess.Process | None = None
-        self._waiting: set[asyncio.Task[int]] = set()
 
     def routes(self) -> list[web.RouteDef]:
         """For the server."""
@@ -142,16 +140,8 @@ class Learn:
         return folder if folder.is_dir() else None
 
     async def _start(self) -> None:
-        self._child = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "appliance.cli.learn"),
-            *(word for name, path in self._box.items() for word in (f"--{name}", path)),
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.DEVNULL,
-            env=environment(),
-        )
-        task = asyncio.create_task(self._child.wait())
-        self._waiting.add(task)
-        task.add_done_callback(self._waiting.discard)
+        quiet = asyncio.subprocess.DEVNULL
+        self._child = await own_child("appliance.cli.learn", self._box, environment(), quiet)
 
 
 def has_studio() -> bool:

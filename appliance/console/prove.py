@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import sys
 from pathlib import Path
 
 from aiohttp import web
 
 from appliance.box.child import environment
 from appliance.console.body import said
+from appliance.console.child import own_child
 from appliance.console.guard import Guard
 from appliance.console.proofs import FOLDER, Proofs
 from appliance.console.proving import KINDS, LONGEST_S, SHORTEST_S, SHOW_GOES, Proving, Wanted
@@ -33,7 +33,6 @@ class Prove:
         self._guard, self._box, self._is_installed = guard, box, is_installed
         self._proving, self._proofs = Proving(runtime), Proofs(state / FOLDER)
         self._child: asyncio.subprocess.Process | None = None
-        self._waiting: set[asyncio.Task[int]] = set()
         self._proving.end()  # what a page before this one began ended with it, or ends now
 
     def routes(self) -> list[web.RouteDef]:
@@ -123,12 +122,5 @@ class Prove:
         return wanted
 
     async def _start(self) -> None:
-        self._child = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "appliance.cli.proof"),
-            *(word for name, path in self._box.items() for word in (f"--{name}", path)),
-            stdin=asyncio.subprocess.DEVNULL,
-            env=environment(OPENBLAS_NUM_THREADS="1"),
-        )
-        task = asyncio.create_task(self._child.wait())
-        self._waiting.add(task)
-        task.add_done_callback(self._waiting.discard)
+        env = environment(OPENBLAS_NUM_THREADS="1")
+        self._child = await own_child("appliance.cli.proof", self._box, env)
