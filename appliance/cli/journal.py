@@ -105,7 +105,7 @@ def export_journal(
 ) -> None:
     """Write the journal into one file that replay, filmstrip and list read, on a stick for example.
 
-    With --bvh or --glb it writes the dance alone, as a recording; with --training a folder that bunraku train
+    With --bvh or --glb it writes only the dance, as a recording; with --training, a folder that bunraku train
     takes.
     """
     from appliance.recorder.export import export

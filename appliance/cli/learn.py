@@ -130,7 +130,7 @@ class Learner:
         self._state: dict[str, Any] = {}
 
     def run(self) -> int:
-        """0: a show is offered; 1: there is none, and why is told; 2: stopped, and the same goes on later."""
+        """Exit status 0: a show is offered; 1: none is, with the reason printed; 2: stopped, may continue."""
         with stop_signals() as self._is_stopped:
             try:
                 require_studio()

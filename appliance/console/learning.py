@@ -68,7 +68,7 @@ class Learning:
             os.utime(self._progress)
 
     def told(self) -> dict[str, Any]:
-        """The progress; {}: there is none."""
+        """The progress; {} before the first."""
         try:
             return dict(stored_json(self._progress))
         except (OSError, ValueError, TypeError):

@@ -29,7 +29,7 @@ _KEYFRAME = 0  # first number of a question for a keyframe; messages are numbere
 @dataclass(frozen=True)
 class PairSettings:
     """name: what the other box is called in words. host, port: where this one listens; peers: the other's
-    addresses. silent_s: after so long without the leader the follower takes over.
+    addresses. silent_s: the follower takes over once the leader is silent for this long.
     """
 
     name: str

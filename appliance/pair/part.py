@@ -16,7 +16,7 @@ FILE, KIND = "pair", "pair"
 STATE_FILE = "pair_state"
 _PART = struct.Struct("<BBBId")  # leads, is ready, peer lives; epoch; when it was written
 _LARGEST_STATE = 16384
-STALE_S = 0.07  # a stage that wrote nothing for so long does not speak
+STALE_S = 0.07  # a stage whose last entry is older sends nothing
 
 
 class BoxPart(NamedTuple):

@@ -14,7 +14,7 @@ MARK = "used"  # in the box's state folder: this box has been used
 
 
 class FirstStart:
-    """Whether the test card is on the wall by itself: until a sensor is heard or somebody commands, and once.
+    """Shows the test card by itself, once, until a sensor is heard or a command comes.
 
     folder: the state folder. Where nothing can be kept the card would come back at each power-on, even in the
     middle of an evening: there it does not come at all, nor where a picture was aligned or a sensor paired.
@@ -28,7 +28,7 @@ class FirstStart:
 
     def is_over(self, now: float, sensor_sequence: int, show_state: ShowState, is_shown: bool = True) -> bool:
         """Once: when the card goes. now: seconds on the monotonic clock; sensor_sequence: -1 without one;
-        is_shown: False when somebody took the card off."""
+        is_shown: False after a person switched the card off."""
         if not self.is_on:
             return False
         self._since = now if self._since is None else self._since

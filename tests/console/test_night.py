@@ -74,7 +74,8 @@ def test_a_picture_is_of_the_wall_while_a_projector_shows_it(tmp_path: Path) -> 
     pictures = night(tmp_path, frame())
     wall = SeenWall(tmp_path)
     wall.offer(0.0, (960, 540), lambda: bytes([200, 40, 10, 255]) * (960 * 540 // 2) + bytes(960 * 540 * 2))
-    wall._writing.join()  # type: ignore[union-attr]
+    assert wall._writing is not None
+    wall._writing.join()
     drawn = ElementTree.fromstring(pictures.picture(time.time()))
     (image,) = drawn.iter("{http://www.w3.org/2000/svg}image")
     jpeg = base64.b64decode(image.attrib["href"].partition("base64,")[2])

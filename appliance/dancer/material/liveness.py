@@ -93,7 +93,7 @@ def network_liveness(network: MotionNetwork, poses: Array) -> Liveness:
 
 
 def what_is_dead(network: MotionNetwork, poses: Array) -> str:
-    """A warning for people, '' where there is none: the network as a whole, else its map.
+    """A warning about the network as a whole, else about its map; '' for a live one.
 
     poses (T, M, 4): a dance of its joints.
     """
