@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.projector.stream.feed import Feed
+from appliance.projector.stream.feed import AGAIN_S, Feed
 from appliance.show.stream import StreamConfig
 from hw_sim.peers import free_ports
 from tests.projector.test_stream import connected
@@ -23,6 +23,7 @@ LIBRARY = r"""
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 typedef struct { const char *name, *groups; bool clock_video, clock_audio; } create_t;
 typedef struct {
     int xres, yres, four_cc, rate_n, rate_d; float aspect; int format; int64_t timecode;
@@ -41,6 +42,7 @@ void NDIlib_send_send_video_v2(void *told, const frame_t *f) {
     for (int at = 0; at < f->yres * f->stride; at++) fprintf(told, "%02x", f->data[at]);
     fprintf(told, "\n");
     fflush(told);
+    while (getenv("NDI_HANGS")) sleep(1);
 }
 """
 
@@ -75,6 +77,27 @@ def test_receivers_get_the_upright_picture(told: Path, has_alpha: bool, pixels: 
     feed.close()
     assert lines[0] == "Bunraku 00"
     assert lines[1].startswith(f"1x2 {pixels}")
+
+
+def test_a_library_that_never_returns_is_started_again_and_no_picture_waits(
+    told: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The receiver's network is gone in the middle of a picture; later it is back."""
+    monkeypatch.setenv("NDI_HANGS", "1")
+    said: list[str] = []
+    feed = Feed(StreamConfig(port=free_ports(1, socket.SOCK_STREAM)[0], ndi="Bunraku"), said.append)
+    until, longest_s = time.monotonic() + WITHIN_S, 0.0
+    while not told.exists() or told.read_text().count("\n") < 3:
+        began = time.monotonic()
+        assert began < until
+        feed.offer(began, (1, 2), lambda: RED_OVER_DARK_BLUE)
+        if told.exists() and told.read_text().count("\n") == 2:  # it hangs with its first picture
+            monkeypatch.delenv("NDI_HANGS", raising=False)
+            longest_s = max(longest_s, time.monotonic() - began)
+        time.sleep(0.01)
+    feed.close()
+    assert len(said) == 1 and "has ended, or hung" in said[0]
+    assert longest_s < AGAIN_S, "no picture waits for the library"
 
 
 @pytest.mark.skipif(find_library("ndi") is not None, reason="NDI's library is installed here")

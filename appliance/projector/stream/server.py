@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Awaitable, Callable
 from io import BytesIO
+from math import inf
 from typing import BinaryIO
 
 from aiohttp import web
@@ -29,6 +30,7 @@ MOST_CLIENTS = 8
 _BUFFER = 1 << 18  # bytes that the system keeps for a slow client: more would be old pictures
 _UNANSWERED_S = 1.0  # before a picture that did not come is asked for again
 _SIGN_S = 1.0
+_HANGS_S = 4.0  # with one picture: NDI's library does not return
 _STUCK_S = 10.0  # before a client that takes nothing makes room for another: its machine may be gone
 _HEAD = "--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n"
 
@@ -46,6 +48,7 @@ class Newest:
         self.jpeg = b""
         self.number = 0
         self.watching = self.clients = 0
+        self.began_at = inf  # monotonic seconds; inf between pictures
 
     async def put(self, picture: Picture, jpeg: bytes | None) -> None:
         """A picture has come; jpeg None: nobody waits for it here."""
@@ -68,11 +71,14 @@ class Newest:
     async def ask(self) -> None:
         """Ask the projector for pictures, as often as the box file says, while a client waits.
 
-        Once a second it hears that this process lives: one that hangs is started again.
+        Once a second it hears that this process lives, unless a picture takes too long: one that hangs is
+        started again.
         """
         loop, sign_at = asyncio.get_running_loop(), 0.0
         while True:
             await asyncio.sleep(1.0 / self._config.rate)
+            if loop.time() - self.began_at > _HANGS_S:
+                continue
             if loop.time() >= sign_at:
                 sign_at = loop.time() + _SIGN_S
                 self._asks.write(ALIVE)
@@ -105,10 +111,12 @@ async def serve(config: StreamConfig, pictures: BinaryIO, asks: BinaryIO) -> Non
         """In a separate thread: clients are served while a picture is encoded."""
         try:
             while (picture := read_picture(pictures)) is not None:
+                newest.began_at = loop.time()
                 if ndi is not None and ndi.receivers:
                     ndi.send(picture)
                 jpeg = jpeg_of(picture, config.quality) if newest.watching else None
                 asyncio.run_coroutine_threadsafe(newest.put(picture, jpeg), loop).result()
+                newest.began_at = inf
         finally:
             loop.call_soon_threadsafe(over.set)
 
