@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import http.client
+import itertools
 import json
 import logging
 import resource
 import socket
+import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -91,6 +93,43 @@ def test_a_thousand_strangers_take_nothing_from_a_technician(venue: tuple[Box, P
     assert page.command("/go").value["done"]
     assert len(box.output.splitlines()) - said < 20, "the log does not grow with the crowd"
     page.cookie = ""
+
+
+def test_a_flood_without_an_end_takes_no_memory(tmp_path: Path) -> None:
+    """Ten strangers send as fast as the page takes it: each kind of request, for a second."""
+    with page_alone(tmp_path) as (page, process):
+        page.unlock()
+        named = f"Host: {HOST}:{page.port}\r\nOrigin: {page.origin}\r\n"
+        pin = f"POST /api/pin HTTP/1.1\r\n{named}Transfer-Encoding: chunked\r\n\r\n"
+        for head, rest in (
+            ("GET / HTTP/1.1\r\n", "X-Y: y\r\n" * 4000),
+            ("GET / HTTP/1.1\r\nX-Y: ", "y" * 65536),
+            ("GET /", "y" * 65536),
+            (pin, f"10000\r\n{'y' * 65536}\r\n"),
+            (f"{pin}1;", "y" * 65536),
+            (f"{pin}0\r\n", "X-Y: y\r\n" * 4000),
+            ("", f"GET /status HTTP/1.1\r\n{named}\r\n" * 1000),
+        ):
+            with strangers(page, 10) as crowd:
+                sent = _flood(crowd, head.encode(), rest.encode())
+                assert page.command("/panic").status == 503, "answered: there is no show control here"
+            assert sent > 1 << 18, head
+        status = Path(f"/proc/{process.process.pid}/status").read_text()
+        assert int(status.split("VmHWM:")[1].split()[0]) < 64 << 10, "the page's most memory in KiB"
+
+
+def _flood(crowd: list[socket.socket], head: bytes, rest: bytes) -> int:
+    """For a second; the bytes that were taken."""
+    for one in crowd:
+        one.settimeout(0.1)
+        one.sendall(head)
+    until, sent = time.monotonic() + 1.0, 0
+    for one in itertools.cycle(crowd):
+        with contextlib.suppress(OSError):
+            sent += one.send(rest)
+        if time.monotonic() > until:
+            return sent
+    return sent
 
 
 def test_a_crowd_where_the_system_gives_few_descriptors(tmp_path: Path) -> None:
