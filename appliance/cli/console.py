@@ -158,8 +158,8 @@ def phone(
 
 
 def card_lines(box: BoxConfig) -> tuple[str, ...]:
-    """For the projector's test card: address and PIN of the page that runs here, and a fault of the Wi-Fi."""
-    wifi = wifi_lines(box)
+    """For the projector's test card: the page's address and PIN, the box's own Wi-Fi, a fault of it."""
+    wifi = _network_lines(box) + wifi_lines(box)
     try:
         devices, host, port, https = (runtime_of(box) / WHERE).read_text().splitlines()
         code = pending_code(runtime_of(box))
@@ -176,11 +176,22 @@ def wifi_lines(box: BoxConfig) -> tuple[str, ...]:
     """Short lines about the Wi-Fi that bunraku-wifi.yaml names; nothing where all is well."""
     from appliance.cli.join_wifi import MESSAGE_FILE
 
-    try:
-        message = (runtime_of(box) / MESSAGE_FILE).read_text("utf-8", "replace")
-    except (OSError, StageError):
-        return ()
+    message = _left(box, MESSAGE_FILE)
     return tuple(textwrap.wrap(message, _CARD_LETTERS, max_lines=_CARD_LINES, placeholder=" ..."))
+
+
+def _network_lines(box: BoxConfig) -> tuple[str, ...]:
+    """Name and password of the network that this box makes itself."""
+    from appliance.cli.join_wifi import NETWORK_FILE
+
+    return tuple(_left(box, NETWORK_FILE).splitlines())
+
+
+def _left(box: BoxConfig, name: str) -> str:
+    try:
+        return (runtime_of(box) / name).read_text("utf-8", "replace")
+    except (OSError, StageError):
+        return ""
 
 
 def console_command(

@@ -19,12 +19,14 @@ from typing import NamedTuple
 
 from appliance.box.durable import write_whole
 from appliance.release.choice import RUN
-from appliance.release.wifi import NAME, PROFILE, WifiFile, is_filled_in, profile, read_wifi
+from appliance.release.wifi import NAME, PROFILE, WifiFile, is_filled_in, profile, read_wifi, unescaped
 from appliance.show.config_error import ConfigError
 
 MESSAGE_FILE = "wifi.txt"  # in the run folder: what went wrong, for the test card and the doctor
+NETWORK_FILE = "access-point.txt"  # there too: the box's own network and its password, for the test card
 _ACCESS_POINT_PROFILE = "sensors.nmconnection"  # by bunraku-access-point
 _AVAHI = ("org.freedesktop.Avahi", "/", "org.freedesktop.Avahi.Server")  # took the name at its own start
+_SAID = ("wi-fi", "ssid"), ("password", "psk")
 _CARD_S, _JOINED_S = 20.0, 40.0
 _RETRY_S = 0.5
 
@@ -48,15 +50,29 @@ NameBox = Callable[[str], None]
 def join_wifi(places: Places, run: Run, wait: Wait, name_box: NameBox) -> int:
     """Apply the newest file; 0, or 1 with a message in the run folder."""
     message = _applied(places, run, wait, name_box)
-    left = places.run / MESSAGE_FILE
-    with contextlib.suppress(OSError):
-        if message:
-            write_whole(left, f"{message}\n".encode())
-        else:
-            left.unlink(missing_ok=True)
+    _leave(places.run / MESSAGE_FILE, message)
+    _leave(places.run / NETWORK_FILE, _own_network(places.saved / _ACCESS_POINT_PROFILE))
     if message:
         print(message, flush=True)
     return 1 if message else 0
+
+
+def _leave(path: Path, text: str) -> None:
+    """For the services, which are not root; no file where there is nothing to say."""
+    with contextlib.suppress(OSError):
+        if text:
+            write_whole(path, f"{text}\n".encode(), private=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _own_network(path: Path) -> str:
+    """Name and password, one a line, of the network that the box makes; empty where it makes none."""
+    try:
+        values = dict(line.split("=", 1) for line in path.read_text().splitlines() if "=" in line)
+    except OSError:
+        return ""
+    return "\n".join(f"{word} {unescaped(values.get(key, ''))}" for word, key in _SAID)
 
 
 def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:

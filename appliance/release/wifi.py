@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import uuid
 from pathlib import Path
 from typing import Annotated, Any
@@ -122,3 +123,8 @@ def _escaped(text: str) -> str:
     ended = text.rstrip(" ")
     begun = ended.lstrip(" ")
     return "\\s" * (len(ended) - len(begun)) + begun + "\\s" * (len(text) - len(ended))
+
+
+def unescaped(text: str) -> str:
+    """A value of a keyfile as it was meant."""
+    return re.sub(r"\\(.)", lambda found: " " if found[1] == "s" else found[1], text)

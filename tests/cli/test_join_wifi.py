@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from appliance.cli.console import card_lines
-from appliance.cli.join_wifi import MESSAGE_FILE, Places, join_wifi
+from appliance.cli.join_wifi import MESSAGE_FILE, NETWORK_FILE, Places, join_wifi
 from appliance.release.wifi import NAME, PROFILE
 from appliance.show.box import BoxConfig
 
@@ -144,6 +144,18 @@ def test_the_box_makes_the_network_itself(box: Box) -> None:
     assert not (box.folder / "kept" / PROFILE).exists(), "it does not look for it as well"
     box.power_on()
     assert "bunraku-access-point" not in [command[0] for command in box.ran], "it is kept over power-off"
+
+
+def test_its_own_network_is_on_the_test_card_until_there_is_none(box: Box) -> None:
+    (box.folder / "run").chmod(0o700)
+    config, made = BoxConfig(runtime=box.folder / "run"), box.folder / "kept" / "sensors.nmconnection"
+    made.write_text("[wifi]\nssid=hall\n\n[wifi-security]\npsk=two\\\\slashes\\s\n")
+    box.power_on()
+    assert card_lines(config) == ("wi-fi hall", "password two\\slashes ")
+    assert (box.folder / "run" / NETWORK_FILE).stat().st_mode & 0o077 == 0
+    made.unlink()
+    box.power_on()
+    assert card_lines(config) == ()
 
 
 def test_an_access_point_that_fails_is_said_and_tried_at_the_next_power_on(box: Box) -> None:
