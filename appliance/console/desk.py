@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any
 
-from appliance.show_control.command import REPLY, SENSORS_REPLY, STREAMS
+from appliance.show_control.command import REPLY, STREAMS, reply_to
 from appliance.show_control.packet import datagram, messages_in, readable
 
 PATIENCE_S = 2.0  # show control answers within 0.6 s, and later while it starts
@@ -38,7 +38,7 @@ class Desk:
 
     async def send_command(self, address: str, arguments: Sequence[str | int | float]) -> tuple[bool, str]:
         """Whether show control carried it out, and its sentence. Raises NoAnswerError, ValueError."""
-        reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY
+        reply = reply_to(address)
         is_stream = address.startswith(STREAMS)
         patience_s = _STREAM_S if is_stream else PATIENCE_S
         try:

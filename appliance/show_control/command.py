@@ -30,6 +30,11 @@ class Command:
     also: str = ""
 
 
+def reply_to(address: str) -> str:
+    """Address of the reply to a command."""
+    return SENSORS_REPLY if address.startswith("/sensors/") else REPLY
+
+
 def command(address: str, arguments: Sequence[object]) -> Command:
     """The command in one message. Raises ValueError with one clear sentence."""
     if address == "/panic":  # with any arguments; a single 0 is a button that is let go

@@ -23,6 +23,7 @@ from appliance.show_control.command import (
     STREAMS,
     Command,
     command,
+    reply_to,
 )
 from appliance.show_control.fallback import COMMAND_FAILED, LIVE_PARTIAL, LIVE_REFUSED
 from appliance.show_control.figure_datagram import DATAGRAM, is_figure
@@ -277,8 +278,7 @@ class CommandHandler:
             return
         if not done:
             self._refuse(message)
-        reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY
-        self._send(asker, (reply, address[:LONGEST_NAME], int(done), message or "Done."))
+        self._send(asker, (reply_to(address), address[:LONGEST_NAME], int(done), message or "Done."))
 
     @property
     def _takes_live(self) -> bool:

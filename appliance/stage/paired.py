@@ -121,8 +121,6 @@ class PairedStage:
         self._has_begun = False
         self._looked_at = self._beat_at = self._work_s = 0.0
         self.resyncs = 0
-        parts.outputs.may_speak = self._may_speak
-        parts.outputs.mute(True)
         self._hear_leader()
 
     @property
@@ -262,7 +260,6 @@ class PairedStage:
             return
         self._say(self._sentence(role))
         if before is Role.LEADS:
-            self._parts.outputs.mute(True)
             self._has_danced, self._led_until = False, now
             self._hear_leader()
         self._write_part(now)
@@ -293,8 +290,12 @@ class PairedStage:
         self._part.write(part)
 
     def _hear_leader(self) -> None:
-        self._parts.link, self._parts.live_inbox = self._rerun.heard, self._rerun.live
-        self._parts.outputs.shift_shared(self.pair.offset.seconds)
+        parts = self._parts
+        parts.link, parts.live_inbox = self._rerun.heard, self._rerun.live
+        parts.outputs.may_speak = (
+            _never  # also while the leader's last ticks are run by a box that takes over
+        )
+        parts.outputs.shift_shared(self.pair.offset.seconds)
 
     def _restore(self, keyframe: bytes) -> None:
         try:
@@ -369,8 +370,8 @@ class PairedStage:
         self.pair.lead_anew()
         self.pair.is_ready = True
         parts.link, parts.live_inbox = self._own_link, self._own_live
+        parts.outputs.may_speak = self._may_speak
         parts.outputs.shift_shared(0.0)
-        parts.outputs.mute(False)
         self._sent_state = None
         if self._has_danced:
             shift_times(self._tick, ahead_s)
@@ -391,6 +392,10 @@ class PairedStage:
                 one.iterations.allow(most)
         self._has_danced = False
         self._write_part(clock.now())
+
+
+def _never() -> bool:
+    return False
 
 
 def _made_here_or_again(show: Show, parts: StageParts, made: Callable[[str], Loop]) -> Callable[[str], Loop]:

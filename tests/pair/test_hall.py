@@ -23,12 +23,6 @@ from tests.system.processes import run_bunraku, wait_until
 pytestmark = pytest.mark.skipif(bool(missing := why_not()), reason=str(missing))
 
 
-@pytest.fixture(autouse=True, scope="module")
-def only_at_full_length(long_run: bool) -> None:
-    if not long_run:
-        pytest.skip("two boxes on two cores, 50 s: --long")
-
-
 @pytest.fixture(scope="module")
 def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
     """Both boxes on, the first one leads, the second one is ready."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from appliance.show.box import BoxConfig
-from appliance.show_control.command import SENSORS_REPLY as REPLY
+from appliance.show_control.command import reply_to
 from appliance.show_control.order_dispatch import PATIENCE_S as ERRAND_S
 from appliance.show_control.packet import Message, datagram, messages_in, readable
 from appliance.show_control.port import Address
@@ -73,7 +73,7 @@ class ControlClient:
         answer, asked = None, time.monotonic()
         with contextlib.closing(self._replies((address, *arguments))) as replies:
             for about, values in replies:
-                if about == REPLY and len(values) == 3 and values[0] == address:
+                if about == reply_to(address) and len(values) == 3 and values[0] == address:
                     answer = Answer(bool(values[1]), readable(str(values[2])))
                     if answer.done or time.monotonic() - asked < ERRAND_S:  # refused, for good
                         return answer
@@ -91,7 +91,7 @@ class ControlClient:
                 elif about == END and _is_made_of(_ENDING, values) and values[0] == len(lines):
                     _, age_s, key_file = values
                     return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
-                elif about == REPLY and values[:2] == ["/sensors/list", 0]:
+                elif about == reply_to("/sensors/list") and values[:2] == ["/sensors/list", 0]:
                     raise NoBoxError(readable(str(values[-1])))
         raise self._no_box()
 
