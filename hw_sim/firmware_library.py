@@ -154,10 +154,6 @@ class CompiledWearable:
         """From that time on; announce it ahead for the sake of a join that blocks meanwhile."""
         self._library.wearable_set_access_point(self._world, is_on, at_us)
 
-    def set_stale(self, least_s: float, most_s: float) -> None:
-        """How long the driver calls itself joined after the access point went."""
-        self._library.wearable_set_stale(self._world, int(least_s * 1e6), int(most_s * 1e6))
-
     def put_datagram(self, address: tuple[int, int], data: bytes) -> bool:
         """A datagram for the wearable, from there; whether its radio heard it."""
         return bool(self._library.wearable_put_datagram(self._world, *address, data, len(data)))
@@ -224,10 +220,6 @@ class CompiledWearable:
         self._library.wearable_flash_image(self._world, image, room)
         return bytes(image)
 
-    def erase_flash(self) -> None:
-        """As an upload of new firmware does."""
-        self._library.wearable_erase_flash(self._world)
-
 
 @cache
 def load_library(path: Path = LIBRARY) -> ctypes.CDLL:
@@ -248,7 +240,6 @@ def load_library(path: Path = LIBRARY) -> ctypes.CDLL:
         "read_status": (None, (world, POINTER(Status))),
         "set_network": (None, (world, c_char_p, c_char_p)),
         "set_access_point": (None, (world, c_int, c_uint64)),
-        "set_stale": (None, (world, c_uint32, c_uint32)),
         "put_datagram": (c_int, (world, c_uint32, c_uint16, data, c_uint16)),
         "take_datagram": (
             c_uint16,
@@ -265,7 +256,6 @@ def load_library(path: Path = LIBRARY) -> ctypes.CDLL:
         "set_battery": (None, (world, c_uint16)),
         "take_light": (c_int, (world, POINTER(c_uint64))),
         "flash_image": (c_uint32, (world, POINTER(c_uint8), c_uint32)),
-        "erase_flash": (None, (world,)),
     }
     for name, (result, arguments) in signatures.items():
         function = getattr(library, f"wearable_{name}")

@@ -166,11 +166,6 @@ class ShowConfig(Section):
         return sensors[0].sensor if sensors else None
 
     @property
-    def has_springs(self) -> bool:
-        """Whether springs are among the hands."""
-        return any(hand.springs for hand in self.hands)
-
-    @property
     def names(self) -> dict[str, tuple[str, ...]]:
         """The values a cue may name under each key, the one in force at start first."""
         at_start = [hand.springs for hand in self.hands if hand.springs]
@@ -299,7 +294,9 @@ def load_show(directory: Path | str) -> Show:
         problems.extend(error.problems)
     else:
         problems.extend(cue_problems(config.cues, config.names, file))
-        problems.extend(puppet_problems(config.puppets, config.motion, config.lights.mappings, file))
+        problems.extend(
+            puppet_problems(config.puppets, config.cast, config.motion, config.lights.mappings, file)
+        )
     if problems or skeleton is None:
         raise ConfigError(problems)
     return Show(config, directory, skeleton, file)

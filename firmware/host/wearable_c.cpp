@@ -94,11 +94,6 @@ void wearable_set_access_point(wearable_world* world, int is_on, uint64_t at_us)
   world->wifi.set_access_point(is_on != 0, at_us);
 }
 
-void wearable_set_stale(wearable_world* world, uint32_t least_us, uint32_t most_us) {
-  world->wifi.conditions.stale_us[0] = least_us;
-  world->wifi.conditions.stale_us[1] = most_us;
-}
-
 int wearable_put_datagram(wearable_world* world, uint32_t ip, uint16_t port, const uint8_t* data, uint16_t count) {
   return world->wifi.deliver({world->clock.now_us(), {ip, port}, std::vector<uint8_t>(data, data + count)});
 }
@@ -161,5 +156,3 @@ uint32_t wearable_flash_image(const wearable_world* world, uint8_t* data, uint32
   if (data != nullptr && image.size() <= room) std::copy(image.begin(), image.end(), data);
   return static_cast<uint32_t>(image.size());
 }
-
-void wearable_erase_flash(wearable_world* world) { world->flash.erase(); }

@@ -45,8 +45,6 @@ void wearable_read_status(const wearable_world* world, wearable_status* status);
 /* Wi-Fi. A change of the access point may be announced ahead; times never go back. */
 void wearable_set_network(wearable_world* world, const char* name, const char* password);
 void wearable_set_access_point(wearable_world* world, int is_on, uint64_t at_us);
-/* How long the driver calls itself joined after the access point went. */
-void wearable_set_stale(wearable_world* world, uint32_t least_us, uint32_t most_us);
 int wearable_put_datagram(wearable_world* world, uint32_t ip, uint16_t port, const uint8_t* data, uint16_t count);
 /* Bytes of the oldest datagram sent, 0 when there is none; ip 0xFFFFFFFF: to all. */
 uint16_t wearable_take_datagram(wearable_world* world, uint64_t* at_us, uint32_t* ip, uint16_t* port,
@@ -75,7 +73,6 @@ int wearable_take_light(wearable_world* world, uint64_t* at_us);
 
 /* The flash as an image: how many bytes it has; written when they fit the room. */
 uint32_t wearable_flash_image(const wearable_world* world, uint8_t* data, uint32_t room);
-void wearable_erase_flash(wearable_world* world);
 
 #ifdef __cplusplus
 }

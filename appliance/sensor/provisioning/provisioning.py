@@ -23,7 +23,6 @@ from appliance.sensor.provisioning.wearable_console import (
 LONGEST_NETWORK = 32  # bytes, IEEE 802.11
 SHORTEST_PASSWORD, LONGEST_PASSWORD = 8, 63  # WPA2
 DEFAULT_PORT = 9750
-FUSIONS = ("imuplus", "ndof")
 _AGAIN = "Plug it in, switch it off and on, and run this again."
 
 
