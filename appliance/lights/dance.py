@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.outputs.joint_frame import JointFrame, PuppetFrame
-from appliance.outputs.motion_features import MotionFeatures
+from appliance.outputs.motion_features import Floats, MotionFeatures, TurnFeatures
 from appliance.pose import quaternion
 from appliance.pose.roles import roles_of
 from appliance.pose.skeleton import Skeleton
@@ -30,16 +31,49 @@ _COORDINATE = {"across": 0, "height": 1, "depth": 2}
 
 
 class Dances:
-    """The dance of each puppet, by name."""
+    """The dance of each puppet, by name; of each hand and of a live dancer."""
 
-    def __init__(self, skeleton: Skeleton, puppets: Sequence[str], led: str) -> None:
-        """led: the name of the one that cues lead."""
+    def __init__(
+        self, skeleton: Skeleton, puppets: Sequence[str], led: str, hands: Sequence[tuple[str, str]] = ()
+    ) -> None:
+        """led: the name of the one that cues lead. hands: puppet and joint of each, by rows of the frame."""
         self._by_name, self._led = {name: Dance(skeleton) for name in puppets}, led
+        self._hands = [(hand, Felt(TurnFeatures)) for hand in hands]
+        self._live, self._seen = Dance(skeleton), PuppetFrame.of(len(skeleton))
+        self._time, self._generation = -math.inf, -1
 
     def take_frame(self, frame: JointFrame, generation: int, now: float) -> None:
         """Take the newest frame, which may be the same again; `generation`: the stage's."""
         for dance, puppet in zip(self._by_name.values(), frame.puppets, strict=False):
             dance.take_frame(frame, puppet, generation, now)
+        if frame.live.any():
+            self._seen.positions[:] = frame.live
+            self._live.take_frame(frame, self._seen, generation, now)
+        else:
+            self._live.rest(now)
+        elapsed_s = frame.frame_time - self._time
+        for (_, felt), orientation in zip(self._hands, frame.hands, strict=False):
+            if generation != self._generation:
+                felt.begin_anew()
+            if elapsed_s > 0.0 and not frame.late:
+                felt.take(orientation, frame.frame_time, min(elapsed_s, PAUSE_S))
+            elif now - self._time > PAUSE_S:
+                felt.rest()
+        self._generation = generation
+        if not frame.late:
+            self._time = frame.frame_time
+
+    def read(self, rule: RuleConfig) -> float:
+        """A rule's present input: metres, metres a second or degrees; of a hand radians."""
+        if rule.of == "live":
+            return self._live.read(rule)
+        if rule.of is None:
+            return self.of(rule.puppet).read(rule)
+        puppet = self._led if rule.puppet is None else rule.puppet
+        for (name, joint), felt in self._hands:
+            if name == puppet and rule.joint in (None, joint):
+                return felt.read(rule.reads)
+        return 0.0
 
     def of(self, puppet: str | None) -> Dance:
         """The dance of a puppet; None: of the one that cues lead."""
@@ -65,8 +99,7 @@ class Dance:
             inverse = quaternion.inverse(standing[self._head])
             self._forward, self._up = (quaternion.rotate(inverse, np.array(way)) for way in (_FRONT, _ABOVE))
         self._age_s = 0.0  # age of the newest frame since it left the stage
-        self._features: MotionFeatures | None = None  # made when a rule first reads one
-        self._felt: dict[str, float] = dict.fromkeys(FEATURES, 0.0)  # smoothed
+        self._felt = Felt(lambda: MotionFeatures(joints))
         self._time = -math.inf
         self._tick: tuple[int, int] | None = None
 
@@ -76,14 +109,18 @@ class Dance:
         self._age_s = min(max(now - max(frame.left, frame.frame_time), 0.0), MOST_ON_S)
         self.__dict__.pop("eyes", None)
         if tick == self._tick:
-            if now - self._time > PAUSE_S:
-                self._settle(np.zeros_like(self.speeds), PAUSE_S)
-                self._feel(dict.fromkeys(FEATURES, 0.0), PAUSE_S)
-                self._velocities[:] = 0.0
+            self.rest(now)
             return
         if (not frame.late or self._tick is None) and np.isfinite(puppet.positions).all():
             self._measure(frame, puppet, generation)
         self._tick = tick
+
+    def rest(self, now: float) -> None:
+        """No new frame shows it: after a pause it stands still."""
+        if now - self._time > PAUSE_S:
+            self._settle(np.zeros_like(self.speeds), PAUSE_S)
+            self._felt.rest()
+            self._velocities[:] = 0.0
 
     def read(self, rule: RuleConfig) -> float:
         """A rule's present input: metres, metres a second or degrees."""
@@ -94,9 +131,8 @@ class Dance:
             return self.body_speed if rule.joint is None else float(self.speeds[joint])
         if rule.reads == "answer":
             return self.answer
-        if rule.reads in self._felt:
-            self._features = self._features or MotionFeatures(len(self.skeleton))
-            return self._felt[rule.reads]
+        if rule.reads in FEATURES:
+            return self._felt.read(rule.reads)
         turned = self.pose[joint] if rule.relative else self.world[joint]
         return turn(turned, rule.axis) if rule.reads == "turn" else lean(turned, rule.axis)
 
@@ -129,7 +165,7 @@ class Dance:
             speeds = np.linalg.norm(self._velocities, axis=-1)
             if speeds.max() > FASTEST_M_S:  # a jump: motion begins anew
                 self._velocities[:] = 0.0
-                self._features = self._features and MotionFeatures(len(self.skeleton))
+                self._felt.begin_anew()
             self._settle(np.minimum(speeds, FASTEST_M_S), elapsed_s)
         else:
             self._velocities[:] = 0.0
@@ -137,9 +173,7 @@ class Dance:
         self._compare(puppet, min(elapsed_s, PAUSE_S))
         self.positions[:], self.pose[:], self.world[:] = puppet.positions, puppet.pose, puppet.world
         self._time = frame.frame_time
-        if self._features is not None:
-            self._features.take_frame(puppet.positions, frame.frame_time)
-            self._feel({name: float(self._features.numbers[name][0]) for name in FEATURES}, elapsed_s)
+        self._felt.take(puppet.positions, frame.frame_time, elapsed_s)
 
     def _compare(self, puppet: PuppetFrame, elapsed_s: float) -> None:
         """How far the joints that no hand holds are from the phrase; 0 while none is held."""
@@ -155,10 +189,41 @@ class Dance:
         self.speeds += (speeds - self.speeds) * (1.0 - math.exp(-elapsed_s / SMOOTHING_S))
         self.body_speed = float(self.speeds.mean())
 
-    def _feel(self, numbers: Mapping[str, float], elapsed_s: float) -> None:
+
+class Felt:
+    """FEATURES of one thing that moves, smoothed; measured as soon as a rule has read one."""
+
+    def __init__(self, make: Callable[[], MotionFeatures | TurnFeatures]) -> None:
+        self._make = make
+        self._features: MotionFeatures | TurnFeatures | None = None
+        self._smoothed: dict[str, float] = dict.fromkeys(FEATURES, 0.0)
+
+    def read(self, name: str) -> float:
+        """The present value; 0 at the first call."""
+        self._features = self._features or self._make()
+        return self._smoothed[name]
+
+    def take(self, moving: Floats, seconds: float, elapsed_s: float) -> None:
+        """Positions (J, 3), metres, or a hand's orientation (4,), zeros: unknown; at a later time."""
+        if self._features is None:
+            return
+        if self._features.take_frame(moving, seconds):
+            self._ease({name: float(self._features.numbers[name][0]) for name in FEATURES}, elapsed_s)
+        else:
+            self.rest()
+
+    def begin_anew(self) -> None:
+        """A jump: what was before does not count."""
+        self._features = self._features and self._make()
+
+    def rest(self) -> None:
+        """Nothing moves."""
+        self._ease(dict.fromkeys(FEATURES, 0.0), PAUSE_S)
+
+    def _ease(self, numbers: Mapping[Any, float], elapsed_s: float) -> None:
         share = 1.0 - math.exp(-elapsed_s / SMOOTHING_S)
         for name, number in numbers.items():
-            self._felt[name] += (number - self._felt[name]) * share
+            self._smoothed[name] += (number - self._smoothed[name]) * share
 
 
 def turn(q: NDArray[np.float64], axis: tuple[float, float, float]) -> float:

@@ -106,7 +106,7 @@ class _Rule:
         if config.reads == "steady":
             wanted = config.value
         else:
-            wanted = bent(config, share(dances.of(config.puppet).read(config), config.ends))
+            wanted = bent(config, share(dances.read(config), config.ends))
         if self._level is not None:
             wanted = eased(self._level, wanted, *config.eases_s, seconds)
         self._level = wanted

@@ -42,10 +42,11 @@ class Rig:
         rate_hz: float = USUAL_RATE_HZ,
         puppets: Sequence[str] = ("",),
         led: str = "",
+        hands: Sequence[tuple[str, str]] = (),
     ) -> None:
-        """puppets: their names; led: the one that cues lead."""
+        """puppets: their names; led: the one that cues lead; hands: puppet and joint of each, by rows."""
         self.patch = patch
-        self.dances = Dances(skeleton, puppets, led)
+        self.dances = Dances(skeleton, puppets, led, hands)
         self.safety = 1.0  # 0: only the dance; 1: only the safe look
         self._safe, self._homes = _safe_look(config.safe, patch), config.safe.heads == "home"
         self.values: Values = patch.dimmed(self._safe, 1.0)  # (S,) what the last pass showed

@@ -57,8 +57,10 @@ class Lights:
         config = rig_here(show, box)
         patch = Patch(config.fixtures, show.directory)
         self.show, self.box = show, box
-        puppets = [puppet.name for puppet in show.config.cast]
-        self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz, puppets, show.config.led.name)
+        cast, led = show.config.cast, show.config.led.name
+        puppets = [puppet.name for puppet in cast]
+        hands = [(puppet.name, hand.joint) for puppet in cast for hand in puppet.hands]
+        self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz, puppets, led, hands)
         self.universes = wired(patch, box)
         self._walk, self._live = OrderedWalk(inbox, patch, box.lights.rate_hz), live
         self._stage, self._show_state, self._say, self._fallbacks = stage, show_state, say, fallbacks

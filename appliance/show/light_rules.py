@@ -20,6 +20,7 @@ ReadValue = Literal[
     "place", "across", "height", "depth", "speed", "turn", "lean", "answer", "steady", Feature
 ]
 FEATURES: tuple[Feature, ...] = get_args(Feature)
+Mover = Literal["hand", "live"]  # what moves and is no puppet
 
 USUAL_RANGES: dict[str, tuple[float, float]] = {
     "across": (-2.0, 2.0),  # metres
@@ -35,6 +36,15 @@ USUAL_RANGES: dict[str, tuple[float, float]] = {
     "flow_effort": (0.0, 1000.0),  # metres a second^3
     "space_effort": (1.0, 4.0),
 }
+# A hand's turns are in radians. 95 % of the forearms of recorded dancers stay below these.
+HAND_RANGES: dict[str, tuple[float, float]] = {
+    "qom": (0.0, 7.0),
+    "weight_effort": (0.0, 100.0),
+    "time_effort": (0.0, 50.0),
+    "flow_effort": (0.0, 2500.0),
+    "space_effort": (1.0, 4.0),
+}
+LIVE_READS = ("speed", "across", "height", "depth", *FEATURES)  # a stream of positions says no more
 AIM, COLOUR = "aim", "colour"  # what a rule can drive in addition to attributes
 # Dimmers and colours rise by at most 26 of 255 levels in a pass and fall by 8. Faster light flickers.
 USUAL_ATTACK_S, USUAL_RELEASE_S = 0.25, 0.8
@@ -61,6 +71,11 @@ class RuleConfig(Section):
         None,
         length=(1, 32),
     )
+    of: Mover | None = key(
+        "hand: reads the hand that holds `joint` (default: the puppet's first), qom and the efforts of its "
+        "turns; live: reads the live dancer instead of a puppet. null: the puppet.",
+        None,
+    )
     drives: str = key(
         "aim (pan and tilt follow the joint), colour, dimmer, or any attribute of the profile.",
         length=(1, 64),
@@ -68,7 +83,8 @@ class RuleConfig(Section):
     range: Pair | None = key(
         "The readings that count as 0 and 1. Defaults: speed 0 to 2, height 0 to 2, across and "
         "depth -2 to 2, turn -180 to 180, lean 0 to 90, answer 0 to 25; qom 0 to 2, weight_effort 0 to 4, "
-        "time_effort 0 to 20, flow_effort 0 to 1000, space_effort 1 to 4.",
+        "time_effort 0 to 20, flow_effort 0 to 1000, space_effort 1 to 4; of a hand, in radians, qom 0 to 7, "
+        "weight_effort 0 to 100, time_effort 0 to 50, flow_effort 0 to 2500.",
         None,
     )
     curve: Literal["linear", "s", "gamma", "points"] = key(
@@ -121,6 +137,12 @@ class RuleConfig(Section):
     @model_validator(mode="after")
     def _consistent(self) -> RuleConfig:
         place, aims = self.reads == "place", self.drives == AIM
+        can = {"hand": FEATURES, "live": LIVE_READS}.get(self.of or "")
+        if can is not None and self.reads not in can:
+            cure = f"Read one of {', '.join(can)}, or remove `of`."
+            raise refusal(f"'{self.reads}' cannot be read of '{self.of}'.", cure, "reads")
+        if self.of == "live" and self.puppet is not None:
+            raise refusal("A live dancer is no puppet.", "Remove `puppet` or `of`.", "puppet")
         if place and not aims:
             cure = "Read across, height or depth for a single attribute."
             raise refusal(f"A place drives the aim, not '{self.drives}'.", cure, "drives")
@@ -154,7 +176,8 @@ class RuleConfig(Section):
     @property
     def ends(self) -> tuple[float, float]:
         """The readings that count as 0 and 1; for place and steady of no meaning."""
-        return self.range or USUAL_RANGES.get(self.reads, (0.0, 1.0))
+        usual = HAND_RANGES if self.of == "hand" else USUAL_RANGES
+        return self.range or usual.get(self.reads, (0.0, 1.0))
 
 
 def _growing(points: Sequence[tuple[float, float]]) -> bool:

@@ -131,7 +131,11 @@ def require_each_joint_once(hands: list[HandConfig]) -> list[HandConfig]:
 
 
 def _light_problems(
-    puppets: Sequence[PuppetConfig], mappings: Sequence[MappingConfig], file: YamlFile
+    puppets: Sequence[PuppetConfig],
+    cast: Sequence[PuppetStart],
+    motion: MotionConfig,
+    mappings: Sequence[MappingConfig],
+    file: YamlFile,
 ) -> Iterator[Problem]:
     names = [puppet.name for puppet in puppets]
     for place, mapping in enumerate(mappings):
@@ -140,6 +144,27 @@ def _light_problems(
                 cure = did_you_mean(rule.puppet, names) if names else "Remove it: the show has one puppet."
                 at = ("lights", "mappings", place, "rules", number, "puppet")
                 yield file.problem(at, f"The show has no puppet '{rule.puppet}'.", cure)
+            of = ("lights", "mappings", place, "rules", number, "of")
+            yield from mover_problems(rule.of, of, cast, motion, file, rule.puppet, rule.joint)
+
+
+def mover_problems(
+    of: str | None,
+    at: Location,
+    cast: Sequence[PuppetStart],
+    motion: MotionConfig,
+    file: YamlFile,
+    puppet: str | None = None,
+    joint: str | None = None,
+) -> Iterator[Problem]:
+    """A live dancer that the show does not take, or a hand that it does not have. at: of the key `of`."""
+    if of == "live" and not motion.live:
+        yield file.problem(at, "This show takes no live dancer.", "Add `live: true` under motion.")
+    read = (one for one in cast if (one.is_led if puppet is None else one.name == puppet))
+    hands = [hand.joint for one in read for hand in one.hands]
+    if of == "hand" and (not hands if joint is None else joint not in hands):
+        cure = did_you_mean(joint, hands) if joint and hands else "Add one under `hands`, or remove `of`."
+        yield file.problem(at, f"No hand holds {joint or 'a joint of it'}.", cure)
 
 
 def _partner_problems(puppets: Sequence[PuppetConfig], file: YamlFile) -> Iterator[Problem]:
@@ -159,12 +184,16 @@ def _partner_problems(puppets: Sequence[PuppetConfig], file: YamlFile) -> Iterat
 
 
 def puppet_problems(
-    puppets: Sequence[PuppetConfig], motion: MotionConfig, mappings: Sequence[MappingConfig], file: YamlFile
+    puppets: Sequence[PuppetConfig],
+    cast: Sequence[PuppetStart],
+    motion: MotionConfig,
+    mappings: Sequence[MappingConfig],
+    file: YamlFile,
 ) -> Iterator[Problem]:
-    """Settings that the first puppet must not have, phrases of the others that the show lacks, and puppets
-    that it lacks in rules of lights.
+    """Settings that the first puppet must not have, phrases of the others that the show lacks, and puppets,
+    hands and a live dancer that it lacks in rules of lights.
     """
-    yield from _light_problems(puppets, mappings, file)
+    yield from _light_problems(puppets, cast, motion, mappings, file)
     yield from _partner_problems(puppets, file)
     for place, puppet in enumerate(puppets):
         if place == 0:
