@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from appliance.cli import preflight as commands
 from appliance.cli.preflight import Options, preflight
 from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.release.choice import CHOSEN, Choice
@@ -67,7 +68,8 @@ def late(machine: Machine, uptime_s: float) -> list[str]:
     said: list[str] = []
 
     def in_a_fork() -> bytes:
+        setattr(commands, "CHECK_S", PATIENCE_S)  # noqa: B010 - it runs at the lowest priority
         assert preflight(machine.options._replace(late=True), said.append, uptime_s) == 0
         return "\n".join(said).encode()
 
-    return run_with_timeout(60.0, in_a_fork).decode().splitlines()
+    return run_with_timeout(PATIENCE_S, in_a_fork).decode().splitlines()
