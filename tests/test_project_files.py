@@ -139,8 +139,10 @@ def test_the_small_steps_of_a_release_do_what_they_say(tmp_path: Path) -> None:
 def test_the_quick_workflow_runs_on_each_python_of_the_project() -> None:
     document = yaml.safe_load((ROOT / ".github/workflows/quick.yml").read_text())
     wanted = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"]
-    assert wanted == ">=3.11,<3.14"
-    assert document["jobs"]["quick"]["strategy"]["matrix"]["python"] == ["3.11", "3.12", "3.13"]
+    assert wanted == ">=3.11,<3.15"
+    jobs = document["jobs"]
+    assert jobs["quick"]["strategy"]["matrix"]["python"] == ["3.11", "3.12", "3.13"]
+    assert jobs["newest-python"]["steps"][1]["with"]["python-version"] == "3.14"
 
 
 @pytest.mark.parametrize("template", TEMPLATES, ids=lambda path: path.stem)
