@@ -180,6 +180,20 @@ PROJECTOR = (
         ),
         Number("brightness", 0, 2),
     ),
+    _once(
+        "projector",
+        "overlap",
+        "/projector/overlap",
+        "with `edge_blend`: the share of this display that the other projector lights too",
+        Number("overlap", 0.01, 0.5),
+    ),
+    _once(
+        "projector",
+        "blend_gamma",
+        "/projector/blend_gamma",
+        "with `edge_blend`: this projector's gamma",
+        Number("gamma", 1, 3),
+    ),
     _once("projector", "mirror", "/projector/mirror", "rear projection", _ON),
     _once("projector", "grid", "/projector/grid", "a grid for focus and corners", _ON),
     _once(

@@ -6,7 +6,7 @@ import contextlib
 import os
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from appliance.projector.corners import WHOLE, Corners, complaint
 from appliance.projector.warp import NOT_WARPED, Warp
 from appliance.projector.warp import complaint as warp_complaint
 from appliance.show.box import BoxConfig
-from appliance.show.projector import ProjectorConfig
+from appliance.show.projector import LEAST_TO_MOST_GAMMA, LEAST_TO_MOST_OVERLAP, ProjectorConfig
 
 _HEADER = (
     "# How the picture lies on the wall; written by bunraku project, corners clockwise from the top left.\n"
@@ -27,18 +27,30 @@ _HEADER = (
 _LARGEST_FILE = 4096
 LAST_WRITE_S = 1.0  # seconds, less than the 3 s that systemd and `bunraku play` give the projector
 MOST_BRIGHT = 2.0
+_ALSO_IN_BOX_FILE = "mirror", "brightness", "overlap", "blend_gamma"
 
 
 @dataclass(frozen=True)
 class Alignment:
     """corners: where the picture's corners lie, clockwise from its top left as the audience sees it, in
     shares of the display's width and height, y down; mirror: for rear projection; brightness: a factor;
-    warp: how far each point of the mesh is pulled from there, row by row, () for none."""
+    warp: how far each point of the mesh is pulled from there, row by row, () for none; overlap: the share of
+    the display that the projector beside it lights too, 0 where there is none; blend_gamma: this projector's.
+    """
 
     corners: Corners = WHOLE
     mirror: bool = False
     brightness: float = 1.0
     warp: Warp = NOT_WARPED
+    overlap: float = 0.0
+    blend_gamma: float = 2.2
+
+    @staticmethod
+    def of_box(config: ProjectorConfig) -> Alignment:
+        """What the box file says."""
+        chosen = Alignment(WHOLE, config.mirror, config.brightness)
+        blend = config.edge_blend
+        return chosen if blend is None else replace(chosen, overlap=blend.overlap, blend_gamma=blend.gamma)
 
 
 def alignment_folder(box: BoxConfig, environment: Mapping[str, str] = os.environ) -> Path:
@@ -65,7 +77,7 @@ class AlignmentFile:
 
     def __init__(self, folder: Path, config: ProjectorConfig, say: Callable[[str], None]) -> None:
         self.path = folder / file_name(config)
-        self._from_box, self._say = Alignment(WHOLE, config.mirror, config.brightness), say
+        self._from_box, self._say = Alignment.of_box(config), say
         self._saved = self._wanted = self._load()
         self._is_wanted = threading.Event()
         self._closing = False
@@ -92,6 +104,12 @@ class AlignmentFile:
             sentences.append(
                 f"The brightness is {chosen.brightness:g}, as last chosen by hand, and not the box file's "
                 f"{box_file.brightness:g}."
+            )
+        if (chosen.overlap, chosen.blend_gamma) != (box_file.overlap, box_file.blend_gamma):
+            sentences.append(
+                f"The overlap is {100 * chosen.overlap:.1f} % and its gamma {chosen.blend_gamma:g}, as last "
+                f"chosen by hand, and not the box file's {100 * box_file.overlap:.1f} % and "
+                f"{box_file.blend_gamma:g}."
             )
         return sentences
 
@@ -167,29 +185,32 @@ def _text(alignment: Alignment, from_box: Alignment) -> str:
     """Beside each value that the box file sets as well stands the box file's value of that time."""
     corners = ", ".join(f"[{x!r}, {y!r}]" for x, y in alignment.corners)
     warp = ", ".join(f"[{x!r}, {y!r}]" for x, y in alignment.warp)
-    mirror, box_mirror = str(alignment.mirror).lower(), str(from_box.mirror).lower()
-    return (
-        f"{_HEADER}corners: [{corners}]\n"
-        f"warp: [{warp}]\n"
-        f"mirror: {{chosen: {mirror}, box_file: {box_mirror}}}\n"
-        f"brightness: {{chosen: {alignment.brightness!r}, box_file: {from_box.brightness!r}}}\n"
+    both = "".join(
+        f"{name}: {{chosen: {_yaml(getattr(alignment, name))}, box_file: {_yaml(getattr(from_box, name))}}}\n"
+        for name in _ALSO_IN_BOX_FILE
     )
+    return f"{_HEADER}corners: [{corners}]\nwarp: [{warp}]\n{both}"
+
+
+def _yaml(value: bool | float) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def _read(values: Any, from_box: Alignment) -> Alignment:
     """Raises ValueError, TypeError, KeyError or OverflowError for nonsense."""
     a, b, c, d = ((float(x), float(y)) for x, y in values["corners"])
-    brightness, mirror = values["brightness"], values["mirror"]
-    chosen = Alignment(
-        (a, b, c, d),
-        bool(mirror["chosen"]) if mirror["box_file"] == from_box.mirror else from_box.mirror,
-        float(brightness["chosen"]) if brightness["box_file"] == from_box.brightness else from_box.brightness,
-        tuple((float(x), float(y)) for x, y in values.get("warp", ())),
-    )
+    warp = tuple((float(x), float(y)) for x, y in values.get("warp", ()))
+    chosen = replace(from_box, corners=(a, b, c, d), warp=warp)
+    for name in _ALSO_IN_BOX_FILE:
+        kept, in_box = values.get(name), getattr(from_box, name)
+        if kept is not None and kept["box_file"] == in_box:
+            chosen = replace(chosen, **{name: type(in_box)(kept["chosen"])})
     if (
         complaint(chosen.corners)
         or warp_complaint(chosen.warp, chosen.corners)
         or not 0.0 <= chosen.brightness <= MOST_BRIGHT
+        or not 0.0 <= chosen.overlap <= LEAST_TO_MOST_OVERLAP[1]
+        or not LEAST_TO_MOST_GAMMA[0] <= chosen.blend_gamma <= LEAST_TO_MOST_GAMMA[1]
     ):
         raise ValueError("no alignment")
     return chosen

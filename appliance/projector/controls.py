@@ -11,6 +11,7 @@ from appliance.projector.alignment import MOST_BRIGHT, Alignment
 from appliance.projector.corners import WHOLE, Corners, Point, complaint
 from appliance.projector.warp import NOT_WARPED, moved
 from appliance.projector.warp import complaint as warp_complaint
+from appliance.show.projector import LEAST_TO_MOST_GAMMA, LEAST_TO_MOST_OVERLAP
 
 _CORNER_NAMES = ("top left", "top right", "bottom right", "bottom left")
 
@@ -114,9 +115,24 @@ class Controls:
 
     def set_brightness(self, brightness: float) -> str:
         """A factor, limited to 0 and MOST_BRIGHT."""
-        brightness = round(min(max(brightness, 0.0), MOST_BRIGHT), 4)
+        brightness = _within(brightness, (0.0, MOST_BRIGHT))
         self._set_alignment(replace(self.alignment, brightness=brightness))
         return f"Brightness {100 * brightness:.0f} %."
+
+    def blend(self, name: str, value: float) -> tuple[bool, str]:
+        """Set `overlap` or `blend_gamma`, limited as in the box file; whether it was done."""
+        if not self.alignment.overlap:
+            return False, (
+                "This projector shows the whole picture. Nothing has changed. For two of them give each box "
+                "file its `edge_blend` under `projector`."
+            )
+        overlap, gamma = self.alignment.overlap, self.alignment.blend_gamma
+        if name == "overlap":
+            overlap = _within(value, LEAST_TO_MOST_OVERLAP)
+        else:
+            gamma = _within(value, LEAST_TO_MOST_GAMMA)
+        self._set_alignment(replace(self.alignment, overlap=overlap, blend_gamma=gamma))
+        return True, f"The pictures overlap by {100 * overlap:.1f} %, blended with a gamma of {gamma:g}."
 
     def set_grid(self, grid: bool) -> str:
         """Show or hide the grid."""
@@ -140,6 +156,8 @@ class Controls:
             "corners": corners,
             "warp": self.alignment.warp,
             "brightness": brightness,
+            "overlap": self.alignment.overlap,
+            "blend_gamma": self.alignment.blend_gamma,
             "grid": self.has_grid,
             "info": self.shows_info,
             "test_card": self.shows_test_card,
@@ -164,6 +182,8 @@ class Controls:
                 return True, self.reset()
             case "brightness", 1:
                 return True, self.set_brightness(values[0])
+            case "overlap" | "blend_gamma", 1:
+                return self.blend(order.name, values[0])
             case "mirror", 1:
                 return True, self.set_mirror(values[0] != 0)
             case "grid", 1:
@@ -177,3 +197,8 @@ class Controls:
     def _set_alignment(self, alignment: Alignment) -> None:
         self.alignment = alignment
         self._keep(alignment)
+
+
+def _within(value: float, least_to_most: tuple[float, float]) -> float:
+    least, most = least_to_most
+    return round(min(max(value, least), most), 4)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import moderngl
@@ -23,6 +23,7 @@ _NO_SIZE = (1, 1)  # size of an absent picture
 _MARKER_RADIUS = 28.0  # pixels
 _TEXT_ROWS = 160  # letters are as large as on a display of this many rows of pixels
 _TOE = {"projector": 0.06, "screen": 0.0}  # share of white: a projector shows fainter air as a grey rectangle
+_COARSE_WIDE = Detail(0.64, 0)  # in place of 0.7: a picture twice as large within 25 MB of graphics memory
 _DITHER_STEP = 0.618034  # pixels: no two neighbouring pictures have the same pattern
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 _CLIP_FROM_DISPLAY = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.0]])  # y down
@@ -30,37 +31,48 @@ _CLIP_FROM_DISPLAY = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.
 
 @dataclass(frozen=True)
 class Part:
-    """The part of the picture that this display shows: its start and its width, as fractions of the whole
-    width.
-    """
+    """The part of the picture that this display shows, as fractions of the whole; y down."""
 
-    begin: float
+    left: float
+    top: float
     width: float
+    height: float
 
 
-def part_of(blend: EdgeBlendConfig | None) -> Part:
-    """The whole picture without edge blend; else one side of it."""
+_TOWARDS = {
+    "left": (1.0, 0.0),
+    "right": (-1.0, 0.0),
+    "top": (0.0, 1.0),
+    "bottom": (0.0, -1.0),
+}  # the other part
+
+
+def part_of(blend: EdgeBlendConfig | None, overlap: float) -> Part:
+    """The whole picture without edge blend; else one side of it. overlap: a fraction of this display."""
     if blend is None:
-        return Part(0.0, 1.0)
-    width = 1.0 / (2.0 - blend.overlap)
-    return Part(0.0 if blend.part == "left" else 1.0 - width, width)
+        return Part(0.0, 0.0, 1.0, 1.0)
+    share = 1.0 / (2.0 - overlap)
+    at = 1.0 - share if blend.part in ("right", "bottom") else 0.0
+    across = blend.part in ("left", "right")
+    return Part(at, 0.0, share, 1.0) if across else Part(0.0, at, 1.0, share)
 
 
-def picture_size(config: ProjectorConfig, display: Size, share: float = 1.0) -> Size:
-    """Pixels that the scene is drawn in: a share of the display's unless the box file says otherwise."""
+def picture_size(config: ProjectorConfig, display: Size, overlap: float, share: float = 1.0) -> Size:
+    """Pixels that the scene is drawn in: a share of the display's unless the box file says otherwise, and
+    with edge blend as many more as both displays show."""
     width, height = config.picture or (round(display[0] * share), round(display[1] * share))
-    return max(1, round(width / part_of(config.edge_blend).width)), max(1, height)
+    part = part_of(config.edge_blend, overlap)
+    return max(1, round(width / part.width)), max(1, round(height / part.height))
 
 
 class FinalPass:
     """Owns the picture's texture and the programs that lay it onto the wall, one of them with marks.
 
-    Where no edges are blended and no marks shown, a look does most of it or all: `wall`.
+    Where no marks are shown, a look does most of it or all: `wall`. Edges are then blended on the display.
     """
 
     def __init__(self, gl: moderngl.Context, config: ProjectorConfig) -> None:
         self._gl, self._config = gl, config
-        self._part = part_of(config.edge_blend)
         fixed = ["GAMMA"] * (config.gamma != 1.0) + ["BLEND"] * (config.edge_blend is not None)
         self._is_graded = False  # whether the picture has its brightness and gamma already
         self._unchanged, self._dimmed, self._marked = (
@@ -69,6 +81,9 @@ class FinalPass:
         )
         self._warped_parts = [*fixed, "DIM", "MARKS", "WARP"]
         self._warped: Drawing | None = None  # few walls need it
+        edges = ["MARKS", "BLEND", "EDGES"]
+        self._edges = None if config.edge_blend is None else Drawing(gl, "final", "final", parts=edges)
+        self._is_unblended = False  # whether a look's picture on the display still needs its edges
         self._offsets = gl.texture((FINE, FINE), 4, dtype="f2")
         self._offsets.repeat_x = self._offsets.repeat_y = False
         self._offset_by: Warp | None = None
@@ -96,20 +111,24 @@ class FinalPass:
         scale, gamma = level * controls.alignment.brightness, self._config.gamma
         toe = _TOE[self._config.wall]
         has_marks = bool(lines) or controls.shows_grid or bool(controls.alignment.warp)
-        self._is_graded = self._config.edge_blend is None and not has_marks
-        if self._is_graded and size == display:
+        whole = picture_size(self._config, display, controls.alignment.overlap)
+        self._is_graded = not has_marks
+        self._is_unblended = self._edges is not None and not has_marks
+        if self._edges is not None and detail == DETAILS[0]:
+            detail = _COARSE_WIDE
+        if self._is_graded and size == whole and (self._config.picture or display) == display:
             self.resize(_NO_SIZE)
-            clip_from_picture = self._clip_from_part(controls) @ _Y_UP
+            clip_from_picture = self._clip_from_part(controls) @ self._part_from_picture(controls) @ _Y_UP
             return Wall(screen, display, size, clip_from_picture, scale, gamma, detail=detail, toe=toe)
         self.resize(size)
         if not self._is_graded:
             return replace(flat(self.picture), detail=detail, toe=toe)
-        finer = 1.0 if self._config.picture else display[1] / size[1]
+        finer = 1.0 if self._config.picture else whole[1] / size[1]
         return Wall(self.picture, size, size, FLAT, scale, gamma, finer, detail, toe)
 
     def show_image(self, image: NDArray[np.uint8]) -> None:
         """An image (height, width, 3), top row first, in place of a look's picture; `draw` does the rest."""
-        self._is_graded = False
+        self._is_graded = self._is_unblended = False
         self.resize((image.shape[1], image.shape[0]))
         opaque = np.dstack([image, np.full(image.shape[:2], 255, np.uint8)])
         self._texture.write(np.ascontiguousarray(opaque[::-1]).tobytes())
@@ -138,8 +157,9 @@ class FinalPass:
         self._gl.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         inputs = {
             "picture": self._texture,
-            "part": (self._part.begin, self._part.width),
+            "part": astuple(self._part(controls)),
             **self._light(scale),
+            **self._blend(controls),
         }
         if has_marks:
             inputs |= self._place(display, controls) | self._mark(lines, display, controls)
@@ -153,8 +173,15 @@ class FinalPass:
             drawing = self._unchanged if self._is_graded else self._dimmed
             drawing.draw(inputs, moderngl.TRIANGLE_STRIP, 4)
 
-    def mask(self, screen: moderngl.Framebuffer, display: Size, controls: Controls) -> None:
-        """Darken what the box file's masks cover; the very last step of a picture."""
+    def darken(self, screen: moderngl.Framebuffer, display: Size, controls: Controls) -> None:
+        """Blend the edges if a look laid its picture onto the display; darken what the box file's masks
+        cover. The very last step of a picture."""
+        if self._is_unblended and self._edges is not None:
+            self._gl.enable_only(moderngl.BLEND)
+            self._gl.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
+            screen.use()
+            screen.viewport = (0, 0, *display)
+            self._edges.draw(self._place(display, controls) | self._blend(controls))
         self._masks.draw(screen, display, self._flips(controls), controls.shows_grid)
 
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
@@ -168,8 +195,9 @@ class FinalPass:
         self._release_picture()
         for owned in (self._masks, self._text, self._offsets, self._unchanged, self._dimmed, self._marked):
             owned.release()
-        if self._warped is not None:
-            self._warped.release()
+        for made in (self._warped, self._edges):
+            if made is not None:
+                made.release()
 
     def _fine_offsets(self, warp: Warp) -> moderngl.Texture:
         """The warp between its points too, as a texture of shares of the display."""
@@ -187,6 +215,20 @@ class FinalPass:
         flipped[:2, 2] = across, upside_down
         return np.asarray(_CLIP_FROM_DISPLAY @ flipped @ homography(controls.alignment.corners))
 
+    def _part(self, controls: Controls) -> Part:
+        return part_of(self._config.edge_blend, controls.alignment.overlap)
+
+    def _part_from_picture(self, controls: Controls) -> NDArray[np.float64]:
+        """(3, 3) from the picture's unit square (y down) to that of this display's part."""
+        part = self._part(controls)
+        return np.array(
+            [
+                [1.0 / part.width, 0.0, -part.left / part.width],
+                [0.0, 1.0 / part.height, -part.top / part.height],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+
     def _flips(self, controls: Controls) -> tuple[float, float]:
         """1 where left and right, top and bottom of the wall are exchanged on the display."""
         upside_down = self._config.upside_down
@@ -203,19 +245,22 @@ class FinalPass:
         }
 
     def _light(self, scale: float) -> dict[str, Any]:
-        """Brightness, gamma and edge blend, as far as the picture does not have them already."""
+        """Brightness and gamma, as far as the picture does not have them already."""
         if self._is_graded:
             return {}
         self._pictures += 1
-        inputs: dict[str, Any] = {
+        return {
             "scale": scale,
             "inverse_gamma": 1.0 / self._config.gamma,
             "seed": (self._pictures % 64 * _DITHER_STEP, self._pictures % 61 * _DITHER_STEP),
         }
-        blend = self._config.edge_blend
-        if blend is not None:
-            inputs["blend"] = (-1.0 if blend.part == "left" else 1.0, blend.overlap, 1.0 / blend.gamma)
-        return inputs
+
+    def _blend(self, controls: Controls) -> dict[str, Any]:
+        """Which edge is blended, and how."""
+        blend, alignment = self._config.edge_blend, controls.alignment
+        if blend is None:
+            return {}
+        return {"blend": (*_TOWARDS[blend.part], alignment.overlap, 1.0 / alignment.blend_gamma)}
 
     def _mark(self, lines: tuple[str, ...], display: Size, controls: Controls) -> dict[str, Any]:
         """Grid, chosen corner, figures and numbers."""
@@ -230,7 +275,7 @@ class FinalPass:
             self._text = self._gl.texture((image.shape[1], image.shape[0]), 1, image.tobytes(), alignment=1)
             self._text.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self._written = written
-        width, height = picture_size(self._config, display)
+        width, height = picture_size(self._config, display, controls.alignment.overlap)
         x, y = controls.alignment.corners[controls.corner or 0]
         radius = 0.0 if controls.corner is None else _MARKER_RADIUS
         return {

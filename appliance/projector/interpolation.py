@@ -27,6 +27,11 @@ class _Seen(NamedTuple):
     figures: tuple[Figure, ...]  # one for each puppet
     ahead: tuple[Figure, ...]  # predicted for `prediction_s` after `time`
 
+    @property
+    def danced_s(self) -> float:
+        """Its time by the dance's own clock."""
+        return TICK_S * self.tick
+
 
 class Interpolation:
     """Follows one stage's frames. Between two, positions and holds are linear, world rotations slerped.
@@ -42,7 +47,12 @@ class Interpolation:
         self._seen: deque[_Seen] = deque(maxlen=_CAPACITY)
         self._tick = -1
         self._latency_s: float | None = None  # from a frame's time to its leaving the stage
-        self._before = 0.0
+        self._before = self._left_s = 0.0
+
+    @property
+    def left_stage(self) -> float:
+        """When what the last moment shows left the stage, monotonic seconds."""
+        return self._left_s
 
     @property
     def newest(self) -> float | None:
@@ -63,23 +73,22 @@ class Interpolation:
         if not self._seen:
             return None
         danced_s = max(now - TICK_S - (self._latency_s or 0.0), self._seen[0].time)
-        time_s = danced_s + self._prediction_s
         after = next((k for k, seen in enumerate(self._seen) if seen.time > danced_s), len(self._seen))
         before = self._seen[after - 1]
-        figures = before.ahead
+        figures, ticks = before.ahead, (danced_s - before.time) / TICK_S
         if after < len(self._seen):
-            figures = _between(before, self._seen[after], danced_s)
-        trail = [seen for seen in self._seen if time_s - TRAIL_S <= seen.time <= time_s] or [before]
+            later = self._seen[after]
+            figures = _between(before, later, danced_s)
+            ticks = (danced_s - before.time) / (later.time - before.time) * (later.tick - before.tick)
+        time_s = TICK_S * (before.tick + ticks) + self._prediction_s
+        trail = [seen for seen in self._seen if time_s - TRAIL_S <= seen.danced_s <= time_s] or [before]
         trails = zip(*(seen.figures for seen in trail), strict=True)
         puppets = (
             PuppetMoment(now.positions, now.world, [(one.positions, one.world) for one in before], now.holds)
             for now, before in zip(figures, trails, strict=True)
         )
-        return Moment(time_s, [seen.time for seen in trail], tuple(puppets))
-
-    def left_stage(self, moment: Moment) -> float:
-        """When what this moment shows left the stage, monotonic seconds."""
-        return min(moment.time_s - self._prediction_s, self._seen[-1].time) + (self._latency_s or 0.0)
+        self._left_s = min(danced_s, self._seen[-1].time) + (self._latency_s or 0.0)
+        return Moment(time_s, [seen.danced_s for seen in trail], tuple(puppets))
 
     def _note(self, frame: JointFrame) -> None:
         if frame.tick <= self._tick or (self._seen and frame.frame_time <= self._seen[-1].time):

@@ -125,7 +125,7 @@ class Projector:
             return None
         level = show_state.level(now) * presence
         is_drawn = self._painter is not None and moment is not None and level > 0.0
-        size = picture_size(self._config, display, share)
+        size = self._picture_size(display, share)
         detail = self._detail if share == 1.0 else DETAILS[0]
         wall = self._final.wall(screen, display, self._controls, level, size, lines, detail)
         if self._painter is not None and moment is not None and is_drawn:
@@ -144,19 +144,24 @@ class Projector:
         if wall.framebuffer is not screen or not is_drawn:
             seen = min(level, show_state.level(now)) if is_drawn else 0.0
             self._final.draw(screen, display, self._controls, seen, lines)
-        self._final.mask(screen, display, self._controls)
+        self._final.darken(screen, display, self._controls)
         is_fresh = newest is not None and now - newest < STALE_S
-        return self._poses.left_stage(moment) if self._poses and moment and is_drawn and is_fresh else None
+        return self._poses.left_stage if self._poses and moment and is_drawn and is_fresh else None
 
     def _draw_test_card(self, screen: moderngl.Framebuffer, display: Size, lines: tuple[str, ...]) -> None:
         """Made again where words or size have changed. The line that begins with PAGE is its address."""
-        size = picture_size(self._config, display)
+        size = self._picture_size(display)
+        blend = self._config.edge_blend
+        shared = None if blend is None else (blend.part, self._controls.alignment.overlap)
         if self._test_card is None or self._test_card_of != (size, lines):
             address = next((line.removeprefix(PAGE) for line in lines if line.startswith(PAGE)), "")
-            self._test_card, self._test_card_of = test_card(size, lines, address), (size, lines)
+            self._test_card, self._test_card_of = test_card(size, lines, address, shared), (size, lines)
         self._final.show_image(self._test_card)
         self._final.draw(screen, display, self._controls, 1.0, ())
-        self._final.mask(screen, display, self._controls)
+        self._final.darken(screen, display, self._controls)
+
+    def _picture_size(self, display: Size, share: float = 1.0) -> Size:
+        return picture_size(self._config, display, self._controls.alignment.overlap, share)
 
     def release(self) -> None:
         """Give the GPU's memory back."""
@@ -201,7 +206,7 @@ class Projector:
         self._painter = self._make_painter(self._gl, show.skeleton, show.looks, show.directory)
         self._cards = Cards(self._gl, show.cards, show.directory, self._say)
         for part in (SHARES[-1], share):
-            size = picture_size(self._config, display, part)
+            size = self._picture_size(display, part)
             wall = self._final.wall(screen, display, self._controls, 1.0, size)
             for look in show.looks:
                 self._painter.draw(moment, look, look, 0.5, wall)
@@ -213,7 +218,7 @@ class Projector:
         self, moment: Moment, show: ShownShow, screen: moderngl.Framebuffer, display: Size
     ) -> Detail:
         """Measured with the look that takes longest."""
-        size = picture_size(self._config, display)
+        size = self._picture_size(display)
 
         def drawn(look: str, detail: Detail) -> None:
             assert self._painter is not None

@@ -30,7 +30,8 @@ class PuppetMoment:
 class Moment:
     """The input of a look: all puppets, interpolated to one time.
 
-    time_s: the dance's time of this picture, monotonic seconds;
+    time_s: the dance's time of this picture: ticks of 20 ms since its first one, so that each box that dances
+    it has its camera, haze and dust in the same place;
     trail_times: the ticks of the last TRAIL_S, seconds, same clock, ascending, none later than time_s, never
     empty.
 

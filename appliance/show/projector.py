@@ -13,20 +13,26 @@ Size = Annotated[
     tuple[Annotated[int, Field(ge=64, le=16384)], Annotated[int, Field(ge=64, le=16384)]], Field(strict=False)
 ]
 _Part = Annotated[float, Field(ge=-1, le=2)]
+LEAST_TO_MOST_OVERLAP, LEAST_TO_MOST_GAMMA = (0.01, 0.5), (1.0, 3.0)
 _Point = Annotated[tuple[_Part, _Part], Field(strict=False)]
 
 
 class EdgeBlendConfig(Section):
-    """Two projectors side by side, each with its own box file; their pictures blend into one."""
+    """Two projectors side by side, or one above the other, each with its own box file; their pictures blend
+    into one."""
 
-    part: Literal["left", "right"] = key("The part of the wide picture that this projector shows.")
+    part: Literal["left", "right", "top", "bottom"] = key(
+        "The part of the picture that this projector shows."
+    )
     overlap: float = key(
-        "Fraction of this projector's width that the other one also lights.", 0.15, within=(0.01, 0.5)
+        "Fraction of this projector's width (its height for top and bottom) that the other one also lights.",
+        0.15,
+        within=LEAST_TO_MOST_OVERLAP,
     )
     gamma: float = key(
         "The projector's gamma: with the right one the overlap is neither brighter nor darker.",
         2.2,
-        within=(1.0, 3.0),
+        within=LEAST_TO_MOST_GAMMA,
     )
 
 

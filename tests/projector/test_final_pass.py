@@ -14,7 +14,7 @@ from appliance.projector.alignment import Alignment
 from appliance.projector.context import offscreen
 from appliance.projector.controls import Controls
 from appliance.projector.corners import Corners
-from appliance.projector.final_pass import FinalPass, part_of, picture_size
+from appliance.projector.final_pass import FinalPass
 from appliance.projector.info import letters
 from appliance.projector.warp import FINE, on_display
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
@@ -129,30 +129,6 @@ def test_gamma_lifts_the_dark_tones_and_keeps_black_and_white(show: Show) -> Non
     assert (show(flat(255), gamma=2.0) == 255).all() and not show(flat(0), gamma=2.0).any()
 
 
-@pytest.mark.parametrize("overlap", [0.1, 0.25, 0.5])
-def test_two_blended_projectors_light_the_wall_evenly(show: Show, overlap: float) -> None:
-    sides = []
-    for part in ("left", "right"):
-        blend = EdgeBlendConfig(part=part, overlap=overlap, gamma=2.2)
-        width, _ = picture_size(ProjectorConfig(edge_blend=blend), SIZE)
-        sides.append(show(flat(220, width), edge_blend=blend)[45, :, 0] / 255)
-    shared = round(overlap * SIZE[0])
-    left, right = (side**2.2 for side in sides)
-    wall = np.concatenate([left[:-shared], left[-shared:] + right[:shared], right[shared:]])
-    assert wall == pytest.approx((220 / 255) ** 2.2, abs=0.02)
-
-
-def test_each_blended_projector_shows_its_part(show: Show) -> None:
-    blends = [EdgeBlendConfig(part=part, overlap=0.25) for part in ("left", "right")]
-    width, height = picture_size(ProjectorConfig(edge_blend=blends[0]), SIZE)
-    assert (width, height) == (280, 90)
-    ramp = np.repeat(np.linspace(0, 250, width)[None, :, None], 3, axis=2).repeat(height, 0).astype(np.uint8)
-    left, right = (show(ramp, edge_blend=blend)[45, :, 0] for blend in blends)
-    assert np.abs(left[:110].astype(int) - ramp[0, :110, 0]).max() <= 2
-    assert np.abs(right[50:].astype(int) - ramp[0, 170:, 0]).max() <= 2
-    assert part_of(None).width == 1.0
-
-
 def test_grid_corner_mark_and_figures_only_on_demand(show: Show) -> None:
     assert not show(flat(0)).any()
     controls = Controls(Alignment(), lambda _: None)
@@ -175,18 +151,6 @@ def test_the_grid_is_clear_on_white_paper(show: Show) -> None:
     assert np.percentile(light, 95) - np.percentile(light, 30) > 120
 
 
-def test_the_grid_of_two_projectors_meets(show: Show) -> None:
-    """Where both light the wall they show the same line."""
-    controls = Controls(Alignment(), lambda _: None)
-    controls.set_grid(True)
-    columns = []
-    for part in ("left", "right"):
-        blend = EdgeBlendConfig(part=part, overlap=0.5)
-        columns.append(show(flat(0, 240), controls=controls, edge_blend=blend)[..., 0])
-    between = np.r_[20:38, 52:70]  # rows without numbers and names
-    assert np.abs(columns[0][between, 80:].astype(int) - columns[1][between, :80]).max() <= 2
-
-
 @pytest.mark.parametrize(("picture", "width"), [(None, 70), ((120, 90), 93)])
 def test_the_grid_has_a_circle_as_round_as_the_picture_is_drawn(
     show: Show, picture: tuple[int, int] | None, width: int
@@ -204,7 +168,7 @@ def test_the_grid_has_a_circle_as_round_as_the_picture_is_drawn(
 
 def test_the_grid_numbers_the_corners_and_names_the_projector(show: Show) -> None:
     corners = ((0.1, 0.1), (0.9, 0.1), (0.95, 0.95), (0.05, 0.9))
-    controls = Controls(Alignment(corners), lambda _: None)
+    controls = Controls(Alignment(corners, overlap=0.5), lambda _: None)
     controls.set_grid(True)
     grids = [
         show(flat(0, 240), controls=controls, edge_blend=EdgeBlendConfig(part=part, overlap=0.5))

@@ -8,11 +8,10 @@ import moderngl
 import numpy as np
 import pytest
 
+from appliance.outputs.coupling import LAGS, ROW_S, ROWS, coupled, led_by
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
-from appliance.projector.picture.led import LAGS, coupled, led_by
 from appliance.projector.picture.looks.strings import tied
-from appliance.projector.picture.poses import ROW_S, ROWS, Poses
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import draw_still, moment_of
 from tests.projector import skeletons
@@ -21,7 +20,7 @@ from tests.projector.golden_looks import AT_S, SIZE
 HAND, FOLLOWER, LATE, RANDOM, STANDING = range(1, 6)
 
 
-def dance(seed: int, lag: int = 4) -> Poses:
+def dance(seed: int, lag: int = 4) -> np.ndarray:
     """A still root, a hand, a limb that does the same, one that does it later, one by itself, a still one."""
     rng = np.random.default_rng(seed)
     long = ROWS + 3 * LAGS
@@ -36,7 +35,7 @@ def dance(seed: int, lag: int = 4) -> Poses:
     places[:, HAND] = places[:, FOLLOWER] = hand[LAGS : LAGS + ROWS]
     places[:, LATE] = hand[LAGS + lag : LAGS + lag + ROWS]
     places[:, RANDOM] = other[:ROWS]
-    return Poses(places.astype(np.float32), np.tile(np.float32([1, 0, 0, 0]), (ROWS, 6, 1)))
+    return places.astype(np.float32)
 
 
 def holds(firmly: float = 1.0) -> np.ndarray:
@@ -88,15 +87,15 @@ def test_strings_run_from_the_held_joint(gl: moderngl.Context, dance: Recording,
 def test_partners_are_coupled_where_they_move_alike_and_strangers_are_not() -> None:
     """Null: another dance. It makes no difference which of the two is late."""
 
-    def later(poses: Poses, rows: int) -> Poses:
-        return Poses(np.roll(poses.positions, rows, axis=0), poses.world)
+    def later(trail: np.ndarray, rows: int) -> np.ndarray:
+        return np.roll(trail, rows, axis=0)
 
-    def slower(poses: Poses) -> Poses:
+    def slower(trail: np.ndarray) -> np.ndarray:
         """In another rhythm: all dances of this test have the same one."""
         at = 0.6 * np.arange(ROWS)
         low = at.astype(int)
         part = (at - low)[:, None, None].astype(np.float32)
-        return Poses((1 - part) * poses.positions[low] + part * poses.positions[low + 1], poses.world)
+        return np.asarray((1 - part) * trail[low] + part * trail[low + 1])
 
     seeds = range(20)
     alike, late, strangers = (

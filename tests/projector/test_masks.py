@@ -35,7 +35,7 @@ def masked(
     final = FinalPass(gl, ProjectorConfig(masks=[MaskConfig(**mask) for mask in masks], **config))
     for _ in range(2):  # the second time from what was kept
         gl.screen.clear(1.0, 1.0, 1.0, 1.0)
-        final.mask(gl.screen, SIZE, controls)
+        final.darken(gl.screen, SIZE, controls)
     found = pixels(gl.screen, SIZE)[..., 0].astype(int)
     final.release()
     return found
@@ -81,6 +81,6 @@ def test_under_the_grid_masks_let_through_what_they_hide(gl: moderngl.Context) -
     controls.set_grid(True)
     final = FinalPass(gl, ProjectorConfig(masks=[MaskConfig(points=DOOR, soft=0.0)]))
     gl.screen.clear(1.0, 1.0, 1.0, 1.0)
-    final.mask(gl.screen, SIZE, controls)
+    final.darken(gl.screen, SIZE, controls)
     assert abs(int(pixels(gl.screen, SIZE)[60, 60, 0]) - 255 * (1 - GHOST)) <= 1
     final.release()

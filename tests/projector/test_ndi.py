@@ -48,7 +48,7 @@ void NDIlib_send_send_video_v2(void *told, const frame_t *f) {
 
 
 @pytest.fixture
-def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """What the library was given, a line each."""
     (tmp_path / "ndi.c").write_text(LIBRARY)
     made = ["cc", "-shared", "-fPIC", "-o", tmp_path / "libndi.so.6", tmp_path / "ndi.c"]
@@ -62,7 +62,7 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     ("has_alpha", "pixels"),
     [(False, "RGBX 25/1 1 1 ff000007000064"), (True, "RGBA 25/1 1 1 ff0000ff0000ff64")],
 )
-def test_receivers_get_the_upright_picture(told: Path, has_alpha: bool, pixels: str) -> None:
+def test_receivers_get_the_upright_picture(reported: Path, has_alpha: bool, pixels: str) -> None:
     feed = Feed(
         StreamConfig(port=free_ports(1, socket.SOCK_STREAM)[0], ndi="Bunraku", ndi_alpha=has_alpha),
         pytest.fail,
@@ -73,25 +73,25 @@ def test_receivers_get_the_upright_picture(told: Path, has_alpha: bool, pixels: 
         assert time.monotonic() < until
         feed.offer(time.monotonic(), (1, 2), lambda: RED_OVER_DARK_BLUE)
         time.sleep(0.01)
-        lines = told.read_text().splitlines() if told.exists() else []
+        lines = reported.read_text().splitlines() if reported.exists() else []
     feed.close()
     assert lines[0] == "Bunraku 00"
     assert lines[1].startswith(f"1x2 {pixels}")
 
 
 def test_a_library_that_never_returns_is_started_again_and_no_picture_waits(
-    told: Path, monkeypatch: pytest.MonkeyPatch
+    reported: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The receiver's network is gone in the middle of a picture; later it is back."""
     monkeypatch.setenv("NDI_HANGS", "1")
     said: list[str] = []
     feed = Feed(StreamConfig(port=free_ports(1, socket.SOCK_STREAM)[0], ndi="Bunraku"), said.append)
     until, longest_s = time.monotonic() + WITHIN_S, 0.0
-    while not told.exists() or told.read_text().count("\n") < 3:
+    while not reported.exists() or reported.read_text().count("\n") < 3:
         began = time.monotonic()
         assert began < until
         feed.offer(began, (1, 2), lambda: RED_OVER_DARK_BLUE)
-        if told.exists() and told.read_text().count("\n") == 2:  # it hangs with its first picture
+        if reported.exists() and reported.read_text().count("\n") == 2:  # it hangs with its first picture
             monkeypatch.delenv("NDI_HANGS", raising=False)
             longest_s = max(longest_s, time.monotonic() - began)
         time.sleep(0.01)

@@ -84,7 +84,7 @@ def test_all_of_them_are_interpolated_to_one_time() -> None:
     one, other = moment.puppets
     assert other.positions == pytest.approx(one.positions + 1.0)
     assert other.holds == pytest.approx(0.5 * np.asarray(one.holds))
-    assert one.positions[0, 0] == pytest.approx(SPEED * moment.time_s, rel=1e-5)
+    assert one.positions[0, 0] == pytest.approx(SPEED * (10.0 + moment.time_s), rel=1e-5)
     assert len(other.trail) == len(one.trail) == len(moment.trail_times)
 
 

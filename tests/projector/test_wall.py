@@ -87,7 +87,7 @@ def test_a_smaller_picture_is_softer_and_otherwise_the_same(
         for style in STYLES:
             shown = []
             for part in (1.0, share):
-                size = picture_size(ProjectorConfig(), display, part)
+                size = picture_size(ProjectorConfig(), display, 0.0, part)
                 wall = final.wall(screen, display, controls, 0.8, size)
                 looks.draw(moment, style, style, 1.0, wall)
                 if wall.framebuffer is not screen:
@@ -105,7 +105,7 @@ def test_cost_with_the_last_step_at_1080p(gl: moderngl.Context, dance: Recording
         final = FinalPass(gl, ProjectorConfig())
 
         def draw(style: str, share: float) -> None:
-            size = picture_size(ProjectorConfig(), FULL_HD, share)
+            size = picture_size(ProjectorConfig(), FULL_HD, 0.0, share)
             wall = final.wall(gl.screen, FULL_HD, controls, 1.0, size)
             looks.draw(moment_of(dance, AT_S), style, style, 1.0, wall)
             if wall.framebuffer is not gl.screen:

@@ -2,12 +2,13 @@
 import { command, say } from "./device.js";
 import { byId, first } from "./elements.js";
 import { held } from "./hold.js";
+import { words } from "./words.js";
 
 const CORNERS = [[0, 0], [1, 0], [1, 1], [0, 1]]; // in the projector's order, and where they are without any change
 const SWITCHES = ["grid", "test_card", "info"]; // what the projector calls them, and their addresses
 const STEP_S = 0.12, NUDGE = 0.002;
 const OWN_MS = 2500; // the projector tells once a second: until then this page's own change is the newest
-const before = []; // corners before each change made here, for undo
+const before = []; // for undo: the corners, or the pull of a point of the mesh, before each change made here
 const MESH = 5; // points across and down
 const INNER = [...Array(MESH * MESH).keys()].filter((place) => ![0, MESH - 1, MESH * (MESH - 1), MESH * MESH - 1].includes(place));
 let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]), pulls = [];
@@ -19,7 +20,17 @@ const CORNER = {
   show: (place, point) => put(shown.map((one, other) => other === place ? point : one)),
   remember,
 };
-const POINT = { address: "/projector/warp", at: meshPoint, show: layPoint, remember: () => {} };
+const POINT = {
+  address: "/projector/warp",
+  at: meshPoint,
+  show: layPoint,
+  remember: (place) => note({ place, pull: pulls[place] ?? [0, 0] }),
+};
+// With edge blend: a step of each value, and how it is said.
+const BLEND = {
+  overlap: [0.002, (value) => `${(100 * value).toFixed(1)} %`],
+  blend_gamma: [0.05, (value) => value.toFixed(2)],
+};
 
 export function initPicture() {
   for (const id of SWITCHES) {
@@ -44,9 +55,15 @@ export function initPicture() {
   byId("mesh").addEventListener("click", () => {
     const isOn = byId("corners").classList.toggle("meshed");
     byId("mesh").setAttribute("aria-pressed", String(isOn));
+    byId("mesh-reset").hidden = !isOn;
   });
+  for (const id of Object.keys(BLEND)) byId("blend").append(stepper(id));
   held(byId("mesh-reset"), async () => {
-    if (await command("/projector/warp/reset")) lay([]);
+    if (!await command("/projector/warp/reset")) return;
+    ownUntil = performance.now() + OWN_MS;
+    lay([]);
+    before.splice(0, before.length, ...before.filter((one) => one.corners));
+    tellUndo();
   }, (sentence) => say(sentence));
   put(shown);
 }
@@ -62,6 +79,8 @@ export function showPicture(value) {
   if (document.activeElement !== byId("brightness")) byId("brightness").value = Math.round(100 * wall.brightness);
   tellBrightness();
   for (const id of SWITCHES) byId(id).setAttribute("aria-pressed", String(wall[id] === true));
+  byId("blend").hidden = !wall.overlap;
+  for (const [id, [, said]] of Object.entries(BLEND)) if (wall.overlap) byId(id).textContent = said(wall[id]);
   pulls = wall.warp ?? [];
   put(wall.corners);
 }
@@ -75,22 +94,27 @@ async function switchOn(id, address, on) {
 }
 
 async function change(address, given, corners) {
-  before.push(shown.map((one) => [...one]));
+  remember();
   if (await command(address, ...given)) {
     ownUntil = performance.now() + OWN_MS;
     put(corners);
   } else before.pop();
-  byId("corners-undo").disabled = before.length === 0;
+  tellUndo();
 }
 
 async function undo() {
-  const corners = before.at(-1);
-  if (!corners || !await command("/projector/corners", ...corners.flat())) return;
+  const { corners, place, pull } = before.at(-1) ?? {};
+  if (corners && await command("/projector/corners", ...corners.flat())) put(corners);
+  else if (pull && await command(POINT.address, place + 1, ...away(pull, pulls[place]))) {
+    pulls[place] = pull;
+    lay(pulls);
+  } else return;
   before.pop();
   ownUntil = performance.now() + OWN_MS;
-  byId("corners-undo").disabled = before.length === 0;
-  put(corners);
+  tellUndo();
 }
+
+function away([x, y], [fromX, fromY] = [0, 0]) { return [x - fromX, y - fromY]; }
 
 // The whole pad is what the projector can light; the handles stay inside of it.
 function put(corners) {
@@ -105,14 +129,14 @@ function put(corners) {
   lay(pulls);
 }
 
-// The mesh hangs between the corners; each of its points is pulled from there.
+// The mesh hangs between the corners, in perspective as on the wall (corners.py); its points are pulled from there.
 function meshPoint(place) {
   const u = place % MESH / (MESH - 1), v = Math.floor(place / MESH) / (MESH - 1), [dx, dy] = pulls[place] ?? [0, 0];
-  const mixed = [0, 1].map((axis) => {
-    const [a, b, c, d] = shown.map((corner) => corner[axis]);
-    return (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * c);
-  });
-  return [mixed[0] + dx, mixed[1] + dy];
+  const [[x0, y0], [x1, y1], [x2, y2], [x3, y3]] = shown;
+  const [ax, ay, bx, by] = [x1 - x2, y1 - y2, x3 - x2, y3 - y2], [sx, sy] = [x0 - x1 + x2 - x3, y0 - y1 + y2 - y3];
+  const area = ax * by - ay * bx, g = (sx * by - sy * bx) / area, h = (ax * sy - ay * sx) / area, w = g * u + h * v + 1;
+  const x = (x1 - x0 + g * x1) * u + (x3 - x0 + h * x3) * v + x0, y = (y1 - y0 + g * y1) * u + (y3 - y0 + h * y3) * v + y0;
+  return [x / w + dx, y / w + dy];
 }
 
 function lay(warp) {
@@ -123,8 +147,32 @@ function lay(warp) {
 function layPoint(place, [x, y]) {
   const button = byId("corners").querySelector(`[data-point="${place}"]`);
   if (!button) return;
-  button.style.left = `calc(${100 * x}% - 20px)`;
-  button.style.top = `calc(${100 * y}% - 20px)`;
+  button.style.left = `clamp(2px, ${100 * x}% - 20px, 100% - 42px)`;
+  button.style.top = `clamp(2px, ${100 * y}% - 20px, 100% - 42px)`;
+}
+
+// A value between two buttons, each press one fine step.
+function stepper(id) {
+  const [step, say] = BLEND[id], row = document.createElement("div"), what = document.createElement("span");
+  const value = document.createElement("b"), to = (sign) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = sign < 0 ? "−" : "+";
+    button.setAttribute("aria-label", `${words(id)} ${button.textContent}`);
+    button.addEventListener("click", async () => {
+      const wanted = wall[id] + sign * step;
+      if (!await command(`/projector/${id}`, wanted)) return;
+      ownUntil = performance.now() + OWN_MS;
+      wall[id] = wanted;
+      value.textContent = say(wanted);
+    });
+    return button;
+  };
+  row.className = "stepper";
+  what.textContent = words(id);
+  value.id = id;
+  row.append(what, to(-1), value, to(1));
+  return row;
 }
 
 function handle(place, what) {
@@ -165,7 +213,7 @@ function handle(place, what) {
   button.addEventListener("pointermove", (event) => {
     if (!from) return;
     const pad = byId("corners").getBoundingClientRect();
-    if (!at[0] && !at[1]) what.remember();
+    if (!at[0] && !at[1]) what.remember(place);
     at = [(event.clientX - from[0]) / pad.width, (event.clientY - from[1]) / pad.height];
     what.show(place, [start[0] + at[0], start[1] + at[1]]);
   });
@@ -182,13 +230,17 @@ function handle(place, what) {
     const way = ways[event.key];
     if (!way) return;
     event.preventDefault();
-    if (!event.repeat) what.remember();
+    if (!event.repeat) what.remember(place);
     await command(what.address, place + 1, NUDGE * way[0], NUDGE * way[1]);
   });
   return button;
 }
 
-function remember() {
-  before.push(shown.map((one) => [...one]));
-  byId("corners-undo").disabled = false;
+function remember() { note({ corners: shown.map((one) => [...one]) }); }
+
+function note(one) {
+  before.push(one);
+  tellUndo();
 }
+
+function tellUndo() { byId("corners-undo").disabled = before.length === 0; }

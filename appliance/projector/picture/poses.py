@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
 from appliance.body.skinning import BodyMesh, dual_quaternions
+from appliance.outputs.coupling import ROW_S as ROW_S
+from appliance.outputs.coupling import ROWS as ROWS
+from appliance.outputs.coupling import rows_between
+from appliance.outputs.joint_frame import Floats as Floats
 from appliance.projector.moment import Moment, PuppetMoment
-
-ROWS = 48
-ROW_S = 0.025  # from one row to the next; 48 of them reach 1.175 s back
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -75,10 +73,8 @@ def poses_of(moment: Moment, puppet: PuppetMoment, height: float, sole: float) -
     times = np.array([*moment.trail_times, moment.time_s])
     positions = np.stack([*(at for at, _ in puppet.trail), puppet.positions])
     world = np.stack([*(turn for _, turn in puppet.trail), puppet.world])
-    at = np.clip(moment.time_s - ROW_S * np.arange(ROWS), times[0], times[-1])
-    after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
-    step = np.maximum(times[after] - times[after - 1], 1e-9)
-    share = np.clip((at - times[after - 1]) / step, 0.0, 1.0)[:, None, None].astype(np.float32)
+    after, shares = rows_between(times, moment.time_s)
+    share = shares[:, None, None]
     between = positions[after - 1] * (1 - share) + positions[after] * share
     earlier, later = world[after - 1], world[after]
     agrees = np.sum(earlier * later, axis=-1, keepdims=True) >= 0

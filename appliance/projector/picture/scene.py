@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from appliance.body.mesh_file import mesh_of_show
 from appliance.body.skinning import BodyMesh
+from appliance.outputs.coupling import coupled, led_by
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.picture.body_buffers import BodyBuffers
 from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import read_image, texture_of
-from appliance.projector.picture.led import coupled, led_by
 from appliance.projector.picture.noise import SIDE, noise_pixels
 from appliance.projector.picture.poses import Floats, HoldTexture, Poses, PoseTexture
 from appliance.projector.picture.targets import Target
@@ -176,7 +176,7 @@ class Easel:
         """Bring onto the GPU how far joints follow the held one; returns the joint that leads each figure."""
         leaders = []
         for textures, one, held in zip(self._figures, self._poses, self._holds, strict=False):
-            leader, led = led_by(one, held)
+            leader, led = led_by(one.positions, held)
             textures.led.write(led)
             leaders.append(leader)
         return leaders
@@ -186,7 +186,7 @@ class Easel:
         inputs hold until the next pair.
         """
         for first, second in itertools.combinations(range(self._shown), 2):
-            self._coupled.write(coupled(self._poses[first], self._poses[second]))
+            self._coupled.write(coupled(self._poses[first].positions, self._poses[second].positions))
             others = self._figures[second].inputs["poses"]
             yield first, {"led": self._coupled.texture, "others": others}
 

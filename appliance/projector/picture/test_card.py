@@ -20,11 +20,18 @@ OVERSCAN = (0.025, 0.05)  # shares of the picture that a display may cut off at 
 _COLOURS = ("#ffffff", "#ffff00", "#00ffff", "#00ff00", "#ff00ff", "#ff0000", "#0000ff")
 _FOCUS = (1, 2, 3)  # pixels: widths of lines
 _STAR = 36  # spokes
+_OVERLAP = (255, 128, 0)
 _FAINT = 44  # level of the squares' lines, of 255
 
 
-def test_card(size: tuple[int, int], lines: Sequence[str], address: str = "") -> Image:
-    """(height, width, 3), top row first. lines: words in its middle; address: as a QR code, '': none."""
+def test_card(
+    size: tuple[int, int], lines: Sequence[str], address: str = "", shared: tuple[str, float] | None = None
+) -> Image:
+    """(height, width, 3), top row first. lines: words in its middle; address: as a QR code, '': none.
+
+    shared: which part of the picture this projector lights, and the overlap as a fraction of it: the overlap
+    is marked, and the words are where only this projector lights.
+    """
     width, height = size
     image = Files.new("RGB", size, (0, 0, 0))
     draw = ImageDraw.Draw(image)
@@ -36,7 +43,11 @@ def test_card(size: tuple[int, int], lines: Sequence[str], address: str = "") ->
     for x in (width / 2 - 23.7 * unit, width / 2 + 23.7 * unit):
         _star(draw, x, height / 2 - 3.6 * unit, 4.2 * unit)
         _focus(draw, x, height / 2 + 2.3 * unit, unit)
-    _lettering(image, lines, address, unit)
+    area = (0.0, 0.0, float(width), float(height))
+    if shared is not None:
+        area = _overlap(draw, width, height, unit, *shared)
+        lines = [*lines, f"{shared[0]}, overlap {100 * shared[1]:.1f} %"]
+    _lettering(image, lines, address, unit, area)
     return np.asarray(image)
 
 
@@ -115,8 +126,31 @@ def _focus(draw: ImageDraw.ImageDraw, x: float, y: float, unit: float) -> None:
                 draw.rectangle(box, fill=(255, 255, 255))
 
 
-def _lettering(image: Files.Image, lines: Sequence[str], address: str, unit: float) -> None:
-    """The words, and the address as a QR code beside them."""
+def _overlap(
+    draw: ImageDraw.ImageDraw, width: int, height: int, unit: float, part: str, overlap: float
+) -> tuple[float, float, float, float]:
+    """Two lines around what both projectors light; returns left, top, width, height of the room for words."""
+    is_across = part in ("left", "right")
+    whole = width if is_across else height
+    half = 0.5 * whole * overlap / (2.0 - overlap)
+    for at in (round(whole / 2 - half), round(whole / 2 + half)):
+        ends = [(at, 0), (at, height)] if is_across else [(0, at), (width, at)]
+        draw.line(ends, _OVERLAP, max(1, round(unit / 15)))
+    room = whole / 2 - max(half, (28.5 if is_across else 17.0) * unit)
+    start = 0.0 if part in ("left", "top") else whole - room
+    return (start, 0.0, room, float(height)) if is_across else (0.0, start, float(width), room)
+
+
+def _lettering(
+    image: Files.Image,
+    lines: Sequence[str],
+    address: str,
+    unit: float,
+    area: tuple[float, float, float, float],
+) -> None:
+    """The words, and the address as a QR code beside them, in the middle of an area."""
+    area_left, top, width, height = area
+    unit = min(unit, width / 32.0)
     parts: list[Files.Image] = []
     if address:
         code = np.array([list(row) for row in segno.make(address, error="m", micro=False).matrix], bool)
@@ -132,7 +166,7 @@ def _lettering(image: Files.Image, lines: Sequence[str], address: str, unit: flo
         ground.paste(text, (0, 0), text)
         parts.append(ground)
     gap = round(unit) if len(parts) > 1 else 0
-    left = (image.width - sum(part.width for part in parts) - gap) // 2
+    left = round(area_left + (width - sum(part.width for part in parts) - gap) / 2)
     for part in parts:
-        image.paste(part, (left, (image.height - part.height) // 2))
+        image.paste(part, (left, round(top + (height - part.height) / 2)))
         left += part.width + gap

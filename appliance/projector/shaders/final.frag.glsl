@@ -1,8 +1,9 @@
 // The picture onto the wall: corner-pin, mirror; GAMMA, BLEND for edge blend, DIM for brightness, MARKS.
 // WARP: the picture is pulled by a mesh, and each pixel of the wall looks for its place in it.
+// EDGES: the light that the blended edge leaves of a picture that is on the display already.
 
 uniform sampler2D picture;         // what the looks have drawn; with edge blend wider than this display
-uniform vec2 part;                 // where this part begins in the picture, and how wide it is
+uniform vec4 part;                 // where this part begins in the picture, and its size; y down
 #ifdef DIM
 uniform float scale;               // brightness * level
 uniform vec2 seed;                 // another pattern of dither for each picture
@@ -16,12 +17,12 @@ uniform float inverse_gamma;
 #endif
 
 #ifdef BLEND
-uniform vec3 blend;                // -1 left, 1 right; overlap, share of this part's width; 1 / gamma
+uniform vec4 blend;                // the way to the other part, y down; overlap, a share of this part; 1 / gamma
 
 // Both ramps of an overlap add up to one in linear light.
-float blended(float u) {
-    float from_edge = clamp((blend.x < 0.0 ? 1.0 - u : u) / blend.y, 0.0, 1.0);
-    return pow(smoothstep(0.0, 1.0, from_edge), blend.z);
+float blended(vec2 uv) {
+    float from_edge = clamp((0.5 - dot(uv - 0.5, blend.xy)) / blend.z, 0.0, 1.0);
+    return pow(smoothstep(0.0, 1.0, from_edge), blend.w);
 }
 #endif
 
@@ -87,16 +88,21 @@ void main() {
 #endif
     vec2 pixel_size = max(fwidth(uv), 1e-9);
     float seen = projected.z > 0.0 ? coverage(uv, pixel_size) : 0.0;
+#ifdef EDGES
+    colour = vec4(vec3(seen * blended(uv)), 1.0);
+    return;
+#endif
     vec2 inside = clamp(uv, 0.0, 1.0);
 #else
     vec2 inside = uv;
 #endif
-    vec3 light = textureLod(picture, vec2(part.x + inside.x * part.y, 1.0 - inside.y), 0.0).rgb;
+    vec2 place = part.xy + inside * part.zw;
+    vec3 light = textureLod(picture, vec2(place.x, 1.0 - place.y), 0.0).rgb;
 #ifdef GAMMA
     light = pow(light, vec3(inverse_gamma));
 #endif
 #ifdef BLEND
-    light *= blended(uv.x);
+    light *= blended(uv);
 #endif
 #ifdef MARKS
     light *= seen;
@@ -106,9 +112,8 @@ void main() {
     light += noise(gl_FragCoord.xy) / 255.0 * step(0.5 / 255.0, light);
 #endif
 #ifdef MARKS
-    vec2 across = vec2(part.x + uv.x * part.y, uv.y);
     light *= 1.0 - 0.65 * grid;  // else its lines are lost on paper
-    light = mix(light, vec3(0.9), grid * seen * grid_lines(across, pixel_size * vec2(part.y, 1.0)));
+    light = mix(light, vec3(0.9), grid * seen * grid_lines(part.xy + uv * part.zw, pixel_size * part.zw));
     float ring = abs(distance(wall, marker.xy) - marker.z);
     if (marker.z > 0.0) light = mix(light, vec3(1.0, 0.6, 0.1), 1.0 - clamp(ring - 2.0, 0.0, 1.0));
     float ink = texelFetch(text, ivec2(wall / text_scale), 0).r;
