@@ -32,30 +32,29 @@ class Outputs:
         self.receivers: tuple[DatagramSender, ...] = (*self._osc.receivers, *self._posistagenet)
         self._shared: FrameWriter | None = None
         self.may_speak: Callable[[], bool] | None = None  # asked before each frame, on a box with a pair
-
-    def mute(self, is_muted: bool) -> None:
-        """Whether receivers get nothing; the shared frame is written nonetheless."""
-        for one in self.receivers:
-            one.is_muted = is_muted
+        self.shift_s = 0.0  # frames have times of a clock that is so much behind this machine's
 
     def share(self, shared: FrameWriter) -> None:
         """Write frames to `shared` too, until `close`."""
         self._shared = shared
 
     def publish_frame(self, frame: JointFrame) -> None:
-        """Send a frame to every receiver and share it. Never waits, never raises."""
+        """Send a frame to every receiver and share it. Never waits, never raises.
+
+        A box that may not speak encodes and shares it nonetheless: its receivers' state goes on.
+        """
         if self.may_speak is not None:
-            self.mute(not self.may_speak())
+            is_muted = not self.may_speak()
+            for one in self.receivers:
+                one.is_muted = is_muted
+        times = frame.frame_time, frame.sensor_arrival
+        frame.frame_time, frame.sensor_arrival = (seconds + self.shift_s for seconds in times)
         self._osc.send_frame(frame)
         for output in self._posistagenet:
             output.send_frame(frame)
         if self._shared is not None:
             self._shared.write(frame)
-
-    def shift_shared(self, seconds: float) -> None:
-        """Frames have times of a clock that is so much behind this machine's."""
-        if self._shared is not None:
-            self._shared.shift_s = seconds
+        frame.frame_time, frame.sensor_arrival = times
 
     def publish_health(self, health: Mapping[str, Any]) -> None:
         """Share how the box is; once a second, after the frame has left."""

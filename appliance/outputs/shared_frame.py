@@ -122,7 +122,7 @@ class FrameWriter:
     """
 
     def __init__(self, folder: Path, facts: Facts, monotonic: Callable[[], float] = time.monotonic) -> None:
-        self._monotonic, self.shift_s = monotonic, 0.0  # shift_s: added to a frame's times
+        self._monotonic = monotonic
         packed, layout = facts.packed(), facts.layout
         shapes = [(1, len(packed)), (HEALTH_SLOTS, HEALTH_BYTES), (FRAME_SLOTS, layout.bytes)]
         self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
@@ -140,10 +140,10 @@ class FrameWriter:
             self._payload,
             0,
             frame.tick,
-            frame.frame_time + self.shift_s,
+            frame.frame_time,
             self._monotonic(),  # after the tick's work: how long that took shifts what the projector shows
             frame.sensor_sequence,
-            frame.sensor_arrival + self.shift_s,
+            frame.sensor_arrival,
             LATE if frame.late else 0,
             self._joints,
         )

@@ -295,7 +295,7 @@ class PairedStage:
         parts.outputs.may_speak = (
             _never  # also while the leader's last ticks are run by a box that takes over
         )
-        parts.outputs.shift_shared(self.pair.offset.seconds)
+        parts.outputs.shift_s = self.pair.offset.seconds
 
     def _restore(self, keyframe: bytes) -> None:
         try:
@@ -331,7 +331,7 @@ class PairedStage:
     def _run_tick(self, item: bytes, clock: TickClock, pulse: Callable[[float, float], None]) -> None:
         recorded = np.frombuffer(item, self._layout, 1)[0]
         begun = clock.now()
-        self._parts.outputs.shift_shared(self.pair.offset.seconds)
+        self._parts.outputs.shift_s = self.pair.offset.seconds
         slot = self._rerun.dance(recorded)
         self._last, self._has_danced = (slot.tick, slot.deadline), True
         self._comparison.look(recorded, self._tick)
@@ -371,7 +371,7 @@ class PairedStage:
         self.pair.is_ready = True
         parts.link, parts.live_inbox = self._own_link, self._own_live
         parts.outputs.may_speak = self._may_speak
-        parts.outputs.shift_shared(0.0)
+        parts.outputs.shift_s = 0.0
         self._sent_state = None
         if self._has_danced:
             shift_times(self._tick, ahead_s)

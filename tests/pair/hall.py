@@ -19,12 +19,22 @@ from typing import Any, Self
 
 import yaml
 
+from appliance.pair.part import BoxPart, PartReader
+from appliance.sensor import wire
+from hw_sim import osc_receiver
 from tests.system.namespace import Namespace
-from tests.system.processes import BUNRAKU, Process, wait_until
+from tests.system.processes import BUNRAKU, Process, children, has_argument, run, wait_until
 
+_PSN_FRAME = 18  # after two heads of chunks, the time and the version (PosiStageNet 2.03, section 3.2)
 HALL, FIRST, SECOND = "10.77.0.9", "10.77.0.1", "10.77.0.2"
-PAIR_PORT, OSC_PORT, CONTROL_PORT = 9760, 9004, 9002
+PAIR_PORT, OSC_PORT, CONTROL_PORT, SENSORS_PORT = 9760, 9004, 9002, 9750
 KEY = "00112233445566778899aabbccddeeff"
+AHEAD_S = {FIRST: 3000.0, SECOND: 0.0}  # their monotonic clocks: the first one was switched on earlier
+_KIND = 3  # where a packet of a wearable has its kind
+_HELLO, _ASSIGNMENT, _CALL = (
+    next(kind for kind, layout in wire.LAYOUTS.items() if layout.name == name)
+    for name in ("Hello", "Assignment", "Call")
+)
 
 
 def _ip(*words: str) -> None:
@@ -88,7 +98,7 @@ class Seen:
     def __init__(self, network: Namespace) -> None:
         self.osc: list[tuple[float, str, list[Any]]] = []  # arrival, box, arguments of the frame message
         self._bundles: list[tuple[float, str, bytes]] = []
-        self.psn: list[tuple[float, str]] = []
+        self.psn: list[tuple[float, str, int]] = []  # arrival, box, number of the frame
         self.sacn: list[tuple[float, str, int, bytes]] = []  # arrival, box, priority, levels
         self.artnet: list[tuple[float, str, bytes]] = []
         with network.entered():
@@ -128,7 +138,7 @@ class Seen:
     def _note(self, name: str, at: float, host: str, data: bytes) -> None:
         if name == "psn":
             if data[:2] == b"\x55\x67":  # data, not names: PSN_DATA_PACKET
-                self.psn.append((at, host))
+                self.psn.append((at, host, data[_PSN_FRAME]))
         elif name == "sacn":
             self.sacn.append((at, host, data[108], data[126:]))
         elif name == "artnet":
@@ -155,8 +165,6 @@ class Seen:
 
 
 def _messages(data: bytes) -> list[tuple[str, list[Any]]]:
-    from hw_sim import osc_receiver
-
     return [(address, arguments) for address, arguments in osc_receiver.decode(data)]
 
 
@@ -184,21 +192,48 @@ class PairedBox(Process):
         (folder / "pair.key").write_text(KEY)
         (folder / "box.yaml").write_text(yaml.safe_dump(settings))
         command = [*BUNRAKU, "play", "--show", str(show), "--box", str(folder / "box.yaml")]
-        super().__init__(folder / "words.txt", network.command("nice", "-n", "-15", *command))
+        super().__init__(folder / "words.txt", self._inside(network, "nice", "-n", "-15", *command))
+        self._network = network
+
+    def _inside(self, network: Namespace, *command: str) -> list[str]:
+        return network.command("unshare", "--time", "--monotonic", f"{AHEAD_S[self.address]:.0f}", *command)
+
+    def ask(self, *command: str) -> tuple[int, str]:
+        """A command of bunraku at this box: its status and what it prints."""
+        done = run(self._inside(self._network, *BUNRAKU, *command, "--box", str(self.folder / "box.yaml")))
+        return done.returncode, done.stdout
+
+    def start(self) -> None:
+        self._spoke = len(self.output) if self.output_file.exists() else 0
+        super().start()
 
     @property
-    def part(self) -> Any:
-        from appliance.pair.part import PartReader
+    def part(self) -> BoxPart | None:
+        """Its stage's part; None where that is a second old: the stage is away."""
+        with contextlib.closing(PartReader(self.runtime)) as reader:
+            part = reader.read()
+        now = time.monotonic() + AHEAD_S[self.address]
+        return part if part is not None and now - part.written < 1.0 else None
 
-        reader = PartReader(self.runtime)
-        try:
-            return reader.read()
-        finally:
-            reader.close()
+    @property
+    def is_lit(self) -> bool:
+        """Whether its lights have come since it was switched on."""
+        return "Lights:" in self.output[self._spoke :]
 
-    def signal(self, number: int, children: bool = True) -> None:
-        """To the stage, and to the other processes of the box (power, or all of a machine that hangs)."""
-        for pid in [self.process.pid, *(_descendants(self.process.pid) if children else ())]:
+    def waited_ms(self) -> dict[str, float]:
+        """For how long the kernel has let its stage and its lights wait for a processor."""
+        stage = self.process.pid
+        lights = [one for one in _descendants(stage) if has_argument(one, "lights")]
+        found = {}
+        for name, pid in (("stage", stage), *(("lights", one) for one in lights)):
+            with contextlib.suppress(OSError):
+                waited_ns = Path(f"/proc/{pid}/task/{pid}/schedstat").read_text().split()[1]
+                found[name] = int(waited_ns) / 1e6
+        return found
+
+    def signal(self, number: int) -> None:
+        """To all its processes: power, or a machine that hangs."""
+        for pid in [self.process.pid, *_descendants(self.process.pid)]:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, number)
 
@@ -209,19 +244,53 @@ class PairedBox(Process):
 
 
 def _descendants(pid: int) -> list[int]:
-    found = []
-    with contextlib.suppress(OSError):
-        for task in Path(f"/proc/{pid}/task").iterdir():
-            for child in (task / "children").read_text().split():
-                found += [int(child), *_descendants(int(child))]
-    return found
+    return [one for child in children(pid) for one in (child, *_descendants(child))]
+
+
+class HallRadio:
+    """A wearable's radio: it greets both boxes, and speaks to the one that answered or called last."""
+
+    is_up = True
+
+    def __init__(self, network: Namespace) -> None:
+        with network.entered():
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._everyone = [(FIRST, SENSORS_PORT), (SECOND, SENSORS_PORT)]
+        self._to = self._everyone
+
+    @property
+    def descriptor(self) -> int:
+        return self._socket.fileno()
+
+    def send_packet(self, data: bytes) -> bool:
+        for address in self._everyone if data[_KIND] == _HELLO else self._to:
+            with contextlib.suppress(OSError):
+                self._socket.sendto(data, address)
+        return True
+
+    def receive_packet(self) -> bytes | None:
+        try:
+            data, sender = self._socket.recvfrom(2 * wire.LARGEST)
+        except OSError:
+            return None
+        if data[_KIND] in (_ASSIGNMENT, _CALL):
+            self._to = [sender]
+        return data
+
+    def close(self) -> None:
+        self._socket.close()
 
 
 class Hall:
     """A context: two boxes on one switch. first, second: None until they are switched on."""
 
-    def __init__(self, folder: Path, show: Path, *, relayed: bool = True, **more: Any) -> None:
+    def __init__(
+        self, folder: Path, show: Path, *, relayed: bool = True, paired: bool = True, **more: Any
+    ) -> None:
+        """more: of the box file. Without `paired` the boxes know nothing of each other."""
         self.folder, self.show, self._relayed, self._more = folder, show, relayed, more
+        self._paired = paired
         self._opened = ExitStack()
         self.boxes: dict[str, PairedBox] = {}
 
@@ -276,7 +345,10 @@ class Hall:
         is_first = address == FIRST
         peer = HALL if self._relayed else SECOND if is_first else FIRST
         settings: dict[str, Any] = {
-            "sensors": {"udp": {"host": "0.0.0.0", "port": 9750}, "keys": str(self.folder / "sensors.keys")},
+            "sensors": {
+                "udp": {"host": "0.0.0.0", "port": SENSORS_PORT},
+                "keys": str(self.folder / "sensors.keys"),
+            },
             "outputs": {
                 "osc": [{"host": HALL, "port": OSC_PORT, "frame_message": True, "dialect": "joint"}],
                 "posistagenet": [{"interface": address}],
@@ -294,10 +366,12 @@ class Hall:
                 "secret": "pair.key",
             },
         }
+        if not self._paired:
+            del settings["pair"]
         for section, values in self._more.items():
             settings[section] = {**settings.get(section, {}), **values}
-        for wire in settings["outputs"].get("dmx", []):
-            wire["interface"] = address
+        for one in settings["outputs"].get("dmx", []):
+            one["interface"] = address
         folder = self.folder / ("first" if is_first else "second")
         box = self.boxes[address] = PairedBox(folder, self.networks[address], address, self.show, settings)
         return box
@@ -315,9 +389,8 @@ class Hall:
 
         def are_ready() -> bool:
             parts = [box.part for box in self.boxes.values()]
-            return sum(part is not None and part.leads for part in parts) == 1 and all(
-                part is not None and (part.leads or part.is_ready) for part in parts
-            )
+            lead = [part.leads for part in parts if part is not None and (part.leads or part.is_ready)]
+            return len(lead) == len(parts) and sum(lead) == 1
 
         wait_until(are_ready, lambda: "\n".join(box.output for box in self.boxes.values()))
 

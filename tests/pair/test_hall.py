@@ -18,7 +18,7 @@ from tests.pair.faults import lost_in
 from tests.pair.hall import FIRST, SECOND, Hall
 from tests.system.lit import RIG
 from tests.system.namespace import why_not
-from tests.system.processes import run_bunraku, wait_until
+from tests.system.processes import wait_until
 
 pytestmark = pytest.mark.skipif(bool(missing := why_not()), reason=str(missing))
 
@@ -38,12 +38,6 @@ def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
         yield made
 
 
-def pair_command(hall: Hall, address: str, word: str) -> tuple[int, str]:
-    with hall.networks[address].entered():
-        done = run_bunraku("pair", word, "--box", hall.boxes[address].folder / "box.yaml")
-    return done.returncode, done.stdout
-
-
 def command(hall: Hall, address: str, osc: str, *arguments: float | str) -> None:
     """To the box's control port, from inside of it."""
     import socket
@@ -55,8 +49,9 @@ def command(hall: Hall, address: str, osc: str, *arguments: float | str) -> None
 
 
 def test_one_box_speaks_and_the_other_one_follows_without_a_difference(hall: Hall) -> None:
-    code, said = pair_command(hall, SECOND, "status")
-    assert "second box of the pair, and it follows" in said and code == 0, said
+    follows = "second box of the pair, and it follows"  # told once a second
+    wait_until(lambda: follows in hall.boxes[SECOND].ask("pair", "status")[1], "it never followed")
+    assert hall.boxes[SECOND].ask("pair", "status")[0] == 0
     since = time.time()
     command(hall, FIRST, "/hold", "lShldr", 1)
     command(hall, FIRST, "/mocap/setjointrot", "lShldr", 0.0, 0.0, 1.0, 1.2)
@@ -87,11 +82,11 @@ def test_the_second_box_takes_over_and_gives_back(hall: Hall) -> None:
     hall.boxes[SECOND].await_output("pair-taken")
 
     since = time.time()
-    code, said = pair_command(hall, SECOND, "back")
+    code, said = hall.boxes[SECOND].ask("pair", "back")
     assert code == 0, said
     wait_until(lambda: hall.leader == FIRST, "the first box never led again")
     hall.await_pair()
-    code, said = pair_command(hall, SECOND, "back")
+    code, said = hall.boxes[SECOND].ask("pair", "back")
     assert code == 1 and "follows" in said
     ticks = [arguments[0] for at, _, arguments in hall.seen.osc if at > since]
     assert all(b > a for a, b in pairwise(ticks)), "a frame was sent twice"
@@ -114,5 +109,5 @@ def test_a_box_with_another_show_does_not_follow(hall: Hall, tmp_path: Path) -> 
     hall.switch_on(follower)
     hall.show = before
     leader = hall.leader
-    wait_until(lambda: "another show" in pair_command(hall, leader, "status")[1], "it said nothing")
+    wait_until(lambda: "another show" in hall.boxes[leader].ask("pair", "status")[1], "it said nothing")
     assert not hall.boxes[follower].part.is_ready

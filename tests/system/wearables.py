@@ -45,16 +45,19 @@ class Wearables:
     def __init__(
         self,
         keys: Sequence[SensorKey],
-        port: int,
+        port: int | None = None,
         *,
+        radio: Callable[[], Sender] | None = None,
         cable: Path | None = None,
         motion: Callable[[int], Motion] = dance,
         on_sent: Callable[[Sent], None] | None = None,
     ) -> None:
+        """port: of a box on this machine; radio: makes each sensor's lane to another place."""
         self._wearers = [Wearer(motion(number), math.inf) for number in range(len(keys))]
         self.sensors = [EmulatedSensor(key, wearer) for key, wearer in zip(keys, self._wearers, strict=True)]
-        self.radios = [Radio(HOST, port) for _ in keys]
-        senders: list[dict[Lane, Sender]] = [{Lane.NETWORK: radio} for radio in self.radios]
+        self.radios = [] if port is None else [Radio(HOST, port) for _ in keys]
+        lanes = self.radios if radio is None else [radio() for _ in keys]
+        senders: list[dict[Lane, Sender]] = [{Lane.NETWORK: lane} for lane in lanes]
         if cable is not None:
             senders[0][Lane.CABLE] = SerialSender(str(cable))
         self.emulator = Emulator(self.sensors, senders, network=VenueNetwork(VENUE, 1), on_sent=on_sent)
