@@ -84,7 +84,7 @@ function spoken({ name, about, message: said }) {
 }
 
 // The first clause: the slot below has the whole sentence.
-const beginning = (sentence) => `${sentence.split(/[.:;] /)[0].replace(/\.$/, "")}.`;
+const beginning = (sentence) => `${sentence.split(/\s?[.:;] /)[0].replace(/\.$/, "")}.`;
 
 function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
@@ -123,7 +123,8 @@ function tonight(value) {
   showMidi(value.remote ?? {});
   showCues(value);
   showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
-  showChoices(byId("overlays"), byId("overlays-part"), value.cards, (name) => command("/card", name));
+  const cards = value.cards.map((one) => one.name === "none" ? { ...one, label: words("card_none") } : one);
+  showChoices(byId("overlays"), byId("overlays-part"), cards, (name) => command("/card", name));
   if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
   byId("panic").setAttribute("aria-pressed", String(Boolean(status?.panic)));
   byId("blackout").setAttribute("aria-pressed", String(Boolean(status?.blackout)));

@@ -62,9 +62,12 @@ export const clock = (seconds) =>
 export const number = (value, digits = 0) =>
   value.toLocaleString(locale, { minimumFractionDigits: digits, maximumFractionDigits: digits });
 
+// No line begins with a sign that its language sets apart from the word before: French colons, percent.
+const unbroken = (_, value) => typeof value === "string" ? value.replace(/ (?=[:;?!%»])/g, "\u00a0") : value;
+
 async function table(name) {
   try {
-    return await (await fetch(`/words/${name}.json`)).json();
+    return JSON.parse(await (await fetch(`/words/${name}.json`)).text(), unbroken);
   } catch {
     return {};
   }
