@@ -84,3 +84,26 @@ def test_orders_and_the_key_show_and_hide_it() -> None:
     controls = Controls(Alignment(), lambda _: None)
     assert controls.carry_out(Order("test_card", (1,)))[0] and controls.report()["test_card"]
     assert press(Key("T"), controls, (1280, 720)) and not controls.shows_test_card
+
+
+@pytest.mark.parametrize("overlap", [0.1, 0.25, 0.5])
+@pytest.mark.parametrize("part", ["left", "right", "top", "bottom"])
+def test_the_overlap_is_marked_and_the_words_are_beside_it(part: str, overlap: float) -> None:
+    """Even greys reach across it: where blending is wrong, they show a band."""
+    whole = 1280 * (2 - overlap), 720 * (2 - overlap)
+    size = (round(whole[0]), 720) if part in ("left", "right") else (1280, round(whole[1]))
+    image = drawn(size, LINES, ADDRESS, (part, overlap)).astype(int)
+    if part in ("top", "bottom"):
+        image = image.swapaxes(0, 1)
+    orange = np.flatnonzero((image == (255, 128, 0)).all(axis=2).mean(axis=0) > 0.95)
+    shared = (1280 if part in ("left", "right") else 720) * overlap
+    assert np.ptp(orange) == pytest.approx(shared, abs=3)
+    assert orange.mean() == pytest.approx(image.shape[1] / 2, abs=2)
+    middle = image[image.shape[0] // 2, orange[0] - 8 : orange[-1] + 8, 0]
+    assert set(middle.tolist()) == {112, 255}, "a grey and the two lines"
+    plain = drawn(size, (), "", (part, overlap)).astype(int)
+    if part in ("top", "bottom"):
+        plain = plain.swapaxes(0, 1)
+    written = np.flatnonzero((image != plain).any(axis=(0, 2)))
+    own = written < orange[0] if part in ("left", "top") else written > orange[-1]
+    assert len(written) > 50 and own.all()

@@ -20,7 +20,7 @@ OVERSCAN = (0.025, 0.05)  # shares of the picture that a display may cut off at 
 _COLOURS = ("#ffffff", "#ffff00", "#00ffff", "#00ff00", "#ff00ff", "#ff0000", "#0000ff")
 _FOCUS = (1, 2, 3)  # pixels: widths of lines
 _STAR = 36  # spokes
-_OVERLAP = (255, 128, 0)
+_OVERLAP, _EVEN = (255, 128, 0), (48, 112, 192)
 _FAINT = 44  # level of the squares' lines, of 255
 
 
@@ -129,10 +129,20 @@ def _focus(draw: ImageDraw.ImageDraw, x: float, y: float, unit: float) -> None:
 def _overlap(
     draw: ImageDraw.ImageDraw, width: int, height: int, unit: float, part: str, overlap: float
 ) -> tuple[float, float, float, float]:
-    """Two lines around what both projectors light; returns left, top, width, height of the room for words."""
+    """Two lines around what both projectors light, and even greys across it; returns the room for words: its
+    left, top, width and height.
+    """
     is_across = part in ("left", "right")
     whole = width if is_across else height
     half = 0.5 * whole * overlap / (2.0 - overlap)
+    reach = min(max(13.44 * unit, 1.5 * half), whole / 2)
+    for number, level in enumerate(_EVEN):
+        along = whole / 2 - reach, whole / 2 + reach
+        beside = [
+            (height if is_across else width) / 2 + 4.0 * unit * (number + step - 1.5) for step in (0, 1)
+        ]
+        (x0, x1), (y0, y1) = (along, beside) if is_across else (beside, along)
+        draw.rectangle([round(x0), round(y0), round(x1) - 1, round(y1) - 1], fill=(level,) * 3)
     for at in (round(whole / 2 - half), round(whole / 2 + half)):
         ends = [(at, 0), (at, height)] if is_across else [(0, at), (width, at)]
         draw.line(ends, _OVERLAP, max(1, round(unit / 15)))
