@@ -20,8 +20,8 @@ def virtual_display(size: str = "640x480") -> Iterator[str]:
     )
     os.close(writing)
     try:
-        with os.fdopen(reading) as told:
-            yield f":{told.readline().strip()}"
+        with os.fdopen(reading) as reported:
+            yield f":{reported.readline().strip()}"
     finally:
         server.terminate()
         server.wait()

@@ -39,12 +39,12 @@ _DANCED_S = 45 * 60.0  # the show has danced this long
 _LINKED_S = 15.0  # the emulated sensor is on, its neutral pose taken, and no fallback of the start in force
 
 
-def at_rest(told: str, now: float) -> str:
+def at_rest(reported: str, now: float) -> str:
     """The status that the server sends each second, as a box with nothing else to do sends it: no late
     ticks, no fallbacks, and the server's own verdict on that. now: Unix seconds, which the page shows."""
-    value = json.loads(told)
+    value = json.loads(reported)
     if value.get("status") is None:
-        return told
+        return reported
     rest = {"late": 0, "skipped": 0, "fallbacks": 0, "rate_hz": 50.0, "tick_p50_ms": 2.0, "tick_p99_ms": 4.0}
     value["status"] |= rest
     value |= {"fallbacks": [], "time": now, "since": now - _DANCED_S}

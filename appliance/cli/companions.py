@@ -119,7 +119,7 @@ class _Running:
         self._started_at = 0.0
         self._starts_at = 0.0
         self._backoff = Backoff()
-        self._told: int | None = None
+        self._reported: int | None = None
         self._is_over = False
 
     def check(self, now: float) -> None:
@@ -178,12 +178,12 @@ class _Running:
             self._start_later(f"cannot be started ({error.strerror})", now)
 
     def _environment(self) -> dict[str, str]:
-        told = {} if self._told is None else {TOLD: str(self._told)}
+        reported = {} if self._reported is None else {TOLD: str(self._reported)}
         watched: dict[str, str] = {}
         if self._listener is not None and self._companion.watchdog_s < math.inf:
             watched = self._listener.environ(self._companion.watchdog_s) | {"PYTHONFAULTHANDLER": "1"}
         inherited = {name: value for name, value in os.environ.items() if name not in _OF_OURS}
-        return environment(inherited, **told, **watched)
+        return environment(inherited, **reported, **watched)
 
     def _note_exit(self, status: int, now: float) -> None:
         companion = self._companion
@@ -191,12 +191,12 @@ class _Running:
             self._is_over = True
             self._say(f"{companion.name} was closed. The dance goes on.")
         elif status == UNAVAILABLE:
-            if self._told is None:
+            if self._reported is None:
                 self._say(
                     f"{companion.name} cannot run now. The dance goes on without it; it is retried "
                     f"every {RETRY_S:g} s."
                 )
-            self._told = status
+            self._reported = status
             self._starts_at = now + RETRY_S
         elif self._killed_at < math.inf:
             self._start_later(f"hung: it gave no sign for {self._companion.watchdog_s:g} s", now)
@@ -206,7 +206,7 @@ class _Running:
             self._start_later(f"ended by itself (status {status})", now)
 
     def _start_later(self, what: str, now: float) -> None:
-        self._told = None
+        self._reported = None
         self._starts_at = now + self._backoff.pause_s(now - self._started_at)
         deaths = self._backoff.deaths
         if deaths <= _REPORTED:

@@ -313,8 +313,8 @@ def devices_file_made(box: BoxConfig) -> Path:
     """The same as the page that runs here says: in a rehearsal it keeps them elsewhere."""
     path = devices_file(box)
     with contextlib.suppress(OSError, StageError):  # root does not meet the box's processes
-        told = Path((runtime_of(box) / WHERE).read_text().partition("\n")[0])
-        path = told if told.is_file() else path
+        reported = Path((runtime_of(box) / WHERE).read_text().partition("\n")[0])
+        path = reported if reported.is_file() else path
     return path
 
 

@@ -174,11 +174,11 @@ def _line(number: int, run: Run) -> str:
     late, failed = (int(((flags & flag) != 0).sum()) for flag in (LATE, NOT_FINITE))
     lost = int(run.ticks["skipped"].sum())
     happened = Counter(event["kind"] for _, event in run.events)
-    told = [f"{late} late"] + [f"{lost} skipped"] * (lost > 0)
-    told += [f"{failed} with a network that failed"] * (failed > 0)
-    told += [f"{count} x {kind}" for kind, count in sorted(happened.items())]
+    reported = [f"{late} late"] + [f"{lost} skipped"] * (lost > 0)
+    reported += [f"{failed} with a network that failed"] * (failed > 0)
+    reported += [f"{count} x {kind}" for kind, count in sorted(happened.items())]
     seconds = len(run.ticks) * run.header["tick_s"]
-    return f"{number}. {begun}  {run.header['show']}: {seconds:.0f} s, {', '.join(told)}"
+    return f"{number}. {begun}  {run.header['show']}: {seconds:.0f} s, {', '.join(reported)}"
 
 
 @contextmanager

@@ -82,10 +82,10 @@ def _line(file: Path, name: str, skeleton: Skeleton) -> str:
     except (OSError, ValueError) as error:
         return f"{name}: cannot be called ({error})"
     recipe = recipe.get("of", recipe)
-    told = ", ".join(
+    reported = ", ".join(
         f"{key} {value}" for key, value in recipe.items() if key not in _NOT_TOLD and value is not None
     )
-    return f"{name}: {material.loop.length / FPS:.1f} s of {recipe['source']} ({told})"
+    return f"{name}: {material.loop.length / FPS:.1f} s of {recipe['source']} ({reported})"
 
 
 _NOT_TOLD = ("source", "number", "after", "from_s", "prompt")

@@ -26,7 +26,7 @@ _FOR_PEOPLE = (BvhError, ConfigError, PuppetError, RuntimeFolderError, StageErro
 def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> str:
     """The output of `do`. Raises StageError with its error for the user, or with why it was ended."""
 
-    def told() -> bytes:
+    def reported() -> bytes:
         limit_memory()
         error = ""
         with contextlib.redirect_stdout(io.StringIO()) as output:
@@ -39,7 +39,7 @@ def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> s
         return json.dumps([output.getvalue(), error]).encode()
 
     try:
-        message, error = json.loads(run_with_timeout(seconds, told))
+        message, error = json.loads(run_with_timeout(seconds, reported))
     except TimedOutError as reason:
         raise StageError(
             f"{network}: this network was given up ({reason}): it never ends, or it crashes. "

@@ -83,11 +83,11 @@ def _latency(proving: Proving, wanted: Wanted, show: Path, box: Path | None) -> 
     """The measurement's figures and limits, and its readings in phase with the sensor."""
     named = ("--box", str(box)) if box is not None else ()
     with tempfile.TemporaryDirectory(prefix="bunraku-prove-") as scratch:
-        told = Path(scratch) / "progress"
-        told.touch()
-        command = ("measure", "--seconds", str(wanted.seconds), "--progress", str(told))
-        said = _run(proving, (*command, "--show", str(show), *named), _copying(told, proving), True)
-        lines = [json.loads(line) for line in told.read_text().splitlines()]
+        reported = Path(scratch) / "progress"
+        reported.touch()
+        command = ("measure", "--seconds", str(wanted.seconds), "--progress", str(reported))
+        said = _run(proving, (*command, "--show", str(show), *named), _copying(reported, proving), True)
+        lines = [json.loads(line) for line in reported.read_text().splitlines()]
     if not lines or "figures" not in lines[-1]:
         raise _NotProvenError(f"It could not be measured. {said.strip()[-600:]}")
     in_phase = lines[: next(place for place, one in enumerate(lines) if one.get("phase") == "free")]
@@ -109,8 +109,8 @@ def _doctor(proving: Proving, box: Path | None) -> dict[str, Any]:
         findings = json.loads(said)
     except ValueError:
         raise _NotProvenError(f"The doctor did not end its look. {said.strip()[-600:]}") from None
-    told = [{part: for_phone(message) for part, message in one.items()} for one in findings]
-    return {"holds": all(one["verdict"] != "wrong" for one in findings), "findings": told}
+    reported = [{part: for_phone(message) for part, message in one.items()} for one in findings]
+    return {"holds": all(one["verdict"] != "wrong" for one in findings), "findings": reported}
 
 
 def _run(
@@ -141,13 +141,13 @@ def _run(
         return out.read().decode(errors="replace")
 
 
-def _copying(told: Path, proving: Proving) -> Callable[[], None]:
+def _copying(reported: Path, proving: Proving) -> Callable[[], None]:
     """Carries what measure tells to where the page reads it, as far as it is written."""
     done = 0
 
     def copy() -> None:
         nonlocal done
-        with told.open("rb") as stream:
+        with reported.open("rb") as stream:
             stream.seek(done)
             part = stream.read()
         part = part[: part.rfind(b"\n") + 1]

@@ -69,12 +69,14 @@ def _replay(
         if danced % _PROGRESS_TICKS == 0:
             _progress(name, danced, len(run.ticks))
     _progress("", 0, 0)
-    for line in _told(name, comparison, again, [*others, *files], tolerance):
+    for line in _reported(name, comparison, again, [*others, *files], tolerance):
         print(readable(line))
     return comparison.ticks, comparison.first is None
 
 
-def _told(name: str, comparison: Comparison, again: Replay, others: list[str], tolerance: float) -> list[str]:
+def _reported(
+    name: str, comparison: Comparison, again: Replay, others: list[str], tolerance: float
+) -> list[str]:
     ticks, first, worst = comparison.ticks, comparison.first, comparison.worst
     if tolerance:
         bound = f"within {tolerance:g} degrees and {1000 * METRES_PER_DEGREE * tolerance:g} mm"

@@ -88,19 +88,19 @@ def routes(folder: Path) -> list[web.RouteDef]:
 
 
 def _keep(path: Path, made: bytes, names: Sequence[str], until: float) -> None:
-    write_whole(path, f"{_told(names)}{until:.0f}\n".encode() + made, private=True)
+    write_whole(path, f"{_reported(names)}{until:.0f}\n".encode() + made, private=True)
 
 
 def _covers(path: Path, names: Sequence[str], until: float) -> bool:
     """Whether a file of ours has all these names, and is valid until then. Its first line says so."""
     try:
-        told = path.read_text().partition("\n")[0].split()
-        return told[0] == "bunraku" and set(names) <= set(told[1:-1]) and float(told[-1]) >= until
+        reported = path.read_text().partition("\n")[0].split()
+        return reported[0] == "bunraku" and set(names) <= set(reported[1:-1]) and float(reported[-1]) >= until
     except (OSError, ValueError, IndexError):
         return False
 
 
-def _told(names: Sequence[str]) -> str:
+def _reported(names: Sequence[str]) -> str:
     return " ".join(("bunraku", *names, ""))
 
 

@@ -102,10 +102,10 @@ class _Place:
             if now - self._heard < _CLOSEST_S:
                 return "too_fast"
         self._heard = now
-        told = _numbers([message.get("t"), message.get("taps", 0)], 1e15)
-        if len(told) != 2:
+        reported = _numbers([message.get("t"), message.get("taps", 0)], 1e15)
+        if len(reported) != 2:
             return self._refuse("no_numbers")
-        clock, taps = told
+        clock, taps = reported
         if taps != self._taps:
             self._taps = taps
             self.sensor.taps += 1

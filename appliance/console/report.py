@@ -37,7 +37,7 @@ class Reports:
         self._after_s, self._every_s = after_s, every_s
         self._since: dict[tuple[str, str], float] = {}
         self._messages: dict[tuple[str, str], str] = {}
-        self._told: set[tuple[str, str]] = set()
+        self._reported: set[tuple[str, str]] = set()
         self._is_on = False
         self._lines: list[str] = []
         self._sent_at = -every_s
@@ -51,14 +51,14 @@ class Reports:
                 self._lines.append(f"The box is on. Show: {status['show']}.")
         active = {(one["name"], one["about"]): one["message"] for one in _active(value)}
         for key, message in active.items():
-            if now - self._since.setdefault(key, now) >= self._after_s and key not in self._told:
-                self._told.add(key)
+            if now - self._since.setdefault(key, now) >= self._after_s and key not in self._reported:
+                self._reported.add(key)
                 self._messages[key] = message
                 self._lines.append(f"Fallback: {message[:_LONGEST]}")
         for key in self._since.keys() - active.keys():
             del self._since[key]
-            if key in self._told:
-                self._told.discard(key)
+            if key in self._reported:
+                self._reported.discard(key)
                 self._lines.append(f"Over: {self._messages.pop(key)[:_LONGEST]}")
         if not self._lines or now - self._sent_at < self._every_s:
             return []
@@ -87,9 +87,9 @@ class Post:
         """Send what waits, if it is time to; monotonic seconds."""
         if not self._lines or now < self._next_at:
             return
-        told = report(self._lines, value, time.time())
+        reported = report(self._lines, value, time.time())
         try:
-            await asyncio.to_thread(self._send, told)
+            await asyncio.to_thread(self._send, reported)
         except Exception as error:  # a server far away may answer with anything
             if not self.trouble:
                 print(f"A report by {self.name} could not be sent ({error}). It is tried again.", flush=True)
@@ -145,24 +145,24 @@ def _active(value: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [one for one in value.get("fallbacks", ()) if one["active"] and one["name"] != UNSENT.name]
 
 
-def _post(address: str, told: Mapping[str, Any]) -> None:
+def _post(address: str, reported: Mapping[str, Any]) -> None:
     from urllib.request import Request, urlopen
 
     headers = {"Content-Type": "application/json", "User-Agent": "bunraku"}
-    asked = Request(address, json.dumps(told).encode(), headers)
+    asked = Request(address, json.dumps(reported).encode(), headers)
     with urlopen(asked, timeout=_PATIENCE_S) as answer:
         answer.read(1024)
 
 
-def _mail(settings: Mapping[str, Any], told: Mapping[str, Any]) -> None:
+def _mail(settings: Mapping[str, Any], reported: Mapping[str, Any]) -> None:
     import smtplib
     import ssl
     from email.message import EmailMessage
 
     letter = EmailMessage()
-    letter["Subject"] = f"Bunraku {told['host']}"
+    letter["Subject"] = f"Bunraku {reported['host']}"
     letter["From"], letter["To"] = settings["sender"], ", ".join(settings["to"])
-    letter.set_content(told["text"].replace(". ", ".\n"))
+    letter.set_content(reported["text"].replace(". ", ".\n"))
     context = ssl.create_default_context()
     place = settings["host"], settings["port"]
     if settings["encryption"] == "tls":

@@ -51,9 +51,9 @@ class SensorChanges:
         running = asyncio.create_task(self._run(command, secret, telling))
         try:
             while True:
-                told = await telling.get()
-                await response.write(json.dumps(told).encode() + b"\n")
-                if "done" in told:
+                reported = await telling.get()
+                await response.write(json.dumps(reported).encode() + b"\n")
+                if "done" in reported:
                     break
         except ConnectionError:
             await asyncio.shield(running)  # a wearable is never left half-way because a phone fell asleep

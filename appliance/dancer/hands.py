@@ -133,11 +133,11 @@ class Hands:
     def _pull_places(self, now: float, window: FloatArray, path: list[float], positions: FloatArray) -> None:
         root = path
         for row, puppeteer in enumerate(self._placed):
-            told = puppeteer.told
-            if told is not None:
-                x, z = self._from_room.point(told[0], told[2])
-                told = x, told[1], z
-            puppeteer.stand(positions[puppeteer.number].tolist(), root, told)
+            given = puppeteer.given
+            if given is not None:
+                x, z = self._from_room.point(given[0], given[2])
+                given = x, given[1], z
+            puppeteer.stand(positions[puppeteer.number].tolist(), root, given)
             weight = puppeteer.pull(now).weight
             self._points[row] = puppeteer.place(self._ahead_s)
             if puppeteer is not self._hips:

@@ -70,7 +70,7 @@ class HeldPlace(Puppeteer):
     `reach` of the root. habitual: where this dancer's joint goes at all, if known.
     """
 
-    SNAPSHOT: tuple[str, ...] = ("_place", "_speed", "_told")
+    SNAPSHOT: tuple[str, ...] = ("_place", "_speed", "_given")
 
     habitual: Reach | None = None
 
@@ -78,7 +78,7 @@ class HeldPlace(Puppeteer):
         super().__init__(joint, weight)
         self.number = skeleton.index(joint)
         self.reach = reach_of(skeleton, self.number)
-        self._told: Point | None = None
+        self._given: Point | None = None
         self._here = self._aim = self._root = _ORIGIN
         self._place = self._speed = _ORIGIN
         self._limits = HIPS if self.is_root else LIMBS
@@ -89,16 +89,16 @@ class HeldPlace(Puppeteer):
         return self.number == 0
 
     @property
-    def told(self) -> Point | None:
-        """The place that it was told last, metres in the room; None: none."""
-        return self._told
+    def given(self) -> Point | None:
+        """The place given last, metres in the room; None: none."""
+        return self._given
 
-    def stand(self, here: Sequence[float], root: Sequence[float], told: Point | None) -> None:
-        """Before each pull: where its joint is and where the root will be, metres, and `told` as the same
+    def stand(self, here: Sequence[float], root: Sequence[float], given: Point | None) -> None:
+        """Before each pull: where its joint is and where the root will be, metres, and `given` as the same
         frame has it.
         """
         self._here, self._root = _three(here), _three(root)
-        self._aim = self._place if told is None else told
+        self._aim = self._place if given is None else given
 
     def place(self, ahead_s: float = 0.0) -> Point:
         """Where the last pull held the joint, or will hold it ahead_s later; in the frame of `stand`."""
@@ -106,7 +106,7 @@ class HeldPlace(Puppeteer):
         return self._bounded((x, y, z))
 
     def _holds(self, now: float) -> bool:
-        return self._told is not None
+        return self._given is not None
 
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
         """Move the place towards what it was told; the orientation stays."""
@@ -140,7 +140,7 @@ class FixedPlace(HeldPlace):
     def __init__(self, joint: str, skeleton: Skeleton, place: Sequence[float], weight: float = 1.0) -> None:
         """place: x, y, z in the room, metres. Raises ValueError."""
         super().__init__(joint, skeleton, weight)
-        self._told = checked_place(place)
+        self._given = checked_place(place)
 
 
 class RemotePlace(HeldPlace):
@@ -157,21 +157,21 @@ class RemotePlace(HeldPlace):
 
         Raises ValueError.
         """
-        self._told, self._left_s = checked_place(place), for_s
+        self._given, self._left_s = checked_place(place), for_s
 
     def hold_here(self, place: Sequence[float]) -> None:
         """Hold the joint where it is, unless a place was set before."""
-        if self._told is None:
+        if self._given is None:
             self.hold(place)
 
     def release(self) -> None:
         """Give the joint back to the puppet."""
-        self._told = None
+        self._given = None
 
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
         self._left_s -= elapsed
         if self._left_s < 0.0:
-            self._told, self._aim = None, self._place
+            self._given, self._aim = None, self._place
         super()._point(orientation, now, elapsed)
 
 

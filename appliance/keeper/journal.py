@@ -97,5 +97,5 @@ class MirroredJournal:
         files = fingerprints(
             default_show_path() if directory is None else Path(directory), facts["show_files"]
         )
-        told = self._environment | facts | {"show_files": files, "written_at": self._wall_clock()}
-        return json.dumps(told).encode()
+        reported = self._environment | facts | {"show_files": files, "written_at": self._wall_clock()}
+        return json.dumps(reported).encode()

@@ -10,19 +10,19 @@ from appliance.levers.form import Number
 
 T = TypeVar("T")
 
-Told = tuple[str, tuple[float, ...]]  # a text and numbers, as messages and the journal have them
+Formatted = tuple[str, tuple[float, ...]]  # a text and numbers, as messages and the journal have them
 
 
 @dataclass(frozen=True, slots=True)
 class Kind(Generic[T]):
     """One kind of value.
 
-    given: the value in a message's text and numbers; told: the other way round. plain: the value in a cue or
-    in a file, raises ValueError or TypeError. text, numbers, optional: as in a Form.
+    given: the value in a message's text and numbers; formatted: the other way round. plain: the value in a
+    cue or in a file, raises ValueError or TypeError. text, numbers, optional: as in a Form.
     """
 
     given: Callable[[str, Sequence[float]], T]
-    told: Callable[[T], Told]
+    formatted: Callable[[T], Formatted]
     plain: Callable[[Any], T]
     text: str = ""
     numbers: tuple[Number, ...] = ()
@@ -94,7 +94,7 @@ def several(numbers: tuple[Number, ...], optional: int = 0) -> Kind[tuple[float,
 def fields(numbers: Mapping[str, Number]) -> Kind[Mapping[str, float | str]]:
     """Some values by key, of which cues may give any, and others than numbers too."""
 
-    def numbers_of(value: Mapping[str, float | str]) -> Told:
+    def numbers_of(value: Mapping[str, float | str]) -> Formatted:
         return "", tuple([float(value[key]) for key in numbers if key in value])
 
     def plain(given: Any) -> Mapping[str, float | str]:

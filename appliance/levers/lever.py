@@ -8,7 +8,7 @@ from typing import Generic, Literal, NamedTuple, TypeVar
 
 from appliance.levers.fade import Fade
 from appliance.levers.form import FADE, Form
-from appliance.levers.kind import Kind, Told
+from appliance.levers.kind import Formatted, Kind
 
 T = TypeVar("T")
 
@@ -85,12 +85,12 @@ class Lever(Generic[T]):
         value = self.kind.given(text, numbers)
         if self.fade_s is None:
             return value, 0.0
-        own = len(self.kind.told(value)[1])
+        own = len(self.kind.formatted(value)[1])
         return value, float(numbers[own]) if len(numbers) > own else self.fade_s
 
-    def told(self, fade: Fade[T]) -> Told:
+    def formatted(self, fade: Fade[T]) -> Formatted:
         """The other way round: the text and numbers of an order."""
-        text, numbers = self.kind.told(fade.value)
+        text, numbers = self.kind.formatted(fade.value)
         return text, numbers if self.fade_s is AT_ONCE else (*numbers, fade.seconds)
 
 

@@ -387,7 +387,7 @@ _BY_NAME: dict[str, Lever[Any]] = {lever.name: lever for lever in LEVERS}
 
 def hand(joint: str) -> Lever[bool]:
     """Whether the hand of a joint holds."""
-    holding: kind.Kind[bool] = replace(HAND.kind, told=lambda holds: (joint, (float(holds),)))
+    holding: kind.Kind[bool] = replace(HAND.kind, formatted=lambda holds: (joint, (float(holds),)))
     return replace(
         HAND,
         name=f"{HAND.name} {joint}",

@@ -199,7 +199,7 @@ class Midi:
                 continue
             if one.name or one.low == one.high or now - self._moved_at.get(one.control, 0.0) < _OWN_CONTROL_S:
                 continue
-            number = lever.kind.told(state[lever].value)[1]
+            number = lever.kind.formatted(state[lever].value)[1]
             if not number:
                 continue
             share = (number[0] - one.low) / (one.high - one.low)

@@ -145,12 +145,12 @@ class CommandHandler:
 
     def report(self, strangers: int, now: float) -> dict[str, Any]:
         """The part of the status that only this process knows."""
-        told = self.gestures.told() if self.gestures is not None else {}
+        reported = self.gestures.reported() if self.gestures is not None else {}
         return {
             "refused": self.refused,
             "strangers": strangers,
             "live": self._live.came(now),
-            "gestures": told,
+            "gestures": reported,
         }
 
     def call_cue(self, name: str, now: float) -> None:
@@ -242,12 +242,12 @@ class CommandHandler:
         if (gestures := self.gestures) is None:
             raise ValueError("This box knows no gestures.")
         if command.address == "/gestures":
-            told = gestures.told()
+            reported = gestures.reported()
             answers: list[Message] = [
-                ("/gestures/gesture", one["name"], one["cue"], one["hand"]) for one in told["list"]
+                ("/gestures/gesture", one["name"], one["cue"], one["hand"]) for one in reported["list"]
             ]
-            if (now_made := told["recording"]) is not None:
-                answers.append(("/gestures/recording", now_made["name"], now_made["come"], told["most"]))
+            if (now_made := reported["recording"]) is not None:
+                answers.append(("/gestures/recording", now_made["name"], now_made["come"], reported["most"]))
             for answer in (*answers, (END, command.address, len(answers))):
                 self._send(asker, answer)
             return

@@ -183,7 +183,7 @@ class Gestures:
         self._write()
         return f"The gesture '{name}' is called '{new}' now."
 
-    def told(self) -> dict[str, Any]:
+    def reported(self) -> dict[str, Any]:
         """For the page: list (name, cue, hand), recording (name, repetitions that have come), a sentence."""
         recording = self._recording
         return {

@@ -71,7 +71,7 @@ class Reconciler:
                 if one is RATE and is_news:
                     self.rate = self._usual_rate or 1.0 if fade.value is None else fade.value
                 elif one.follower == "generator":
-                    self.motion = tuple({**dict(self.motion), name: one.told(fade)[1]}.items())
+                    self.motion = tuple({**dict(self.motion), name: one.formatted(fade)[1]}.items())
                 elif one.follower != "stage" or (one is PHRASE and self._is_made(fade.value)):
                     continue  # others follow it
                 elif is_news:
@@ -150,7 +150,7 @@ class Reconciler:
 
 def order_of(lever: Lever[Any], fade: Fade[Any]) -> Order:
     """The order to go to a value, as the journal notes it."""
-    text, numbers = lever.told(fade)
+    text, numbers = lever.formatted(fade)
     return Order(lever.family, numbers, text)
 
 

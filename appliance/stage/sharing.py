@@ -124,8 +124,8 @@ class Sharing:
         without a sensor, infinite if unheard. `pair`: of a box that is one of two.
         """
         parts = reconciler.parts
-        told = health.snapshot(now)
-        told |= {
+        reported = health.snapshot(now)
+        reported |= {
             "state": "dancing" if parts.led.motion.rate else "stopped",
             "sensor_age_s": None if sensor_age_s in (None, float("inf")) else sensor_age_s,
             "locked": locked,
@@ -169,8 +169,8 @@ class Sharing:
             "fallbacks": fallbacks,
         }
         if pair is not None:
-            told["pair"] = pair
-        parts.outputs.publish_health(told)
+            reported["pair"] = pair
+        parts.outputs.publish_health(reported)
 
     def close(self) -> None:
         """Give the place back, after the outputs were closed."""

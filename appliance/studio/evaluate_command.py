@@ -23,7 +23,7 @@ from appliance.studio.evaluation.measurement import Iterations, Measurement
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.pairs import apart_from, pair_up
 from appliance.studio.evaluation.recorded import Recorded
-from appliance.studio.progress import shown, told
+from appliance.studio.progress import reported, shown
 from appliance.studio.studio_error import StudioError
 
 
@@ -61,8 +61,8 @@ def run(options: EvaluateOptions) -> None:
 
     answer = {}
     if options.reference is not None:
-        told = options.reading.over(trained.options)
-        known = _known(options.reference, told, (*takes, *hands))
+        reported = options.reading.over(trained.options)
+        known = _known(options.reference, reported, (*takes, *hands))
         measurements = _measurements(console, coder, takes, hands, known)
         recorded = _recorded(options, coder, known) if options.compared else None
         answer = _answer(console, measurements, joints, iterations, recorded)
@@ -139,7 +139,7 @@ def _answer(
 ) -> dict[str, Any]:
     """The body's answer when a hand holds a joint, as JSON."""
     count = puppetry.dances(len(measurements), len(joints), iterations, compared=recorded is not None)
-    with told(console, count) as advance:
+    with reported(console, count) as advance:
         return puppetry.measure(measurements, joints, iterations, advance=advance, recorded=recorded)
 
 

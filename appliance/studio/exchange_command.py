@@ -68,7 +68,7 @@ def convert(
     from appliance.studio.exchange.reading import read_as_told
 
     known_ending(out)
-    recording = _told(source, *read_as_told(source, reading, Choice(skin, animation)))
+    recording = _reported(source, *read_as_told(source, reading, Choice(skin, animation)))
     if fps is not None:
         recording = recording.resampled(fps)
     _write(out, recording)
@@ -102,7 +102,7 @@ def retarget(
     from appliance.studio.exchange.retargeting import retarget as put_on
 
     known_ending(out)
-    dance = _told(phrase, *read_as_told(phrase, reading, Choice(skin, animation)))
+    dance = _reported(phrase, *read_as_told(phrase, reading, Choice(skin, animation)))
     other = _skeleton_of(to, reading)
     try:
         found = put_on(dance, other)
@@ -126,7 +126,7 @@ def _skeleton_of(like: Path | None, reading: ReadingOptions = AS_THE_FILES_SAY) 
     folder = like or default_show_path()
     if folder.is_dir():  # a show's skeleton is in the stage's frame already
         return with_stance(read_bvh(folder / "skeleton.bvh"))
-    return _told(folder, *read_as_told(folder, reading)).skeleton
+    return _reported(folder, *read_as_told(folder, reading)).skeleton
 
 
 def _write(out: Path, recording: Recording) -> None:
@@ -137,7 +137,7 @@ def _write(out: Path, recording: Recording) -> None:
         print(f"{out.name}: joints' names changed, as no file can carry them: {changed}.", file=sys.stderr)
 
 
-def _told(file: Path, recording: Recording, guesses: list[Guess]) -> Recording:
+def _reported(file: Path, recording: Recording, guesses: list[Guess]) -> Recording:
     """The recording; what was changed in it is said."""
     for guess in guesses:
         print(f"{file.name}: {guess.sentence()}.", file=sys.stderr)

@@ -48,14 +48,14 @@ def heartbeat() -> Iterator[None]:
     watched, done = _Watched(before), threading.Event()
 
     def beat() -> None:
-        since = told = watched.last_s
+        since = reported = watched.last_s
         while not done.wait(max(0.01, watched.last_s + QUIET_S - time.monotonic())):
-            if watched.last_s > told:
+            if watched.last_s > reported:
                 since = watched.last_s
             if time.monotonic() - watched.last_s >= QUIET_S:
                 line = shorten(watched.line, LONGEST, placeholder="").rstrip(" .") or "at work"
                 watched.add(f"{line} ... {time.monotonic() - since:.0f} s\n")
-                told = watched.last_s
+                reported = watched.last_s
 
     thread = threading.Thread(target=beat, name="heartbeat", daemon=True)
     sys.stderr = watched

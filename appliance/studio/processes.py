@@ -60,9 +60,9 @@ class Processes:
         """The leading process's value: clocks and signals differ, and all must stop after the same step."""
         if self.count == 1:
             return value
-        told = torch.tensor(value, dtype=torch.float64, device=_device())
-        distributed.broadcast(told, 0)
-        return float(told)
+        reported = torch.tensor(value, dtype=torch.float64, device=_device())
+        distributed.broadcast(reported, 0)
+        return float(reported)
 
 
 @contextmanager

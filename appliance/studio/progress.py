@@ -43,7 +43,7 @@ def shown(
 
 
 @contextmanager
-def told(
+def reported(
     console: Console | None, count: int | None = None, now: Callable[[], float] = time.monotonic
 ) -> Iterator[Callable[[str], None]]:
     """Yields what is called before each part with its description; count: how often, None: nobody knows."""

@@ -58,11 +58,11 @@ class FrameWatch:
         self._compare_clocks()
         while True:
             try:
-                datagram, told, _, _ = self._socket.recvmsg(256, 128)
+                datagram, reported, _, _ = self._socket.recvmsg(256, 128)
             except BlockingIOError:
                 return
             if datagram.startswith(FRAME):
-                self._hear(datagram, self._arrival(told))
+                self._hear(datagram, self._arrival(reported))
 
     def end(self, now: float) -> None:
         """Ticks that are overdue now are missing too."""
@@ -110,10 +110,10 @@ class FrameWatch:
         self.missing += count
         self.seconds.note(int(at - self._begun), count * SLOT_MS, count)
 
-    def _arrival(self, told: list[tuple[int, int, bytes]]) -> float:
+    def _arrival(self, reported: list[tuple[int, int, bytes]]) -> float:
         """Arrival time of the datagram, in monotonic seconds."""
         at = time.monotonic()
-        for _, kind, data in told:
+        for _, kind, data in reported:
             if kind == _SO_TIMESTAMPNS:
                 seconds, nanoseconds = struct.unpack("qq", data[:16])
                 at = seconds + nanoseconds * 1e-9 - self._wall_ahead_s

@@ -66,7 +66,7 @@ def write(path: Path, found: list[Figure]) -> None:
     medians: dict[str, dict[str, float]] = {}
     for one in found:
         medians.setdefault(one.group, {})[one.label] = round(one.median_ms, 6)
-    told = {
+    reported = {
         "machine": {
             "processor": platform.machine(),
             "cores": os.cpu_count(),
@@ -76,4 +76,4 @@ def write(path: Path, found: list[Figure]) -> None:
         "medians_ms": medians,
         "times_faster": ratios(found),
     }
-    path.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(reported, indent=1) + "\n", encoding="utf-8")

@@ -160,13 +160,13 @@ def test_a_writer_killed_in_the_middle_leaves_the_newest_whole_place(tmp_path: P
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:
             try:
                 assert writer.stdout is not None
-                told = int(writer.stdout.readline())
+                reported = int(writer.stdout.readline())
             finally:
                 writer.send_signal(signal.SIGKILL)
         reader = CheckpointReader(tmp_path)
         place = reader.read()
         reader.close()
-        assert place is not None and place.tick >= told > newest
+        assert place is not None and place.tick >= reported > newest
         assert place == replace(PLACE, tick=place.tick)
         newest = place.tick
 

@@ -108,10 +108,10 @@ def test_check_ends_with_words_whatever_a_file_holds(
         (show / name).write_bytes(content)
         if name != CHECKSUMS:
             write_checksums(show)
-        told = run_with_timeout(DEADLINE_S, lambda: said(show, box)).decode()
-        assert told and "Traceback" not in told + capfd.readouterr().err, content
+        reported = run_with_timeout(DEADLINE_S, lambda: said(show, box)).decode()
+        assert reported and "Traceback" not in reported + capfd.readouterr().err, content
         if name != "puppet.onnx":  # what native code does with a damaged one is given up, and said
-            assert "given up" not in told, content
+            assert "given up" not in reported, content
 
 
 def said(show: Path, box: Path) -> bytes:

@@ -113,9 +113,9 @@ def test_a_companion_waits_for_its_needs(
 ) -> None:
     monkeypatch.setattr(companions, "RETRY_S", 0.1)
     said: list[str] = []
-    display, told, shows = tmp_path / "display", tmp_path / "told", tmp_path / "shows"
+    display, reported, shows = tmp_path / "display", tmp_path / "told", tmp_path / "shows"
     waits = "from appliance.box.parent_death import was_told; "
-    waits += f"open({str(told)!r}, 'a').write(f'{{was_told({UNAVAILABLE}):d}}'); "
+    waits += f"open({str(reported)!r}, 'a').write(f'{{was_told({UNAVAILABLE}):d}}'); "
     waits += f"os.path.exists({str(display)!r}) or sys.exit({UNAVAILABLE}); "
     waits += f"open({str(shows)!r}, 'w').close(); time.sleep(60)"
     with Companions([diary.child(waits)], said.append, lambda: True):
@@ -123,7 +123,7 @@ def test_a_companion_waits_for_its_needs(
         display.touch()
         until(lambda: shows.exists())
     assert said == ["The child cannot run now. The dance goes on without it; it is retried every 0.1 s."]
-    assert told.read_text() == "0" + "1" * (len(diary.pids) - 1)  # it gives its reasons once
+    assert reported.read_text() == "0" + "1" * (len(diary.pids) - 1)  # it gives its reasons once
     assert is_gone(diary.pids[-1])
 
 

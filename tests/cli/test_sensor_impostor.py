@@ -43,8 +43,8 @@ def test_an_impostor_cannot_control_the_terminal(tmp_path: Path, bunraku: Comman
     listed: list[Message] = [("/sensors/sensor", *line), ("/sensors/end", 1, 0.1, ESCAPES)]
     out, _ = bunraku("sensors", "--box", str(Impostor(tmp_path, listed).box_file))
     assert "mine" in out
-    told: list[Message] = [("/sensors/reply", "/sensors/strobe", 1, ESCAPES)]
-    message, _ = bunraku("sensors", "strobe", "head", "--box", str(Impostor(tmp_path, told).box_file))
+    reported: list[Message] = [("/sensors/reply", "/sensors/strobe", 1, ESCAPES)]
+    message, _ = bunraku("sensors", "strobe", "head", "--box", str(Impostor(tmp_path, reported).box_file))
     assert "mine" in message
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", out + message)
 

@@ -78,9 +78,9 @@ def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
 
 def test_programs_get_values_and_nulls(box: RunningBox, bunraku: Command) -> None:
     out, _ = bunraku("sensors", "--json", "--box", box.box_file)
-    told = json.loads(out)
-    assert told["box"] is True
-    left, head, spare = told["sensors"]
+    reported = json.loads(out)
+    assert reported["box"] is True
+    left, head, spare = reported["sensors"]
     assert left == {
         "name": "left-wrist",
         "id": "1a2b3c4d",
@@ -130,8 +130,8 @@ def test_without_a_box_it_lists_the_key_file(tmp_path: Path, bunraku: Command) -
     out, _ = bunraku("sensors", "--box", box_file)
     assert "chmod 600" in out
     out, _ = bunraku("sensors", "--json", "--box", box_file)
-    told = json.loads(out)
-    assert (told["box"], [sensor["state"] for sensor in told["sensors"]]) == (False, [None, None])
+    reported = json.loads(out)
+    assert (reported["box"], [sensor["state"] for sensor in reported["sensors"]]) == (False, [None, None])
 
 
 @contextmanager

@@ -44,20 +44,22 @@ def test_the_page_tells_what_a_desk_is_answered(tmp_path: Path, view: BoxView) -
             return view.value["status"] is not None and view.value["status"]["refused"] == refused
 
         until(is_told)
-        told = view.value
+        reported = view.value
         answered = asker.status()._asdict()
         for changing in ("level", "uptime_s"):
-            answered.pop(changing), told["status"].pop(changing)
-        assert told["status"] == {name: pytest.approx(value) for name, value in answered.items()}
+            answered.pop(changing), reported["status"].pop(changing)
+        assert reported["status"] == {name: pytest.approx(value) for name, value in answered.items()}
         for question in ("cues", "phrases", "looks", "cards"):
             *answers, _ = asker.ask_all(f"/{question}")
-            assert [[one["name"], int(one["now"])] for one in told[question]] == [one[1:] for one in answers]
-        assert told["hands"] == [
+            assert [[one["name"], int(one["now"])] for one in reported[question]] == [
+                one[1:] for one in answers
+            ]
+        assert reported["hands"] == [
             {"joint": "lShldr", "source": "left-wrist", "holds": False, "by": "orientation"}
         ]
-        (sensor,) = told["sensors"]
+        (sensor,) = reported["sensors"]
         assert (sensor["name"], sensor["battery"], sensor["heard"]) == ("left-wrist", 80, True)
-        assert (told["frames"], told["trouble"]) == ("fresh", "")
+        assert (reported["frames"], reported["trouble"]) == ("fresh", "")
     control.close()
 
 

@@ -30,7 +30,7 @@ def test_the_box_tells_its_release_and_addresses(tab: Tab, venue: tuple[Box, Pag
 
 def test_the_box_tells_which_shows_it_has(tab: Tab) -> None:
     """As an installed box answers, with names that no page may take for its own text."""
-    told = {
+    reported = {
         "shows": [{"source": "<b>stick</b>", "good": False}, {"source": "comes with the box", "good": True}],
         "refused": ["show.yaml:3: no such key."],
         "aside": ["It was too slow."],
@@ -41,7 +41,7 @@ def test_the_box_tells_which_shows_it_has(tab: Tab) -> None:
         "host": "stage",
         "addresses": [["eth0", "192.0.2.7"]],
     }
-    tab.route("**/api/box", lambda route: route.fulfill(json=told))
+    tab.route("**/api/box", lambda route: route.fulfill(json=reported))
     press(tab, '[data-page="box"]')
     dances, instead = (tab.locator("#box-shows li").nth(place) for place in (0, 1))
     expect(dances).to_contain_text("<b>stick</b>starts at power-on · has not run here yet")

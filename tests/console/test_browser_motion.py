@@ -40,7 +40,7 @@ def numbers(box: Box, name: str) -> tuple[float, ...]:
     if lever is None or lever not in state:
         return ()
     fade = state[lever]
-    return (lever.told(fade) if fade.seconds else lever.kind.told(fade.value))[1]
+    return (lever.reported(fade) if fade.seconds else lever.kind.reported(fade.value))[1]
 
 
 def value(box: Box, part: str) -> tuple[float, ...]:
@@ -162,7 +162,7 @@ def test_knobs_of_springs_and_strings(browser: Browser, studio: tuple[Box, Page]
     for knob, key, least in (("stiffness", "End", 10.0), ("storm", "End", 1.0), ("feedback", "Home", 0.0)):
         tab.locator(f"#springs-{knob}").focus()
         tab.keyboard.press(key)
-        wait_until(lambda part=knob, told=least: numbers(box, part) == (told, 1.0))
+        wait_until(lambda part=knob, reported=least: numbers(box, part) == (reported, 1.0))
     tab.locator("#springs-strings").focus()
     tab.keyboard.press("Home")
     wait_until(lambda: declared(box)[STRINGS].value == 0.0)

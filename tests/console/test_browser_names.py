@@ -33,6 +33,6 @@ def test_a_dead_receiver_has_its_name_in_each_language(
         context.set_default_timeout(PATIENCE_MS)
         tab = context.new_page()
         tab.goto(page.origin)
-        told = tab.locator("#fallbacks-now li", has_text=message)
-        expect(told).to_contain_text(f"127.0.0.1:{nobody}", timeout=PATIENCE_MS)
+        reported = tab.locator("#fallbacks-now li", has_text=message)
+        expect(reported).to_contain_text(f"127.0.0.1:{nobody}", timeout=PATIENCE_MS)
         context.close()

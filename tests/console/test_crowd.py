@@ -88,8 +88,12 @@ def test_a_thousand_strangers_take_nothing_from_a_technician(venue: tuple[Box, P
             done = page.command("/panic").value
             assert done["done"], done
         wait_until(lambda: are_open(crowd) <= MOST_FROM_ONE)
-        told = wait_until(lambda: [one for one in page.status()["fallbacks"] if one["name"] == CROWDED.name])
-        assert told[0]["active"] and told[0]["process"] == "console" and HOST in told[0]["message"]
+        reported = wait_until(
+            lambda: [one for one in page.status()["fallbacks"] if one["name"] == CROWDED.name]
+        )
+        assert (
+            reported[0]["active"] and reported[0]["process"] == "console" and HOST in reported[0]["message"]
+        )
     assert page.command("/go").value["done"]
     assert len(box.output.splitlines()) - said < 20, "the log does not grow with the crowd"
     page.cookie = ""
@@ -193,8 +197,8 @@ def test_after_a_thousand_wrong_pins_it_is_a_longer_one(own_page: Page) -> None:
     assert own_page.get("/api/me").value["known"], "a device that gave the PIN stays known"
     again = Page(own_page.port, own_page.box_file)
     assert len(again.pin) == LONG_DIGITS and again.pin != before
-    told = wait_until(lambda: own_page.status().get("fallbacks"))
-    assert [one["name"] for one in told] == [PIN_CHANGED.name]
+    reported = wait_until(lambda: own_page.status().get("fallbacks"))
+    assert [one["name"] for one in reported] == [PIN_CHANGED.name]
     again.unlock()
 
 
@@ -239,7 +243,7 @@ class _Doorway:
         return made
 
     @property
-    def told(self) -> list[bool]:
+    def reported(self) -> list[bool]:
         return [one.active for one in self.fallbacks.happened(self.now)]
 
 
@@ -252,19 +256,19 @@ def test_idle_strangers_are_closed_and_watchers_and_known_devices_are_not() -> N
     assert not idle.is_closed
     doorway.door.look(doorway.now + IDLE_S + 1.0)
     assert [one.is_closed for one in (idle, watching, known)] == [True, False, False]
-    assert doorway.told == [], "nobody had to give way"
+    assert doorway.reported == [], "nobody had to give way"
 
 
 def test_one_address_gives_way_to_itself_and_many_to_each_other() -> None:
     doorway = _Doorway()
     own = [doorway.comes("10.0.0.1", port) for port in range(MOST_FROM_ONE + 3)]
     assert [one.is_closed for one in own].index(False) == 3 == sum(one.is_closed for one in own)
-    assert doorway.told == [True]
+    assert doorway.reported == [True]
     for number in range(2 * MOST_STRANGERS):
         doorway.comes(f"10.0.1.{number % 250}", 100 + number)
     assert len(doorway.door) == MOST_STRANGERS
     doorway.door.look(doorway.now + 20.0)
-    assert doorway.told == [False], "the crowd is over"
+    assert doorway.reported == [False], "the crowd is over"
 
 
 def test_whatever_strangers_do_known_devices_have_room() -> None:

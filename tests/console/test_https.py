@@ -44,8 +44,8 @@ def test_a_box_has_one_certificate_and_the_same_rules_over_https(tmp_path: Path)
     with Process(tmp_path / "page.txt", [*BUNRAKU, "console", "--box", box_file]) as process:
         first = wait_until(lambda: served(port), lambda: process.output)
         assert f"The page: https://{HOST}:{port}" in process.output
-        pin, _, told = run_bunraku("console", "pin", "--box", box_file).stdout.strip().partition("\n")
-        assert told == f"Certificate, SHA-256: {first}"
+        pin, _, reported = run_bunraku("console", "pin", "--box", box_file).stdout.strip().partition("\n")
+        assert reported == f"Certificate, SHA-256: {first}"
         trusted = ssl.create_default_context(cafile=str(tmp_path / "state" / FILE))
         page = http.client.HTTPSConnection(HOST, port, context=trusted, timeout=60)
         said = json.dumps({"pin": pin, "name": "a"})

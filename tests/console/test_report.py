@@ -38,8 +38,8 @@ def test_a_box_that_comes_on_is_told_once_and_a_restarted_page_is_not() -> None:
 
 def test_a_fallback_is_told_when_it_lasts_and_when_it_is_over() -> None:
     reports = Reports(after_s=10.0, every_s=60.0)
-    told = [reports.look(box(SILENT, uptime_s=4000.0), now) for now in (0.0, 9.0, 10.0, 11.0)]
-    assert told == [[], [], ["Fallback: No readings."], []]
+    reported = [reports.look(box(SILENT, uptime_s=4000.0), now) for now in (0.0, 9.0, 10.0, 11.0)]
+    assert reported == [[], [], ["Fallback: No readings."], []]
     assert reports.look(box(uptime_s=4000.0), 30.0) == [], "a report a minute"
     assert reports.look(box(uptime_s=4000.0), 70.0) == ["Over: No readings."]
     assert reports.look(box(uptime_s=4000.0), 700.0) == []
@@ -67,9 +67,9 @@ def sent(settings: dict[str, Any], lines: list[str], value: dict[str, Any]) -> N
 def test_a_webhook_gets_json() -> None:
     with _web_server() as (port, came, _):
         sent({"webhook": f"http://127.0.0.1:{port}/hook", "mail": None}, ["Over: A."], box(SILENT))
-    ((path, told),) = came
-    assert path == "/hook" and told["text"].endswith(": Over: A.")
-    assert told["fallbacks"] == [{"name": "sensor-silent", "about": "left-wrist"}]
+    ((path, reported),) = came
+    assert path == "/hook" and reported["text"].endswith(": Over: A.")
+    assert reported["fallbacks"] == [{"name": "sensor-silent", "about": "left-wrist"}]
 
 
 def test_a_mail_arrives() -> None:
@@ -105,7 +105,7 @@ def test_a_report_that_is_refused_is_a_fallback_until_it_arrives(
 
     with _web_server(refuses=True) as (port, came, refusals):
         asyncio.run(asyncio.wait_for(watched(port, came, refusals), 60.0))
-    texts = [told["text"] for _, told in came]
+    texts = [reported["text"] for _, reported in came]
     assert seen == [0] and any("The box is on" in text for text in texts)
     assert "tried again" not in "".join(texts), "a report about itself"
     assert capfd.readouterr().out.count("could not be sent (HTTP Error 503") == 1
@@ -114,8 +114,8 @@ def test_a_report_that_is_refused_is_a_fallback_until_it_arrives(
 def test_tries_come_ever_later_and_what_waits_is_bounded() -> None:
     tries: list[int] = []
 
-    def refused(told: object) -> None:
-        tries.append(len(str(told)))
+    def refused(reported: object) -> None:
+        tries.append(len(str(reported)))
         raise OSError("no route")
 
     async def look() -> list[float]:
@@ -163,9 +163,9 @@ def _web_server(refuses: bool = False) -> Iterator[tuple[int, list[tuple[str, An
 
     class Hook(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
-            told = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+            reported = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
             if accepts:
-                came.append((self.path, told))
+                came.append((self.path, reported))
             self.send_response(200 if accepts else 503)
             self.end_headers()
 

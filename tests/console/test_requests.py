@@ -168,10 +168,10 @@ def test_whatever_comes_as_a_body_is_refused(page: Page, rng: random.Random, lon
 
 
 def test_the_box_tells_what_it_is(page: Page) -> None:
-    told = page.get("/api/box").value
-    assert told["box_file"] == str(page.box_file.resolve())
-    assert told["version"] == version("bunraku") and told["host"] == socket.gethostname()
-    assert told["shows"] == [], "nothing was chosen at power-on here"
+    reported = page.get("/api/box").value
+    assert reported["box_file"] == str(page.box_file.resolve())
+    assert reported["version"] == version("bunraku") and reported["host"] == socket.gethostname()
+    assert reported["shows"] == [], "nothing was chosen at power-on here"
 
 
 def test_a_box_file_that_is_gone_is_no_fault_of_the_page(own_page: Page) -> None:

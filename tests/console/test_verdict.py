@@ -29,7 +29,7 @@ def status(**values: Any) -> Status:
 
 
 @pytest.mark.parametrize(
-    ("frames", "told", "sensors", "fallbacks", "ago_s", "trouble", "level", "key"),
+    ("frames", "reported", "sensors", "fallbacks", "ago_s", "trouble", "level", "key"),
     [
         ("fresh", status(), [HEARD, SPARE], [], HOUR_AGO, "", "well", "well"),
         ("fresh", status(), [SPARE], [], HOUR_AGO, "", "well", "well_alone"),
@@ -48,9 +48,9 @@ def status(**values: Any) -> Status:
     ],
 )
 def test_the_worst_comes_first(
-    frames: str, told: Any, sensors: Any, fallbacks: Any, ago_s: float, trouble: str, level: str, key: str
+    frames: str, reported: Any, sensors: Any, fallbacks: Any, ago_s: float, trouble: str, level: str, key: str
 ) -> None:
-    said = verdict(frames, told, sensors, fallbacks, time.time() - ago_s, trouble)
+    said = verdict(frames, reported, sensors, fallbacks, time.time() - ago_s, trouble)
     assert (said.level, said.key) == (level, key)
     for language in languages():
         sentence = table(language)[f"verdict_{key}"]

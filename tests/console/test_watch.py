@@ -252,8 +252,8 @@ def test_the_page_dies_and_comes_back_and_the_dance_does_not_notice(venue: tuple
     box, page = venue
 
     def deaths() -> int:
-        told = page.status().get("fallbacks", ())
-        return sum(one["times"] for one in told if one["name"] == "console-died")
+        reported = page.status().get("fallbacks", ())
+        return sum(one["times"] for one in reported if one["name"] == "console-died")
 
     assert f"The page: {page.origin}, PIN {page.pin}." in box.output
     page.unlock()

@@ -44,7 +44,7 @@ def course(
     """Places (N, 3) and weights (N,) tick by tick, the root standing still."""
     places, weights = [], []
     for tick in range(round(start_s / TICK_S), round((start_s + seconds) / TICK_S)):
-        hand.stand(here, ROOT, hand.told)
+        hand.stand(here, ROOT, hand.given)
         weights.append(hand.pull(tick * TICK_S).weight)
         places.append(hand.place())
     return np.array(places), np.array(weights)
@@ -162,10 +162,10 @@ def test_a_place_for_a_while_is_given_back_unless_it_comes_again(skeleton: Skele
 def test_a_hand_by_place_holds_where_its_joint_is_unless_it_was_told_before(skeleton: Skeleton) -> None:
     hand = RemotePlace("lShldr", skeleton)
     hand.hold_here(HERE)
-    assert hand.told == HERE
+    assert hand.given == HERE
     hand.hold(THERE)
     hand.hold_here(HERE)
-    assert hand.told == THERE
+    assert hand.given == THERE
 
 
 @pytest.mark.parametrize("place", [(0, 0), (0, 0, math.nan), (0, math.inf, 0), (0, 1e3, 0)])

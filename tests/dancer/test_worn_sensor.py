@@ -176,15 +176,15 @@ def hand_at(seconds: float) -> np.ndarray:
 @pytest.mark.parametrize(("every_s", "age_s"), [(0.02, 0.004), (0.02, 0.009), (0.01, 0.008)])
 def test_a_reading_is_turned_on_to_the_time_of_the_tick(every_s: float, age_s: float) -> None:
     """Against a sensor whose readings have no time: the hand that is held is the older one."""
-    told, untold = WornSensor("lShldr"), WornSensor("lShldr")
+    reported, untold = WornSensor("lShldr"), WornSensor("lShldr")
     apart: list[list[float]] = []
     for tick in range(1, 200):
         now = tick * TICK_S
         for part in range(round(TICK_S / every_s), 0, -1):
             measured_at = now - age_s - (part - 1) * every_s
-            told.take_reading(hand_at(measured_at), now, measured_at)
+            reported.take_reading(hand_at(measured_at), now, measured_at)
             untold.take_reading(hand_at(measured_at), now)
-        held = [sensor.pull(now).orientation.copy() for sensor in (told, untold)]
+        held = [sensor.pull(now).orientation.copy() for sensor in (reported, untold)]
         apart.append([float(quaternion.angle_between(one, hand_at(now))) for one in held])
     turned_on, as_it_came = np.median(np.degrees(apart[50:]), axis=0)
     assert turned_on < 0.3 * as_it_came

@@ -54,16 +54,16 @@ def write(folder: Path, form: str) -> Path:
     titles = [f"{name}_{axis}" for name in MEDIAPIPE for axis in ("x", "y", "z", "visibility")]
     path = folder / f"dance.{form.rpartition(' ')[2]}"
     if form == "ours json":
-        told = [{"time": at, "world": one} for at, one in zip(read.times.tolist(), frames, strict=True)]
-        path.write_text(json.dumps({"frames": told}))
+        reported = [{"time": at, "world": one} for at, one in zip(read.times.tolist(), frames, strict=True)]
+        path.write_text(json.dumps({"frames": reported}))
     elif form == "persons json":
         keys = ("x", "y", "z", "visibility")
         people = [[[dict(zip(keys, point, strict=True)) for point in one]] for one in frames]
-        told = [
+        reported = [
             {"timestamp_ms": 1000 * at, "pose_world_landmarks": one}
             for at, one in zip(read.times.tolist(), people, strict=True)
         ]
-        path.write_text(json.dumps(told))
+        path.write_text(json.dumps(reported))
     elif form == "wide csv":
         with path.open("w", newline="") as file:
             writer = csv.writer(file)
@@ -139,8 +139,8 @@ def test_a_folder_of_openpose_has_the_person_that_goes_on(tmp_path: Path) -> Non
         first = np.concatenate([points, np.ones((25, 1))], axis=-1).ravel().tolist()
         second = np.concatenate([3 * points + 500, np.ones((25, 1))], axis=-1).ravel().tolist()
         people = [] if frame == 5 else [second, first] if frame > 2 else [first]
-        told = {"people": [{"pose_keypoints_2d": one} for one in people]}
-        (tmp_path / f"dance_{frame:012}_keypoints.json").write_text(json.dumps(told))
+        reported = {"people": [{"pose_keypoints_2d": one} for one in people]}
+        (tmp_path / f"dance_{frame:012}_keypoints.json").write_text(json.dumps(reported))
     found = read_landmarks(tmp_path, fps=30.0)
     assert found.is_flat and found.layout.program == "OpenPose BODY_25" and len(found.times) == 10
     assert np.isnan(found.points[5]).all()

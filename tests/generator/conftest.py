@@ -28,8 +28,8 @@ class Bench:
     def __init__(self, show: Path, folder: Path, state: Path | None) -> None:
         self.show, self.folder = load_show(show), folder
         self.declared = ShowState(show=self.show.config.name)
-        self.told: dict[str, Any] = {"name": "", "base": "main", "made": ""}
-        self.health: dict[str, Any] = {"puppets": [self.told]}
+        self.reported: dict[str, Any] = {"name": "", "base": "main", "made": ""}
+        self.health: dict[str, Any] = {"puppets": [self.reported]}
         self._closed, self._now = False, time.monotonic()
         self.fallbacks = Fallbacks(OF_THE_GENERATOR)
         self._writer, self._reader = ShowStateWriter(folder), ShowStateReader(folder)
@@ -61,7 +61,7 @@ class Bench:
         """The stage dances what was made last; then as `recipe`."""
         made = self.made.read()
         assert made is not None
-        self.told["made"] = made.recipe
+        self.reported["made"] = made.recipe
         return self.recipe()
 
     def close(self) -> None:

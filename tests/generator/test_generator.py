@@ -55,9 +55,9 @@ def test_one_variation_ahead_and_no_more(bench: Benches, tmp_path: Path) -> None
     assert second["seed"] == 2 and not newest(one.made).at_once
     assert one.recipe() == second
     assert one.dance()["seed"] == 3
-    one.told["base"] = "other"
+    one.reported["base"] = "other"
     one.declare(phrase=("path", (0.5,)))
-    one.told["base"] = "main"
+    one.reported["base"] = "main"
     assert one.recipe()["source"] == "path"
     assert one.dance() == one.recipe(), "a path loops: the next one comes when another is asked for"
     assert len(list((one.folder / "material").iterdir())) <= 4
@@ -66,7 +66,7 @@ def test_one_variation_ahead_and_no_more(bench: Benches, tmp_path: Path) -> None
 def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: Path) -> None:
     show = write_show_with_sources(tmp_path / "show")
     one = bench(show)
-    one.told["position_s"] = 0.5
+    one.reported["position_s"] = 0.5
     one.health["looked_at"] = time.monotonic()
     one.declare(phrase=("improvise", NO_FADE))
     first = one.recipe()
@@ -77,7 +77,7 @@ def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: 
     assert made is not None and not made.at_once
     assert second["after"] == first["number"] and second["seed"] == first["seed"] + 1
     assert 2.0 < second["from_s"] < 4.5 and second["prompt"] != first["prompt"]
-    one.told["position_s"] = 1.0
+    one.reported["position_s"] = 1.0
     one.declare(motion_improvise_temperature=("", (0.25,)))
     third = one.recipe()
     assert third["temperature"] == 0.25 and third["after"] == first["number"]
@@ -96,15 +96,15 @@ def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: 
 def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
     puppets = [{"name": "a"}, {"name": "b", "phrase": "vary"}, {"name": "c"}, {"name": "d", "phrase": "path"}]
     one = bench(write_show_with_sources(tmp_path / "show", puppets=puppets))
-    told = [{"name": one["name"], "base": "main", "made": "", "position_s": 0.0} for one in puppets[1:]]
-    one.told["name"] = "a"
-    one.health |= {"puppets": [one.told, *told], "looked_at": time.monotonic()}
+    reported = [{"name": one["name"], "base": "main", "made": "", "position_s": 0.0} for one in puppets[1:]]
+    one.reported["name"] = "a"
+    one.health |= {"puppets": [one.reported, *reported], "looked_at": time.monotonic()}
     made = [MadeMotionReader(one.folder, puppet) for puppet in range(4)]
     one.recipe()
-    told[0]["made"] = newest(made[1]).recipe
+    reported[0]["made"] = newest(made[1]).recipe
     one.recipe()  # a motion a look: the path that is waited for comes before the next variation
     assert made[3].read() is not None
-    told[0]["made"] = ""
+    reported[0]["made"] = ""
     varied, path = (json.loads(newest(made[puppet]).recipe) for puppet in (1, 3))
     assert (varied["source"], path["source"]) == ("vary", "path")
     assert made[0].read() is None and made[2].read() is None
@@ -114,7 +114,7 @@ def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
     one.recipe()
     again = json.loads(newest(made[1]).recipe)
     assert (again["sigma"], again["seed"]) == (2.0, varied["seed"]), "values are those of all puppets"
-    told[0]["made"] = newest(made[1]).recipe
+    reported[0]["made"] = newest(made[1]).recipe
     one.recipe()
     assert json.loads(newest(made[1]).recipe)["seed"] == varied["seed"] + 1
     assert one.recipe() == own, "what it made for the others changes nothing of the first"
@@ -166,7 +166,7 @@ def test_a_generator_that_was_killed_goes_on_where_it_was(bench: Benches, tmp_pa
     one.declare(phrase=("vary", NO_FADE))
     one.recipe()
     danced = one.dance()
-    health = {"puppets": [one.told | {"made": newest(one.made).recipe}]}
+    health = {"puppets": [one.reported | {"made": newest(one.made).recipe}]}
     one.close()
     other = bench(show)
     other.health = health

@@ -20,9 +20,9 @@ class TestCalibration:
         pair = paired()
         pair.device.save_profile(self.OFFSETS, pair.clock.now)
         pair.run(5.0)
-        told = pair.box.of(wire.Profile)
-        assert [packet.sequence for _, packet in told] == [0, 1, 2]
-        assert told[2][0] - told[0][0] == pytest.approx(2.0, abs=0.1)
+        reported = pair.box.of(wire.Profile)
+        assert [packet.sequence for _, packet in reported] == [0, 1, 2]
+        assert reported[2][0] - reported[0][0] == pytest.approx(2.0, abs=0.1)
         assert readings(pair)[-1].flags & wire.HAS_PROFILE
 
     def test_taken_after_the_assignment(self) -> None:

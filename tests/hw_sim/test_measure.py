@@ -58,18 +58,18 @@ def test_measures_writes_figures_and_picture_and_gives_a_verdict(tmp_path: Path)
     figures = json.loads(figures_file.read_text())
     assert json.loads((report / "measure.json").read_text()) == figures
     assert (report / "measure.png").read_bytes().startswith(b"\x89PNG")
-    told = [json.loads(line) for line in progress.read_text().splitlines()]
-    assert [one["phase"] for one in told if "phase" in one] == [
+    reported = [json.loads(line) for line in progress.read_text().splitlines()]
+    assert [one["phase"] for one in reported if "phase" in one] == [
         *("locked", "free", "power-ons", "restarts", "sound")
     ]
-    assert told[-1]["figures"] == figures
-    assert all(limit["holds"] for limit in told[-1]["limits"]) == (done.returncode == 0)
-    begun = told.index(next(one for one in told if one.get("phase") == "free"))
+    assert reported[-1]["figures"] == figures
+    assert all(limit["holds"] for limit in reported[-1]["limits"]) == (done.returncode == 0)
+    begun = reported.index(next(one for one in reported if one.get("phase") == "free"))
     live = [
         ms
-        for one in told[:begun]
+        for one in reported[:begun]
         for at, ms in zip(one.get("at_s", ()), one.get("transport_ms", ()), strict=True)
-        if at >= told[0]["settling_s"]
+        if at >= reported[0]["settling_s"]
     ]
     assert len(live) > 0.8 * figures["readings"], "what is told meanwhile"
     assert abs(float(np.median(live)) - figures["transport_ms"]["p50"]) < 1.0

@@ -35,8 +35,8 @@ def test_a_box_that_keeps_everything_in_memory_says_so(
     assert memory_of(STATE) == memory
     keeper = KeeperHealth(tmp_path, STATE)
     keeper.report([], 10.0)
-    told = [one for _, one in ProcessHealth(tmp_path).fallbacks(10.0)]
-    assert [(one.name, one.active, one.about) for one in told] == (
+    reported = [one for _, one in ProcessHealth(tmp_path).fallbacks(10.0)]
+    assert [(one.name, one.active, one.about) for one in reported] == (
         [(SAVED_IN_MEMORY.name, True, memory)] if memory else []
     )
     assert bool(memory) == ("gone at power-off" in forgotten(Path("/data/bunraku/keys/sensors.keys")))

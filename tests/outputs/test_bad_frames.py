@@ -88,12 +88,12 @@ def test_hammered_by_a_writer_no_reader_ever_takes_a_torn_frame(tmp_path: Path) 
                 )
                 for _ in range(3)
             ]
-            told = [tuple(map(int, reader.communicate()[0].split())) for reader in readers]
+            reported = [tuple(map(int, reader.communicate()[0].split())) for reader in readers]
         finally:
             writer.kill()
-    assert all(torn == 0 for _, torn, _ in told), told
-    assert all(seen > 1000 for seen, _, _ in told), told
-    assert any(overtaken for _, _, overtaken in told), "the writer was never faster: this proved nothing"
+    assert all(torn == 0 for _, torn, _ in reported), reported
+    assert all(seen > 1000 for seen, _, _ in reported), reported
+    assert any(overtaken for _, _, overtaken in reported), "the writer was never faster: this proved nothing"
 
 
 @pytest.mark.parametrize("content", [b"", b"x" * 100_000])

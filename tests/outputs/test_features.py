@@ -128,13 +128,13 @@ def test_a_hand_that_turns_steadily_has_its_angular_velocity_and_goes_straight()
     """Through half a turn and more, where a quaternion's sign and the shortest way change."""
     hand = Hand()
     for tick in range(3 * WINDOW):
-        told = hand.at(tick * STEP_S, 3.0 * tick * STEP_S, None)
-    assert told["/bunraku/hand/l_Wrist/velocity"] == pytest.approx([0.0, 3.0, 0.0], abs=1e-3)
-    assert told["/bunraku/hand/l_Wrist/qom"] == pytest.approx([3.0], abs=1e-3)
-    assert told["/bunraku/hand/l_Wrist/weight_effort"] == pytest.approx([9.0], abs=0.02)
-    assert told["/bunraku/hand/l_Wrist/space_effort"] == pytest.approx([1.0], abs=1e-3)
-    assert np.abs(told["/bunraku/hand/l_Wrist/acceleration"]).max() < 0.3
-    assert not any(address.startswith("/bunraku/live") for address in told), "nobody is there"
+        reported = hand.at(tick * STEP_S, 3.0 * tick * STEP_S, None)
+    assert reported["/bunraku/hand/l_Wrist/velocity"] == pytest.approx([0.0, 3.0, 0.0], abs=1e-3)
+    assert reported["/bunraku/hand/l_Wrist/qom"] == pytest.approx([3.0], abs=1e-3)
+    assert reported["/bunraku/hand/l_Wrist/weight_effort"] == pytest.approx([9.0], abs=0.02)
+    assert reported["/bunraku/hand/l_Wrist/space_effort"] == pytest.approx([1.0], abs=1e-3)
+    assert np.abs(reported["/bunraku/hand/l_Wrist/acceleration"]).max() < 0.3
+    assert not any(address.startswith("/bunraku/live") for address in reported), "nobody is there"
     assert "/bunraku/1/hand/l_Wrist/qom" in Hand(number=1).at(0.0, 0.0, None)
 
 
@@ -151,8 +151,8 @@ def test_a_hand_that_shakes_is_indirect_and_sudden() -> None:
 def test_a_live_dancer_has_a_puppets_features() -> None:
     hand = Hand()
     for tick in range(2 * WINDOW):
-        told = hand.at(tick * STEP_S, 0.0, 0.5 * tick * STEP_S)
-    assert told["/bunraku/live/velocity"] == pytest.approx([0.5, 0.0, 0.0] * JOINTS, abs=1e-3)
-    assert told["/bunraku/live/qom"] == pytest.approx([0.5], abs=1e-3)
-    assert told["/bunraku/live/space_effort"] == pytest.approx([1.0], abs=1e-3)
-    assert told["/mocap/0/qom"] == pytest.approx([0.0])
+        reported = hand.at(tick * STEP_S, 0.0, 0.5 * tick * STEP_S)
+    assert reported["/bunraku/live/velocity"] == pytest.approx([0.5, 0.0, 0.0] * JOINTS, abs=1e-3)
+    assert reported["/bunraku/live/qom"] == pytest.approx([0.5], abs=1e-3)
+    assert reported["/bunraku/live/space_effort"] == pytest.approx([1.0], abs=1e-3)
+    assert reported["/mocap/0/qom"] == pytest.approx([0.0])

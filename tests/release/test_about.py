@@ -19,14 +19,14 @@ def test_the_shows_stand_in_the_order_in_which_they_are_tried(tmp_path: Path) ->
     pairs = Pair(box=venue, id="a+b", source="from the stick"), Pair(good=True)
     chosen = tmp_path / "chosen.json"
     Choice(pairs, ("show.yaml:3: wrong.",), (Aside("c+", "It did not dance."),)).write(chosen)
-    told = about(chosen, None, tmp_path)
-    assert told["shows"] == [
+    reported = about(chosen, None, tmp_path)
+    assert reported["shows"] == [
         {"id": "a+b", "source": "from the stick", "good": False},
         {"id": "", "source": "comes with the box", "good": True},
     ]
-    assert (told["refused"], told["aside"]) == (["show.yaml:3: wrong."], ["It did not dance."])
-    assert told["box_file"] == str(venue)
-    json.dumps(told)
+    assert (reported["refused"], reported["aside"]) == (["show.yaml:3: wrong."], ["It did not dance."])
+    assert reported["box_file"] == str(venue)
+    json.dumps(reported)
 
 
 @pytest.mark.parametrize("content", [None, "", "{", "[]", '{"pairs": 3}'])

@@ -53,7 +53,7 @@ class Wearable:
     ) -> bytes:
         half = radians(degrees) / 2
         moment_us = 20_000 * sequence % 2**32 if time_us is None else time_us
-        told = {"calibration": 0x3C, "battery": 80, "round_trip": 23, "taps": 1, "recoveries": 2} | fields
+        reported = {"calibration": 0x3C, "battery": 80, "round_trip": 23, "taps": 1, "recoveries": 2} | fields
         packet = wire.Reading(
             self.key.device_id,
             self.boot,
@@ -61,8 +61,8 @@ class Wearable:
             sequence,
             moment_us,
             (length * cos(half), length * sin(half), 0.0, 0.0),
-            flags=told.pop("flags", self.flags),
-            **told,
+            flags=reported.pop("flags", self.flags),
+            **reported,
         )
         return wire.pack(packet, self.tagger)
 

@@ -11,15 +11,15 @@ HOUR_S = 3600.0
 
 def test_what_is_left_is_known_after_a_while_and_no_longer_than_it_lasts() -> None:
     life, rng, lasts_s = BatteryLife(), random.Random(1), 3 * HOUR_S
-    told = []
+    reported = []
     for now in range(round(lasts_s)):
         percent = round(100 * (1 - now / lasts_s) + rng.uniform(-0.7, 0.7))
         life.hear(max(0, percent), float(now))
         if life.left_s != UNKNOWN_S:
-            told.append((life.left_s, lasts_s - now))
-    assert 0.05 * lasts_s < lasts_s - len(told) < 0.2 * lasts_s
-    assert all(left <= truly + 300.0 for left, truly in told)
-    left, truly = told[len(told) // 2]
+            reported.append((life.left_s, lasts_s - now))
+    assert 0.05 * lasts_s < lasts_s - len(reported) < 0.2 * lasts_s
+    assert all(left <= truly + 300.0 for left, truly in reported)
+    left, truly = reported[len(reported) // 2]
     assert left > 0.6 * truly
 
 

@@ -73,11 +73,11 @@ def test_both_sides_have_the_same_key_and_the_wearable_all_settings(path: Path) 
     assert not any(secret in "\n".join(said) for secret in (sensor.key.hex(), "curtain up 9"))
 
 
-@pytest.mark.parametrize(("crystal", "told"), [(True, "yes"), (False, "no"), (None, "yes")])
-def test_a_crystal_is_set_only_when_asked_for(path: Path, crystal: bool | None, told: str) -> None:
+@pytest.mark.parametrize(("crystal", "reported"), [(True, "yes"), (False, "no"), (None, "yes")])
+def test_a_crystal_is_set_only_when_asked_for(path: Path, crystal: bool | None, reported: str) -> None:
     with FakeWearable(Memory(crystal="yes")) as fake:
         provisioned(fake, path, Settings("head", crystal=crystal))
-    assert fake.saved.crystal == told
+    assert fake.saved.crystal == reported
     assert any(line.startswith("set crystal") for line in fake.heard) == (crystal is not None)
 
 
@@ -120,9 +120,9 @@ def test_a_wearable_does_not_take_anothers_name_by_mistake(path: Path, own: str,
     keys = create_keys(path, ["left-wrist", "spare-1"])
     device = f"{keys[own].device_id:08x}" if own else "00000001"
     with FakeWearable(Memory("left-wrist", device)) as fake:
-        told = refused(fake, path)
-        assert message in told
-        assert f"bunraku sensors replace left-wrist {own or '--port'}" in told
+        reported = refused(fake, path)
+        assert message in reported
+        assert f"bunraku sensors replace left-wrist {own or '--port'}" in reported
         assert fake.saved.key == b""
         done, _ = provisioned(fake, path, takes_over=True)
     assert done.was == own
@@ -133,8 +133,8 @@ def test_a_wearable_does_not_take_anothers_name_by_mistake(path: Path, own: str,
 def test_a_wearable_of_the_show_does_not_leave_its_joint_to_replace_another(path: Path) -> None:
     keys = create_keys(path, ["left-wrist", "right-ankle"])
     with FakeWearable(Memory("right-ankle", f"{keys['right-ankle'].device_id:08x}")) as fake:
-        told = refused(fake, path, takes_over=True, worn=["right-ankle"])
-        assert "This wearable is right-ankle, a sensor of this show" in told
+        reported = refused(fake, path, takes_over=True, worn=["right-ankle"])
+        assert "This wearable is right-ankle, a sensor of this show" in reported
         assert fake.saved.key == b""
         done, _ = provisioned(fake, path, Settings("right-ankle"), worn=["right-ankle"])  # its own name
     assert load_keys(path)["right-ankle"] == done.sensor

@@ -79,8 +79,8 @@ class Clocks:
         """What becomes of a datagram that the kernel stamped at this moment of the monotonic clock."""
         seconds = int(stamped + self.wall_minus_monotonic)
         nanoseconds = round((stamped + self.wall_minus_monotonic - seconds) * 1e9)
-        told = [(socket.SOL_SOCKET, SO_TIMESTAMPNS, TIMESPEC.pack(seconds, nanoseconds))]
-        return self.intake._arrival(told, now)
+        reported = [(socket.SOL_SOCKET, SO_TIMESTAMPNS, TIMESPEC.pack(seconds, nanoseconds))]
+        return self.intake._arrival(reported, now)
 
     def _wall(self) -> float:
         self.now += self.held_up_s

@@ -41,8 +41,8 @@ def test_what_is_nested_deeper_than_anybody_writes_is_refused_at_once(text: str,
         parse_keys(tmp_path / "keys.yaml", text)
     with pytest.raises(DamagedMemoryError):
         read_memory(text.encode())
-    told = change(box_file(tmp_path, ""), None, Change(text, [(["control", "port"], 9003)]))
-    assert "nested too deeply" in told["problems"][0]["message"]
+    reported = change(box_file(tmp_path, ""), None, Change(text, [(["control", "port"], 9003)]))
+    assert "nested too deeply" in reported["problems"][0]["message"]
     assert time.process_time() - began < 10.0, "it took 23 s for one of them"
 
 
@@ -62,8 +62,8 @@ def test_a_value_that_no_file_holds_is_refused() -> None:
 
 
 def test_a_text_of_any_length_is_bounded(tmp_path: Path) -> None:
-    told = change(box_file(tmp_path, ""), None, Change("#" * (MAX_BYTES + 1), []))
-    assert "at most 256 kB" in told["problems"][0]["message"]
+    reported = change(box_file(tmp_path, ""), None, Change("#" * (MAX_BYTES + 1), []))
+    assert "at most 256 kB" in reported["problems"][0]["message"]
 
 
 @pytest.mark.parametrize("line", ["key{}: 1", "stat{}: 1", "a: {}"], ids=["unknown", "nearly", "twice"])

@@ -95,7 +95,7 @@ class StageDouble:
         self.obeys = True
         self.answer: Callable[[Order], tuple[bool, str]] = lambda order: (True, f"{order.name} it is.")
         self.orders: list[Order] = []
-        self.told: dict[str, Any] = {"state": "dancing", "rate_hz": 50.0, "puppets": [{"is_led": True}]}
+        self.reported: dict[str, Any] = {"state": "dancing", "rate_hz": 50.0, "puppets": [{"is_led": True}]}
         self.remark = ""
         self._show_state = ShowStateReader(folder)
         self._telling = threading.Lock()
@@ -125,16 +125,16 @@ class StageDouble:
         """Say this about itself and its puppet from now on."""
         with self._telling:
             of_puppet = {name: health.pop(name) for name in OF_PUPPET & health.keys()}
-            self.told["puppets"] = [self.told["puppets"][0] | of_puppet]
-            self.told |= health
-            self._writer.write_health(self.told)
+            self.reported["puppets"] = [self.reported["puppets"][0] | of_puppet]
+            self.reported |= health
+            self._writer.write_health(self.reported)
 
     def _live(self) -> None:
         while not self._is_over.wait(0.005):
             if self.dances:
                 self._share()
             generation = self._show_state.read().generation
-            if self.obeys and generation != self.told.get("applied", [0])[0]:
+            if self.obeys and generation != self.reported.get("applied", [0])[0]:
                 self.tell(applied=[generation, self.remark])
             while self.obeys and (order := self._inbox.take()) is not None:
                 self.orders.append(order)

@@ -192,8 +192,8 @@ def test_a_damaged_datagram_is_refused_in_words(
     reply = asker.hear()
     assert reply is not None and reply[2] == 0 and message in reply[3]
     assert reader.read() is None
-    told = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
-    assert told and told[0][4] == 1
+    reported = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
+    assert reported and reported[0][4] == 1
 
 
 @pytest.mark.parametrize("program", [xsens, mocopi])

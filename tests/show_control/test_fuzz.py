@@ -30,10 +30,10 @@ def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
 ) -> None:
     count = MOST if long_run else COUNT
     writer, sender, projector = ShowStateWriter(folder), OrderSender(folder), InboxDouble(folder, "projector")
-    told: list[int] = []
+    reported: list[int] = []
 
     def tell(to: Address, message: Message) -> None:
-        told.append(len(datagram(message)))
+        reported.append(len(datagram(message)))
 
     dispatch = OrderDispatch(sender)
     handler = CommandHandler(
@@ -57,8 +57,8 @@ def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
     assert 0.0 <= show_state[MASTER].value <= 1.0
     assert show_state[LOOK].value in ("", "plaster", "lines", "ink", "cloud")
     assert handler.refused > count / 2
-    assert len(told) > count / 2
-    assert max(told) < 1500  # an answer is no weapon
+    assert len(reported) > count / 2
+    assert max(reported) < 1500  # an answer is no weapon
     assert stage.orders  # some of them were commands
     assert all(math.isfinite(value) for order in stage.orders for value in order.values)
     projector.close()

@@ -74,11 +74,11 @@ class Hand:
         self.rest(made[-1])
 
     def learned(self) -> dict[str, Any]:
-        """What is told once nothing is being learned any more."""
+        """What is reported once nothing is being learned any more."""
         while self.gestures._learning is not None:
             time.sleep(0.01)
             self.gestures.look(self.now)
-        return self.gestures.told()
+        return self.gestures.reported()
 
     def close(self) -> None:
         self.gestures.close()
@@ -100,9 +100,11 @@ def test_a_gesture_is_recorded_calls_its_cue_and_survives_restart_and_power_cut(
     for count in range(1, 4):
         hand.make("salute", rng)
         if count < 3:
-            assert hand.gestures.told()["recording"] == {"name": "lift", "come": count}
-    told = hand.learned()
-    assert told["recording"] is None and told["list"] == [{"name": "lift", "cue": "storm", "hand": "2"}]
+            assert hand.gestures.reported()["recording"] == {"name": "lift", "come": count}
+    reported = hand.learned()
+    assert reported["recording"] is None and reported["list"] == [
+        {"name": "lift", "cue": "storm", "hand": "2"}
+    ]
     hand.make("wave", rng)
     assert hand.called == []
     hand.make("salute", rng)
@@ -120,7 +122,7 @@ def test_a_gesture_is_recorded_calls_its_cue_and_survives_restart_and_power_cut(
         hand.gestures.look(hand.now)
         hand.make("salute", rng)
         assert hand.called == ["storm"] * (2 + is_cut)
-        assert [one["name"] for one in hand.gestures.told()["list"]] == ["lift" if is_cut else "up"]
+        assert [one["name"] for one in hand.gestures.reported()["list"]] == ["lift" if is_cut else "up"]
     hand.gestures.forget("lift")
     hand.make("salute", rng)
     assert len(hand.called) == 3
@@ -131,9 +133,9 @@ def test_a_gesture_that_is_not_made_is_not_learned(hand: Hand) -> None:
     hand.gestures.record("lift", "storm", hand.now)
     hand.now += RECORD_S
     hand.rest(np.array([1.0, 0.0, 0.0, 0.0]))
-    assert hand.gestures.told()["recording"] is None and "none is learned" in hand.gestures.message
+    assert hand.gestures.reported()["recording"] is None and "none is learned" in hand.gestures.message
     hand.gestures.record("lift", "storm", hand.now)
-    assert "not recorded" in hand.gestures.stop() and hand.gestures.told()["list"] == []
+    assert "not recorded" in hand.gestures.stop() and hand.gestures.reported()["list"] == []
 
 
 def test_what_no_gesture_can_be(hand: Hand) -> None:

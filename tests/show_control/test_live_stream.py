@@ -102,8 +102,8 @@ def test_numbers_that_no_figure_has_are_refused_told_and_end_nothing(
     asker.socket.send(received)
     heard = asker.hear()
     assert heard is not None and heard[2] == 0 and text in heard[3]
-    told = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
-    assert told and told[0][4] == 1 and text in told[0][5]
+    reported = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
+    assert reported and reported[0][4] == 1 and text in reported[0][5]
     with closing(LivePoseReader(folder)) as reader:
         assert reader.read() is None
     assert asker.ask("/panic")[2] == 1
@@ -224,8 +224,8 @@ def test_how_much_of_a_live_dancer_comes_is_answered_and_told(
     answer = asker.ask("/phrase", LIVE)[3]
     assert f"1 of {len(BONES)} bones come, without Hips" in answer and "stay with the phrase" in answer
     stream("LeftUpperArm")
-    told = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-partial"]
-    assert told and told[0][4] == 1 and f"1 of {len(BONES)} bones" in told[0][5]
+    reported = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-partial"]
+    assert reported and reported[0][4] == 1 and f"1 of {len(BONES)} bones" in reported[0][5]
     until(lambda: stream(*BONES) == f"{len(BONES)} of {len(BONES)} bones")
     assert [one[4] for one in asker.ask_all("/fallbacks") if one[1] == "live-partial"] == [0]
     with closing(LivePoseReader(folder)) as reader:

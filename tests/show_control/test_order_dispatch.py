@@ -110,8 +110,8 @@ def test_what_was_told_as_not_done_is_corrected_when_it_was_done_after_all(
     assert order is not None
     for now in (order.until + ANSWER_S + 0.01, order.until + late_s - 0.01):
         dispatch.exchange(now)
-    [(told, message)] = heard.all
-    assert not told and "does not answer" in message
+    [(reported, message)] = heard.all
+    assert not reported and "does not answer" in message
     for _ in range(2):
         inbox.answer(order, done, "Cue storm.")
         dispatch.exchange(order.until + late_s)

@@ -126,8 +126,8 @@ def test_points_that_are_no_figure_are_refused_in_words(
     asker.ask("/ping")
     reply = asker.ask(POSITIONS, *arguments)
     assert reply[2] == 0 and message in reply[3]
-    told = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
-    assert told and told[0][4] == 1
+    reported = [one for one in asker.ask_all("/fallbacks") if one[1] == "live-refused"]
+    assert reported and reported[0][4] == 1
     assert reader.read() is None
 
 

@@ -122,9 +122,9 @@ def test_over_a_network_the_listed_are_heard_and_strangers_change_nothing(
         assert control.process.handler.show_state.panic == may
         assert control.process.port.strangers == (0 if may else 50)
         until(lambda: may or bool(control.said))
-        told = {one.name: one for one in control.process.observer.own.happened(time.monotonic())}
-        assert ("sender-not-listed" in told) == (not may)
-        assert may or (told["sender-not-listed"].about, told["sender-not-listed"].active) == (
+        reported = {one.name: one for one in control.process.observer.own.happened(time.monotonic())}
+        assert ("sender-not-listed" in reported) == (not may)
+        assert may or (reported["sender-not-listed"].about, reported["sender-not-listed"].active) == (
             "10.77.0.2",
             True,
         )

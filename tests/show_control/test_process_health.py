@@ -24,7 +24,7 @@ from tests.show_control.doubles import Asker, ControlInThread, StageDouble, fact
 DMX = Fallback("dmx-away", "A wire is away.")
 
 
-def told(processes: ProcessHealth, now: float) -> dict[str, tuple[str, int, bool]]:
+def reported(processes: ProcessHealth, now: float) -> dict[str, tuple[str, int, bool]]:
     return {one.name: (who, one.times, one.active) for who, one in processes.fallbacks(now)}
 
 
@@ -32,12 +32,12 @@ def test_a_process_tells_its_fallbacks(folder: Path) -> None:
     fallbacks, processes = Fallbacks([DMX]), ProcessHealth(folder)
     lights = ProcessHealthWriter(folder, "lights", fallbacks)
     lights.publish_health(10.0)
-    assert told(processes, 10.0) == {}
+    assert reported(processes, 10.0) == {}
     fallbacks.set("dmx-away", "The adapter is unplugged.")
     lights.publish_health(10.5)
-    assert told(processes, 10.5) == {}, "once a second is enough"
+    assert reported(processes, 10.5) == {}, "once a second is enough"
     lights.publish_health(11.0)
-    assert told(processes, 11.0) == {"dmx-away": ("lights", 1, True)}
+    assert reported(processes, 11.0) == {"dmx-away": ("lights", 1, True)}
     lights.end(11.5)
     lights.close()
     processes.close()
@@ -49,18 +49,18 @@ def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
         first = ProcessHealthWriter(folder, who, Fallbacks(()))
         first.publish_health(10.0)
         first.close()  # and never says that it ends
-        assert told(processes, 10.0 + LATE_S) == {}
-        late = told(processes, 10.1 + LATE_S)
+        assert reported(processes, 10.0 + LATE_S) == {}
+        late = reported(processes, 10.1 + LATE_S)
         assert late == {f"{who}-died": (who, 1, True)}
         second = ProcessHealthWriter(folder, who, Fallbacks(()))
         second.publish_health(20.0)
-        assert told(processes, 20.0) == {f"{who}-died": (who, 1, False)}
+        assert reported(processes, 20.0) == {f"{who}-died": (who, 1, False)}
         second.end(21.0)
         second.close()
-        assert told(processes, 90.0) == {f"{who}-died": (who, 1, False)}, "what has ended is not late"
+        assert reported(processes, 90.0) == {f"{who}-died": (who, 1, False)}, "what has ended is not late"
         third = ProcessHealthWriter(folder, who, Fallbacks(()))
         third.publish_health(100.0)
-        assert told(processes, 100.0) == {}
+        assert reported(processes, 100.0) == {}
         third.close()
         (folder / f"{who}.health").unlink()
         processes = ProcessHealth(folder)
@@ -74,7 +74,7 @@ def test_a_second_projector_says_nothing(folder: Path) -> None:
         second_fallbacks.set(row.name, True)
     first.publish_health(10.0)
     second.publish_health(10.0)
-    assert told(ProcessHealth(folder), 10.0) == {}
+    assert reported(ProcessHealth(folder), 10.0) == {}
     second.close()
     first.close()
 
@@ -88,7 +88,7 @@ def test_the_keeper_tells_that_the_journal_has_stopped(folder: Path) -> None:
     journal.complaint = "The disk is full."
     keeper = KeeperHealth(folder)
     keeper.report([journal], 10.0)
-    assert told(ProcessHealth(folder), 10.0) == {JOURNAL_STOPPED.name: ("keeper", 1, True)}
+    assert reported(ProcessHealth(folder), 10.0) == {JOURNAL_STOPPED.name: ("keeper", 1, True)}
     keeper.end(11.0)
 
 
@@ -102,19 +102,19 @@ def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
     keeper = KeeperHealth(folder)
     keeper.report([chosen, place, sensors], 10.0)
     rows = {PLACE_NOT_SAVED.name, SENSORS_NOT_SAVED.name, CHOICE_NOT_SAVED.name}
-    assert set(told(ProcessHealth(folder), 10.0)) == rows
+    assert set(reported(ProcessHealth(folder), 10.0)) == rows
     chosen.complaint = place.complaint = sensors.complaint = ""
     keeper.report([chosen, place, sensors], 12.0)
-    assert not any(active for _, _, active in told(ProcessHealth(folder), 12.0).values())
+    assert not any(active for _, _, active in reported(ProcessHealth(folder), 12.0).values())
     keeper.end(13.0)
 
 
 def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
     processes = ProcessHealth(folder)
-    assert told(processes, 1.0) == {}
+    assert reported(processes, 1.0) == {}
     aside = (Aside("a+", "Did not dance."),)
     Choice((Pair(),), ("Broken one.", "Broken two."), aside).write(folder / CHOSEN)
-    assert told(processes, 1.0) == {
+    assert reported(processes, 1.0) == {
         "show-refused": ("preflight", 2, True),
         "show-put-aside": ("preflight", 1, True),
     }
@@ -125,7 +125,7 @@ def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
     Choice(refused=("/media/a stick/show.yaml:3: no such key.", "It is not danced.")).write(folder / CHOSEN)
     assert [one.about for _, one in processes.fallbacks(1.0)] == ["show.yaml:3"]
     (folder / CHOSEN).write_bytes(b"{")
-    assert told(processes, 1.0) == {}
+    assert reported(processes, 1.0) == {}
 
 
 def test_a_stage_that_hangs_is_counted_once(folder: Path) -> None:
@@ -164,13 +164,13 @@ def test_the_desk_answers_and_the_status_counts(folder: Path) -> None:
         stage.tell(fallbacks=[["tick-late", 3, True, message], ["receiver-gone", 1, False, "Gone."]])
         asker = Asker(control.port)
 
-        def told() -> list[list[object]]:
+        def reported() -> list[list[object]]:
             *answers, end = asker.ask_all("/fallbacks")
             assert end == ["/end", "/fallbacks", len(answers)]
             return [answer for answer in answers if answer[2] == "stage"]  # a busy machine has others, too
 
-        until(lambda: len(told()) == 2)
-        assert told()[0] == ["/fallbacks/fallback", "tick-late", "stage", 3, 1, message, ""]
+        until(lambda: len(reported()) == 2)
+        assert reported()[0] == ["/fallbacks/fallback", "tick-late", "stage", 3, 1, message, ""]
         until(lambda: asker.status().fallbacks == 1)
         asker.close()
     control.close()

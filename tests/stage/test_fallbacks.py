@@ -96,9 +96,9 @@ def test_packet_refused(stage: Watch, danced: StageParts, reason: str) -> None:
 
 def test_cable_away(stage: Watch, danced: StageParts) -> None:
     stage.check(1.0, Health())
-    told = of(stage, rows.CABLE_AWAY, 1.0)
-    assert told[1:3] == (1, True)
-    assert "ttyACM0" in told.message
+    reported = of(stage, rows.CABLE_AWAY, 1.0)
+    assert reported[1:3] == (1, True)
+    assert "ttyACM0" in reported.message
     danced.link.intakes[0].trouble = None  # type: ignore[attr-defined]
     stage.check(2.0, Health())
     assert of(stage, rows.CABLE_AWAY, 2.0)[1:3] == (1, False)
@@ -113,9 +113,9 @@ def test_address_absent(stage: Watch, danced: StageParts) -> None:
 
 
 def test_sensor_not_let_in(stage: Watch) -> None:
-    told = of(stage, rows.NOT_LET_IN, 1.0)
-    assert told[1:3] == (1, True)
-    assert "key file" in told.message
+    reported = of(stage, rows.NOT_LET_IN, 1.0)
+    assert reported[1:3] == (1, True)
+    assert "key file" in reported.message
 
 
 @pytest.mark.parametrize(
@@ -140,9 +140,9 @@ def test_what_health_counts(stage: Watch, row: Fallback, counter: str) -> None:
 
 def test_iterations_lowered(danced: StageParts, stage: Watch) -> None:
     assert of(stage, rows.ITERATIONS_LOWERED, 0.0).times == 0
-    told = of(Watch(danced, DOES_NOT_FIT), rows.ITERATIONS_LOWERED, 0.0)
-    assert told[1:3] == (1, True)
-    assert "30 coding iterations do not fit" in told.message
+    reported = of(Watch(danced, DOES_NOT_FIT), rows.ITERATIONS_LOWERED, 0.0)
+    assert reported[1:3] == (1, True)
+    assert "30 coding iterations do not fit" in reported.message
 
 
 def test_receiver_gone(stage: Watch, danced: StageParts) -> None:
@@ -168,13 +168,13 @@ def test_what_a_fallback_is_about_is_told_by_name(stage: Watch, danced: StagePar
         (rows.RECEIVER_GONE, receiver),
         (rows.CABLE_AWAY, danced.link.intakes[0].name),
     ):
-        told = of(stage, row, 3.0)
-        assert told.active and told.about == name and name in told.message, row.name
+        reported = of(stage, row, 3.0)
+        assert reported.active and reported.about == name and name in reported.message, row.name
     hear(danced, 3.1)  # it is back, and the name of what was silent stays
     stage.count_silences(3.12)
     stage.check(4.0, Health())
-    told = of(stage, rows.SENSOR_SILENT, 20.0)
-    assert (told.active, told.about) == (False, "left-wrist")
+    reported = of(stage, rows.SENSOR_SILENT, 20.0)
+    assert (reported.active, reported.about) == (False, "left-wrist")
 
 
 def test_a_system_that_stamps_no_datagrams_is_told_once(stage: Watch, danced: StageParts) -> None:

@@ -89,8 +89,8 @@ class Dance:
 
     def late(self) -> int:
         """How often a source was late."""
-        told = {one.name: one for one in self.watch.fallbacks.happened(self.now)}
-        return told[rows.SOURCE_LATE.name].times if rows.SOURCE_LATE.name in told else 0
+        reported = {one.name: one for one in self.watch.fallbacks.happened(self.now)}
+        return reported[rows.SOURCE_LATE.name].times if rows.SOURCE_LATE.name in reported else 0
 
 
 @pytest.fixture

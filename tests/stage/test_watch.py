@@ -110,9 +110,11 @@ def test_a_sensor_that_moves_to_a_cable_and_back(cast: StageParts) -> None:
 
 def test_a_low_battery_is_told_of_once_until_it_was_charged(cast: StageParts) -> None:
     watch = Watch(cast, FITS)
-    told = [watch.check(1.0, Health(), [sensor(battery=level)]) for level in (16, 14, 15, 13, 255, 12, 80, 9)]
-    assert [len(message) for message in told] == [1, 1, 0, 0, 0, 0, 0, 1]  # the first one: linked
-    assert told[1] == ["Sensor left-wrist: 14 % of its battery left. The dance goes on. Charge it soon."]
+    reported = [
+        watch.check(1.0, Health(), [sensor(battery=level)]) for level in (16, 14, 15, 13, 255, 12, 80, 9)
+    ]
+    assert [len(message) for message in reported] == [1, 1, 0, 0, 0, 0, 0, 1]  # the first one: linked
+    assert reported[1] == ["Sensor left-wrist: 14 % of its battery left. The dance goes on. Charge it soon."]
 
 
 def test_a_complaint_of_the_link_is_passed_on_once(cast: StageParts) -> None:

@@ -69,9 +69,9 @@ def test_training_ends_with_whether_the_dancer_answers(trained: Trained) -> None
 
 def test_training_leaves_its_history_and_pictures(trained: Trained) -> None:
     show, _ = trained
-    told = json.loads((show / "training.json").read_text())
-    assert told["settings"]["width"] == 48 and told["history"][-1]["step"] == 60
-    assert told["history"][-1]["held_out_degrees"] > 0
+    reported = json.loads((show / "training.json").read_text())
+    assert reported["settings"]["width"] == 48 and reported["history"][-1]["step"] == 60
+    assert reported["history"][-1]["held_out_degrees"] > 0
     for picture in (show / "pictures" / "losses.png", show / "report.png", show / "answer.png"):
         assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 10_000
     listed = (show / "SHA256SUMS").read_text()

@@ -117,10 +117,16 @@ def test_four_baselines_are_in_the_json_and_in_the_table(
     comparison: Comparison, training: list[Take], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(critics, "STEPS", 30)
-    told: list[str] = []
+    reported: list[str] = []
     recorded = Recorded(training, NAMES, [take("other", 900)])
     found = puppetry.measure(
-        comparison.measurements[:1], [ARM], [(10, 9)], (10,), told.append, turning=False, recorded=recorded
+        comparison.measurements[:1],
+        [ARM],
+        [(10, 9)],
+        (10,),
+        reported.append,
+        turning=False,
+        recorded=recorded,
     )
     baselines = found[ARM]["baselines"]
     assert list(baselines) == ["phrase", "pasted", "network", "matching"]
@@ -134,7 +140,7 @@ def test_four_baselines_are_in_the_json_and_in_the_table(
     assert baselines["pasted"]["coupling"] < 0.3 * baselines["phrase"]["coupling"]
     assert baselines["matching"]["held"] < 0.1
     assert baselines["matching"]["coupling"] > baselines["pasted"]["coupling"]
-    assert len(told) == puppetry.dances(1, 1, [(10, 9)], (10,), compared=True) - len(puppetry.TURNING)
+    assert len(reported) == puppetry.dances(1, 1, [(10, 9)], (10,), compared=True) - len(puppetry.TURNING)
     assert json.loads(json.dumps(found))[ARM]["baselines"] == baselines
     table = comparison_table(found, [ARM])
     assert table is not None and len(table.columns) == 5 and table.row_count > 20

@@ -62,9 +62,9 @@ def test_random_latents_decode_to_poses_as_the_report_says(show: Path, report: d
     poses = np.concatenate([decoder.run(None, {name: latent})[0] for latent in noise])
     angles = np.degrees(quaternion.angle_between(poses, coder.rest))
     assert angles.max() > 30.0, "the dancer stands still whatever the latent"
-    told, beyond = report["random_latents"], np.maximum(angles - ranges, 0.0)
-    assert (beyond == 0).mean() == pytest.approx(told["share_within_range"], abs=0.01)
-    assert beyond.max() == pytest.approx(told["furthest_beyond_degrees"], abs=10.0)
+    reported, beyond = report["random_latents"], np.maximum(angles - ranges, 0.0)
+    assert (beyond == 0).mean() == pytest.approx(reported["share_within_range"], abs=0.01)
+    assert beyond.max() == pytest.approx(reported["furthest_beyond_degrees"], abs=10.0)
 
 
 def test_the_report_is_about_this_network(show: Path, report: dict[str, Any]) -> None:

@@ -91,7 +91,7 @@ def test_a_training_goes_on_from_a_show(
     before, after = (json.loads((each / "training.json").read_text()) for each in (show, tmp_path / "next"))
     assert after["settings"]["width"] == 48 and after["settings"]["learning_rate"] == 2e-4
     assert after["settings"]["alive_from"] == 0 < before["settings"]["alive_from"]
-    errors = [told["history"][-1]["held_out_degrees"] for told in (before, after)]
+    errors = [reported["history"][-1]["held_out_degrees"] for reported in (before, after)]
     assert errors[1] < 1.1 * errors[0], "it began anew"
     for message, options in (
         ("--width comes with", ("new", "--width", 16)),

@@ -124,8 +124,8 @@ def test_the_command_makes_a_phrase_that_a_show_can_play(
     assert len(phrase) >= 90 and phrase.fps == pytest.approx(50.0)
     assert np.isfinite(phrase.poses).all() and np.isfinite(phrase.roots).all()
     assert out.with_suffix(".png").stat().st_size > 10_000
-    told = json.loads(out.with_suffix(".json").read_text())
-    assert told["naturalness"]["seconds"] == pytest.approx(len(phrase) / 50, abs=0.05)
+    reported = json.loads(out.with_suffix(".json").read_text())
+    assert reported["naturalness"]["seconds"] == pytest.approx(len(phrase) / 50, abs=0.05)
 
 
 @pytest.mark.parametrize(

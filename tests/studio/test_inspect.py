@@ -60,8 +60,8 @@ def test_an_ending_in_any_case_is_one_and_what_is_left_out_of_a_folder_is_named(
     (tmp_path / "four.GLB").write_bytes(b"")
     (tmp_path / "more").mkdir()
     write_bvh(tmp_path / "more" / "five.bvh", dance_of("Mixamo", seconds=2.0))
-    told = said(bunraku("inspect", tmp_path))
-    assert f"Only BVH files are read, left out of {tmp_path}: four.GLB, more/." in told
+    reported = said(bunraku("inspect", tmp_path))
+    assert f"Only BVH files are read, left out of {tmp_path}: four.GLB, more/." in reported
     assert "Only BVH files are read, left out: four.GLB, more/." in findings(load_dataset(tmp_path))
 
 
@@ -131,9 +131,9 @@ def test_masked_frames_are_named_drawn_and_kept_on_demand(tmp_path: Path) -> Non
 
 
 def test_a_show_keeps_how_its_recordings_were_read(tmp_path: Path) -> None:
-    told = Catalogue().with_options(ReadingOptions(up={"*": "z"}, true_fps={"a_*": 60.0}))
-    assert told.reading.fps_of("a_1") == 60.0 and told.reading.conventions_of("b").up == "z"
-    (tmp_path / "report.json").write_text(json.dumps({KEY: reading_facts(told)}))
+    reported = Catalogue().with_options(ReadingOptions(up={"*": "z"}, true_fps={"a_*": 60.0}))
+    assert reported.reading.fps_of("a_1") == 60.0 and reported.reading.conventions_of("b").up == "z"
+    (tmp_path / "report.json").write_text(json.dumps({KEY: reading_facts(reported)}))
     kept = remembered_reading(tmp_path / "puppet.onnx").options
     assert kept.up == {"*": "z"} and kept.fps_of("a_2") == 60.0
     assert ReadingOptions(up={"*": "y"}).over(kept).conventions_of("c").up == "y"

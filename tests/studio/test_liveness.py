@@ -76,10 +76,10 @@ def test_each_cause_is_told_with_its_cure(cause: str, tmp_path: Path) -> None:
     network = MotionNetwork(made(cause, tmp_path / "pose.onnx"), names)
     found = network_liveness(network, poses[:, network.places])
     assert found.cause == ("" if cause == "map" else cause), found
-    told = what_is_dead(network, poses[:, network.places])
-    assert CAUSES[cause] in told
+    reported = what_is_dead(network, poses[:, network.places])
+    assert CAUSES[cause] in reported
     cure = {"deaf": "--seed", "collapsed": "--latent 8", "unlearned": "--minutes", "map": "--latent 2"}
-    assert cure[cause] in told and sum(each in told for each in cure.values()) == 1
+    assert cure[cause] in reported and sum(each in reported for each in cure.values()) == 1
 
 
 @pytest.mark.parametrize("name", ["pose.onnx", "sequence.onnx"])

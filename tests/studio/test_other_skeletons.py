@@ -36,7 +36,7 @@ def write(folder: Path, *recordings: Recording, metres_per_unit: float = 0.01) -
     return folder
 
 
-def told(dataset: Dataset) -> str:
+def reported(dataset: Dataset) -> str:
     return " ".join(findings(dataset))
 
 
@@ -66,8 +66,8 @@ def test_a_folder_of_any_body_is_read_as_it_is(tmp_path: Path, fingers: int) -> 
     found = load_dataset(write(tmp_path / "dancer", *(moved(skeleton, seed=seed) for seed in range(3))))
     assert len(found.moving) == len(skeleton) and found.mirrors
     assert all(take.sound.all() and take.notes == () for take in found.takes)
-    assert f"{len(skeleton)} of {len(skeleton)} joints move" in told(found)
-    assert "mirror images besides" in told(found)
+    assert f"{len(skeleton)} of {len(skeleton)} joints move" in reported(found)
+    assert "mirror images besides" in reported(found)
 
 
 def test_a_file_in_metres_is_read_in_metres(tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_a_file_in_metres_is_read_in_metres(tmp_path: Path) -> None:
     take = found.training[0].recording
     np.testing.assert_allclose(take.skeleton.offsets, dance.skeleton.offsets, atol=1e-5)
     np.testing.assert_allclose(take.roots, dance.roots, atol=1e-5)
-    assert "take_0, take_1: lengths read as metres" in told(found)
+    assert "take_0, take_1: lengths read as metres" in reported(found)
     known = load_dataset(tmp_path / "dancer", Catalogue(metres_per_unit={"*": 0.5}))
     np.testing.assert_allclose(known.skeleton.offsets, 0.5 * dance.skeleton.offsets, atol=1e-5)
 
@@ -85,7 +85,7 @@ def test_z_up_becomes_y_up(tmp_path: Path) -> None:
     dance = moved(body())
     found = load_dataset(write(tmp_path / "dancer", z_up(dance), z_up(moved(body(), seed=1))))
     take = found.training[0].recording
-    assert "turned from Z up to Y up" in told(found)
+    assert "turned from Z up to Y up" in reported(found)
     np.testing.assert_allclose(take.skeleton.offsets, dance.skeleton.offsets, atol=1e-5)
     seen, _ = dance.skeleton.forward_kinematics(dance.poses, dance.roots)
     places, _ = take.skeleton.forward_kinematics(take.poses, take.roots)
@@ -106,7 +106,7 @@ def test_a_root_that_only_carries_the_body_is_left_out(tmp_path: Path) -> None:
     dance = moved(body())
     found = load_dataset(write(tmp_path / "dancer", carried(dance), carried(moved(body(), seed=1))))
     assert found.skeleton.names == dance.skeleton.names
-    assert "Reference, which only carries Hips, left out" in told(found)
+    assert "Reference, which only carries Hips, left out" in reported(found)
     take = found.training[0].recording
     seen, _ = dance.skeleton.forward_kinematics(dance.poses, dance.roots)
     places, _ = take.skeleton.forward_kinematics(take.poses, take.roots, take.translations)
@@ -158,7 +158,7 @@ def test_rigs_whose_bones_lie_along_local_axes_are_mirrored(tmp_path: Path, kind
         write_bvh(folder / f"take_{seed}.bvh", written)
     found = load_dataset(folder)
     assert found.skeleton.stance is not None
-    assert found.asymmetry == "" and "mirror images besides" in told(found)
+    assert found.asymmetry == "" and "mirror images besides" in reported(found)
     recording = found.takes[0].recording
     skeleton, pairs = recording.skeleton, mirror_pairs(recording.skeleton)
     seen, _ = skeleton.forward_kinematics(recording.poses, recording.roots)
@@ -188,8 +188,8 @@ def test_a_body_without_two_sides_is_not_mirrored_and_it_is_said_why(tmp_path: P
     assert asymmetry(lame, range(len(plain))).startswith("LeftLeg and RightLeg are not each other's")
     found = load_dataset(write(tmp_path / "dancer", moved(lame), moved(lame, seed=1)))
     assert not found.mirrors
-    assert "Not learned from the mirror's side too: LeftLeg and RightLeg" in told(found)
-    assert "mirror images besides" not in told(found)
+    assert "Not learned from the mirror's side too: LeftLeg and RightLeg" in reported(found)
+    assert "mirror images besides" not in reported(found)
     training = Training(found, Settings(steps=1, width=16, latent=4, batch=8))
     assert len(training.train_windows) == 12 * 50 - 7
 
@@ -211,8 +211,8 @@ def test_of_one_take_alone_the_end_is_kept_apart(tmp_path: Path) -> None:
     assert (len(training.recording), len(end.recording)) == (800, 150)
     assert (training.name, end.name, end.file) == ("take_0", "take_0 from 17.0 s on", "take_0")
     np.testing.assert_allclose(end.recording.roots[0], moved(body(), 20.0).roots[850], atol=1e-5)
-    assert "1 recording of 1 take," in told(found)
-    assert "the end of the only take: take_0 from 17.0 s on" in told(found)
+    assert "1 recording of 1 take," in reported(found)
+    assert "the end of the only take: take_0 from 17.0 s on" in reported(found)
     assert not load_dataset(write(tmp_path / "short", moved(body(), 8.0))).held_out
     (longer,) = load_dataset(write(tmp_path / "longer", moved(body(), 40.0))).held_out
     assert longer.begins_s == 34.0
@@ -241,7 +241,7 @@ def test_errors_of_a_part_are_at_their_place_in_it(tmp_path: Path) -> None:
 
 def test_few_data_are_told_and_too_few_refused_with_the_figure(tmp_path: Path) -> None:
     found = load_dataset(write(tmp_path / "dancer", swaying(6.0), swaying(4.0, seed=1)))
-    assert "Only 6 s of dance to learn from" in told(found)
+    assert "Only 6 s of dance to learn from" in reported(found)
     require_windows(found, 293)
     with pytest.raises(DatasetError, match=r"Only 293 windows .*about 5\.9 s.*At least 294 are needed"):
         require_windows(found, 294)

@@ -209,9 +209,9 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
     assert is_closed(phrase.poses.astype(np.float32), phrase.roots.astype(np.float32))
     beside = {file.name for file in tmp_path.iterdir()}
     assert beside == {f"phrase.{end}" for end in ("bvh", "json", "png", "improviser.pt", "improviser.png")}
-    told = json.loads((tmp_path / "phrase.json").read_text())
-    assert told["improviser"]["steps"] == 2
-    assert told["naturalness"]["seconds"] == pytest.approx(phrase.seconds)
+    reported = json.loads((tmp_path / "phrase.json").read_text())
+    assert reported["improviser"]["steps"] == 2
+    assert reported["naturalness"]["seconds"] == pytest.approx(phrase.seconds)
     bytes_before = out.read_bytes()
     capsys.readouterr()
     monkeypatch.setattr("appliance.studio.dance_files.draw_filmstrip", lambda *_, **__: None)  # slow
@@ -230,9 +230,9 @@ def test_a_prompt_is_continued_where_it_ends_without_a_seam(
     out = tmp_path / "on.bvh"
     result = bunraku("improvise", checkpoint[0], "--prompt", tmp_path / "prompt.bvh", "--out", out, *options)
     assert result.exit_code == 0, result.output
-    dance, told = read_bvh(out), json.loads(out.with_suffix(".json").read_text())
-    join = round(told["joined_s"] * 50)
-    assert 5.0 < told["joined_s"] <= 6.0 and len(dance) == pytest.approx(join + 200, abs=2)
+    dance, reported = read_bvh(out), json.loads(out.with_suffix(".json").read_text())
+    join = round(reported["joined_s"] * 50)
+    assert 5.0 < reported["joined_s"] <= 6.0 and len(dance) == pytest.approx(join + 200, abs=2)
     kept = join - 20
     np.testing.assert_allclose(
         np.degrees(quaternion.angle_between(dance.poses[:kept], written.poses[:kept])).max(), 0, atol=0.2
@@ -240,7 +240,7 @@ def test_a_prompt_is_continued_where_it_ends_without_a_seam(
     ground = dance.roots[:, [0, 2]]
     steps = np.linalg.norm(np.diff(ground, axis=0), axis=1)
     assert steps[join - 25 : join + 25].max() < 0.03, "nobody is carried off where the prompt ends"
-    assert told["seam_degrees"] < 20 and "prompt ends at" in " ".join(result.stderr.split())
+    assert reported["seam_degrees"] < 20 and "prompt ends at" in " ".join(result.stderr.split())
 
 
 def test_a_prompt_that_is_too_short_is_named(checkpoint: tuple[Path, Path], tmp_path: Path) -> None:

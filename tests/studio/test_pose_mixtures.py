@@ -133,11 +133,11 @@ def test_a_resumed_training_is_the_same_training(dancer: Dataset, tmp_path: Path
 
 def test_training_ends_with_what_it_does_on_its_own_output(improviser: Path) -> None:
     assert (improviser / "pictures/losses.png").stat().st_size > 10_000
-    told = json.loads((improviser / "report.json").read_text())
-    assert set(told["temperatures"]) == {"1.0", "0.5", "0.0"}
-    for row in (*told["temperatures"].values(), told["recordings"]):
+    reported = json.loads((improviser / "report.json").read_text())
+    assert set(reported["temperatures"]) == {"1.0", "0.5", "0.0"}
+    for row in (*reported["temperatures"].values(), reported["recordings"]):
         assert 0 <= row["trembling"] <= 1 and row["longest_still_s"] >= 0
-    assert set(told["held_out"]) == {"nats", "gaussian", "stays"}
+    assert set(reported["held_out"]) == {"nats", "gaussian", "stays"}
     assert (improviser / "dances.png").stat().st_size > 1000
 
 

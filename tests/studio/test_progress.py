@@ -12,7 +12,7 @@ from rich.console import Console
 
 from appliance.studio import heartbeat
 from appliance.studio.clear_errors import clear_errors
-from appliance.studio.progress import EVERY_S, doing, shown, told
+from appliance.studio.progress import EVERY_S, doing, reported, shown
 from tests.studio.conftest import bunraku
 
 
@@ -46,13 +46,13 @@ def test_what_takes_no_time_says_one_line_and_nothing_is_said_to_nobody() -> Non
 def test_parts_with_words_of_their_own_say_them_now_and_then() -> None:
     seconds = iter((0.0, 0.0, 1.0, EVERY_S, EVERY_S, 2 * EVERY_S, 2 * EVERY_S))
     into = console()
-    with told(into, 4, now=lambda: next(seconds)) as advance:
+    with reported(into, 4, now=lambda: next(seconds)) as advance:
         for part in ("a", "b", "c", "d"):
             advance(part)
     assert said(into).splitlines() == ["0 %  a", "50 %  c", "75 %  d"]
-    with told(into) as advance:
+    with reported(into) as advance:
         advance("of nobody knows how many")
-    with told(None, 3) as advance:
+    with reported(None, 3) as advance:
         advance("to nobody")
     assert said(into).splitlines()[3:] == ["of nobody knows how many"]
 
@@ -117,8 +117,8 @@ def test_on_a_terminal_there_is_a_bar() -> None:
 )
 def test_an_option_that_would_do_nothing_is_refused(arguments: str, message: str) -> None:
     result = bunraku(*arguments.split())
-    told = " ".join(result.output.replace("│", " ").split())
-    assert result.exit_code == 2 and message in told, told
+    reported = " ".join(result.output.replace("│", " ").split())
+    assert result.exit_code == 2 and message in reported, reported
 
 
 def test_a_resumed_training_refuses_what_it_cannot_follow(puppet_checkpoint: Path, recordings: Path) -> None:
@@ -130,5 +130,5 @@ def test_a_resumed_training_refuses_what_it_cannot_follow(puppet_checkpoint: Pat
         (("--held-out", "sway_0"), "--held-out"),
     ):
         result = bunraku("train", "--resume", "--out", folder, "--recordings", recordings, *options)
-        told = " ".join(result.output.split())
-        assert result.exit_code == 2 and "cannot follow" in told and message in told, told
+        reported = " ".join(result.output.split())
+        assert result.exit_code == 2 and "cannot follow" in reported and message in reported, reported

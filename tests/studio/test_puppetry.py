@@ -77,12 +77,12 @@ def test_a_hand_does_not_turn_the_whole_dancer(pair: Pair, poses: np.ndarray, jo
 
 
 def test_figures_are_in_the_agreed_json(pair: Pair, poses: np.ndarray) -> None:
-    told: list[str] = []
+    reported: list[str] = []
     joints, iterations = ["lShldr", "head"], [(2, 1), (10, 9)]
     found = puppetry.measure(
-        [Measurement(Pasting(), pair, Reference(poses, 10.0))], joints, iterations, (1, 10), told.append
+        [Measurement(Pasting(), pair, Reference(poses, 10.0))], joints, iterations, (1, 10), reported.append
     )
-    assert len(told) == puppetry.dances(1, 2, iterations, (1, 10))
+    assert len(reported) == puppetry.dances(1, 2, iterations, (1, 10))
     keys = {"answer", "fit", "fit_own", "fit_bare", "plausibility", "energy", "roughness", "held"}
     for joint in joints:
         assert {"2_1", "10_9", "turning", "onset_ticks"} <= set(found[joint])

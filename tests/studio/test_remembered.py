@@ -32,7 +32,7 @@ def test_later_commands_read_as_training_did_and_leave_what_they_made(tmp_path: 
     trained = bunraku("train", "--model", "pose", "--recordings", folder, "--out", out, "--steps", 2, *TOLD)
     assert trained.exit_code == 0, said(trained)
 
-    def wobbled(phrase: Path, name: str, *told: object) -> Path:
+    def wobbled(phrase: Path, name: str, *reported: object) -> Path:
         options = (
             "--model",
             out / "checkpoint.pt",
@@ -44,7 +44,7 @@ def test_later_commands_read_as_training_did_and_leave_what_they_made(tmp_path: 
             "--seconds",
             1,
         )
-        result = bunraku("path", phrase, *options, *told)
+        result = bunraku("path", phrase, *options, *reported)
         assert result.exit_code == 0, said(result)
         return tmp_path / name
 
@@ -68,8 +68,8 @@ def test_what_was_asked_for_goes_before_what_is_remembered(tmp_path: Path) -> No
     write_bvh(tmp_path / "at_another_rate.bvh", swaying(1.0, fps=60.0))
 
     def unit(name: str, **asked: float) -> float | None:
-        told = trained.options_for(tmp_path / name, ReadingOptions(metres_per_unit=asked))
-        return told.conventions_of(Path(name).stem).metres_per_unit
+        reported = trained.options_for(tmp_path / name, ReadingOptions(metres_per_unit=asked))
+        return reported.conventions_of(Path(name).stem).metres_per_unit
 
     assert unit("raw.bvh") == 0.0254 and unit("raw.bvh", raw=0.5) == 0.5
     assert unit("ours.bvh") is None and unit("ours.bvh", ours=0.5) == 0.5

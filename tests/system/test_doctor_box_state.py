@@ -55,11 +55,11 @@ def test_the_health_of_the_dance() -> None:
 
 
 def test_fallbacks_in_force_are_reported_with_their_words() -> None:
-    told = (
+    reported = (
         ("stage", Fallen("sensor-silent", 3, True, "Sensor left-wrist is silent. Charge it.")),
         ("lights", Fallen("wire-gone", 1, False, "It is back.")),
     )
-    found = list(box_state.stage(HostView(stage=RunningStage(1, {}, told))))
+    found = list(box_state.stage(HostView(stage=RunningStage(1, {}, reported))))
     assert [(one.what, one.verdict, one.message, one.cure) for one in found[1:]] == [
         ("stage: sensor-silent", "wrong", "Sensor left-wrist is silent.", "Charge it.")
     ]

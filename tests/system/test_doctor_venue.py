@@ -124,13 +124,13 @@ def radio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> HostView:
 
 
 def test_what_the_access_point_really_does_is_said(radio: HostView, tmp_path: Path) -> None:
-    told = tmp_path / "iw dev lo info"
-    told.write_text("Interface lo\n\tssid stage net\n\ttype AP\n\tchannel 6 (2437 MHz), width: 20 MHz\n")
+    reported = tmp_path / "iw dev lo info"
+    reported.write_text("Interface lo\n\tssid stage net\n\ttype AP\n\tchannel 6 (2437 MHz), width: 20 MHz\n")
     found = only(venue.access_point(radio))
     assert found.verdict == "ok"
     assert "lo is on the air as 'stage net', channel 6 (2437 MHz), country DE; 2 joined." in found.message
     (tmp_path / "ip -brief address show dev lo").write_text("lo DOWN\n")
     assert "no address" in only(venue.access_point(radio)).message
-    told.write_text("Interface lo\n\ttype managed\n")
+    reported.write_text("Interface lo\n\ttype managed\n")
     found = only(venue.access_point(radio))
     assert found.verdict == "wrong" and "not on the air (it is 'managed')" in found.message

@@ -53,18 +53,18 @@ def test_the_pages_of_the_documents_are_of_a_box_at_rest() -> None:
     }
     lost = {**sensor, "name": "right", "heard": False}
     status = Status(state="dancing", show="A", late=22, skipped=3, rate_hz=41.0, cue="storm", level=1.0)
-    told = {
+    reported = {
         "frames": "fresh", "trouble": "", "time": 7.0, "since": 6.0, "status": status._asdict(),
         "fallbacks": [{"name": "tick-late", "active": True, "message": "Late."}],
         "processes": [{"process": "lights", "late": 4}], "sensors": [sensor], "verdict": {"level": "warning"},
     }  # fmt: skip
-    rest = json.loads(at_rest(json.dumps(told), 5000.0))
+    rest = json.loads(at_rest(json.dumps(reported), 5000.0))
     assert (rest["verdict"]["level"], rest["verdict"]["values"]["rate"]) == ("well", 50.0)
     assert (rest["status"]["late"], rest["status"]["cue"], rest["fallbacks"]) == (0, "storm", [])
     assert rest["sensors"][0]["loss"] == 0.0
-    missing = json.loads(at_rest(json.dumps({**told, "sensors": [sensor, lost]}), 5000.0))
+    missing = json.loads(at_rest(json.dumps({**reported, "sensors": [sensor, lost]}), 5000.0))
     assert missing["verdict"]["key"] == "sensors_missing", "what is wrong with the box is still shown"
-    nothing = json.dumps({**told, "status": None})
+    nothing = json.dumps({**reported, "status": None})
     assert at_rest(nothing, 5000.0) == nothing
 
 

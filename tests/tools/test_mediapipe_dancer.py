@@ -86,8 +86,8 @@ def test_what_it_saves_is_what_import_reads(tmp_path: Path) -> None:
     """Also a frame in which nobody was seen, and landmarks of which MediaPipe does not say how visible."""
     for one in (seen := landmarks()):
         one.visibility = None
-    told = [frame_of(seen, 0.0), frame_of(None, 0.033), frame_of(seen, 0.066)]
-    (tmp_path / "dance.json").write_text(json.dumps({"frames": told}))
+    reported = [frame_of(seen, 0.0), frame_of(None, 0.033), frame_of(seen, 0.066)]
+    (tmp_path / "dance.json").write_text(json.dumps({"frames": reported}))
     read = read_landmarks(tmp_path / "dance.json")
     assert read.times.tolist() == [0.0, 0.033, 0.066] and not read.is_flat
     assert np.isnan(read.points[1]).all() and read.seen[0].min() == 1.0

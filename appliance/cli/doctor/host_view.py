@@ -109,9 +109,9 @@ def running_stage(box: BoxConfig) -> RunningStage | None:
             return None
         health, now = reader.health() or {}, time.monotonic()
         with contextlib.closing(ProcessHealth(folder)) as shared:
-            told = [("stage", one) for one in fallen(health.get("fallbacks"))] + shared.fallbacks(now)
+            reported = [("stage", one) for one in fallen(health.get("fallbacks"))] + shared.fallbacks(now)
             members = tuple(shared.members(now))
-        return RunningStage(reader.facts.pid, health, tuple(told), members, reader.facts.show_directory)
+        return RunningStage(reader.facts.pid, health, tuple(reported), members, reader.facts.show_directory)
 
 
 def output_of(*command: str) -> str:

@@ -170,8 +170,8 @@ def power(host: HostView) -> Iterator[Finding]:
     files = host.found("/sys/devices/platform/soc*/soc*firmware/get_throttled")
     bits = next((int(text, 16) for file in files if (text := host.text(file))), None)
     if bits is None and host.is_here:  # Raspberry Pi OS has the program, other kernels have no such file
-        told = output_of("vcgencmd", "get_throttled").strip().partition("throttled=")[2]
-        bits = int(told, 16) if told else None
+        reported = output_of("vcgencmd", "get_throttled").strip().partition("throttled=")[2]
+        bits = int(reported, 16) if reported else None
     alarms = [
         host.number(chip.with_name("in0_lcrit_alarm"))
         for chip in host.found("/sys/class/hwmon/hwmon*/name")

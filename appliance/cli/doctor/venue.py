@@ -53,14 +53,14 @@ def pair(host: HostView) -> Iterator[Finding]:
     """The other box of a pair is there, and could take over."""
     if host.box.pair is None or host.stage is None:
         return
-    told = host.stage.health.get("pair")
-    if not told:
+    reported = host.stage.health.get("pair")
+    if not reported:
         yield better("pair", "This stage notes no journal, so no box can follow it.", "Free memory, restart.")
-    elif told["peer"] and told["ready"]:
-        yield ok("pair", sentence(told))
+    elif reported["peer"] and reported["ready"]:
+        yield ok("pair", sentence(reported))
     else:
         cure = "Switch the other box on; give it the same show, release and secret; look at the cable."
-        yield better("pair", sentence(told), cure)
+        yield better("pair", sentence(reported), cure)
 
 
 def _holders(host: HostView, port: int) -> list[tuple[str, bool]]:
@@ -163,10 +163,10 @@ def access_point(host: HostView) -> Iterator[Finding]:
     card = _access_point_card(host)
     if not card or not host.is_here or not host.at(f"/sys/class/net/{card}").exists():
         return
-    what, told = "access point", output_of("iw", "dev", card, "info")
-    lines = [line.split() for line in told.splitlines()]
+    what, reported = "access point", output_of("iw", "dev", card, "info")
+    lines = [line.split() for line in reported.splitlines()]
     facts = {words[0]: " ".join(words[1:]) for words in lines if len(words) > 1}
-    if not told:
+    if not reported:
         yield better(what, "Nobody says what the radio does: `iw` is missing.", "`sudo apt-get install iw`")
     elif facts.get("type") != "AP":
         yield wrong(

@@ -44,8 +44,8 @@ class Features:
     def encode(self, frame: JointFrame, puppet: PuppetFrame) -> Sequence[memoryview]:
         """Datagrams of this frame; the same buffers each time."""
         found = self._body.datagrams(puppet.positions, frame)
-        for row, told in self._hands.items():
-            found = (*found, *told.datagrams(frame.hands[row], frame))
+        for row, reported in self._hands.items():
+            found = (*found, *reported.datagrams(frame.hands[row], frame))
         if self._live is not None and frame.live.any():
             found = (*found, *self._live.datagrams(frame.live, frame))
         return found

@@ -109,8 +109,8 @@ def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
 
 def masked_take(take: Take, found: Sequence[CaptureError], catalogue: Catalogue) -> Take:
     """The take with its errors masked, except those that the catalogue keeps, and with those that it adds."""
-    told = [CaptureError("", start, end, MARKED) for start, end in catalogue.masked(take.name)]
-    errors = (*without(found, catalogue.kept(take.name)), *told)
+    reported = [CaptureError("", start, end, MARKED) for start, end in catalogue.masked(take.name)]
+    errors = (*without(found, catalogue.kept(take.name)), *reported)
     return replace(take, sound=sound_frames(len(take.recording), FPS, errors), errors=errors)
 
 

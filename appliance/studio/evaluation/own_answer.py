@@ -22,7 +22,7 @@ from appliance.studio.evaluation.onset import CODED_WINDOWS
 from appliance.studio.evaluation.pairs import own_takes
 from appliance.studio.evaluation.puppetry_report import judged
 from appliance.studio.evaluation.recorded import Recorded
-from appliance.studio.progress import told
+from appliance.studio.progress import reported
 from appliance.studio.studio_error import StudioError
 
 PARTS = ("left upper arm", "left forearm", "head")
@@ -63,7 +63,7 @@ def own_answer(
     pairs = [_beginning(pair, size.ticks) for pair in takes.pairs[: size.pairs]]
     measurements = [Measurement(coder, pair, reference) for pair in pairs]
     recorded = Recorded(takes.reference, coder.joints)
-    with told(console) as advance:
+    with reported(console) as advance:
         found = puppetry.measure(
             measurements, joints[: size.joints], ITERATIONS, FREE, advance, turning=False, recorded=recorded
         )

@@ -33,7 +33,7 @@ from appliance.studio.experiments.families import CONDITIONS, Trial, usual_trace
 from appliance.studio.experiments.null_networks import KINDS, null_networks
 from appliance.studio.experiments.page import write_page
 from appliance.studio.experiments.strips import FIGURES, strip_of_excerpts, strips_of_trial
-from appliance.studio.progress import told
+from appliance.studio.progress import reported
 from appliance.studio.studio_error import StudioError
 
 TITLE = "Experiments with a puppet"
@@ -80,7 +80,7 @@ def run(options: ExperimentOptions) -> None:
     drawing: list[Future[Path]] = []
     with (
         ProcessPoolExecutor(mp_context=get_context("spawn")) as pool,  # a strip takes seconds
-        told(
+        reported(
             console, work * len(CONDITIONS) + len(KINDS) + (1 + work * len(FIGURES)) * options.pictures
         ) as advance,
     ):

@@ -69,17 +69,17 @@ class Layers:
         self.int8 = int8
 
     def linear(
-        self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None, told: str = ""
+        self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None, reported: str = ""
     ) -> str:
         """(B, in) -> (B, out); told: (B, out) in place of the layer's own bias."""
         weight = _array(layer.weight).T
-        bias = told or graph.constant(f"{name}.bias", _array(layer.bias))
+        bias = reported or graph.constant(f"{name}.bias", _array(layer.bias))
         if not self.int8:
             return graph.op("Gemm", x, graph.constant(f"{name}.weight", weight), bias, out=out)
         quantized = _quantized(graph, f"{name}.weight", weight)
-        if told:  # the quantized product takes one bias for all rows
+        if reported:  # the quantized product takes one bias for all rows
             product = graph.op("DynamicQuantizeMatMul", x, *quantized, domain=MICROSOFT)
-            return graph.op("Add", product, told, out=out)
+            return graph.op("Add", product, reported, out=out)
         return graph.op("DynamicQuantizeMatMul", x, *quantized, bias, out=out, domain=MICROSOFT)
 
     def layer_norm(

@@ -144,16 +144,16 @@ def test_request_to_send_is_off_or_the_cable_would_listen(
     cable: tuple[int, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A pseudo-terminal has no such line: what a real port would be told is written down."""
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     real = fcntl.ioctl
 
     def ioctl(descriptor: int, request: int, *arguments: Any) -> Any:
         if request in (termios.TIOCMBIS, termios.TIOCMBIC):
-            told.append((request, struct.unpack("I", arguments[0])[0]))
+            reported.append((request, struct.unpack("I", arguments[0])[0]))
             return b""
         return real(descriptor, request, *arguments)
 
     monkeypatch.setattr(fcntl, "ioctl", ioctl)
     OpenDmx(str(cable[1]), 512).close()
-    assert (termios.TIOCMBIC, termios.TIOCM_RTS) in told
-    assert (termios.TIOCMBIS, termios.TIOCM_RTS) not in told
+    assert (termios.TIOCMBIC, termios.TIOCM_RTS) in reported
+    assert (termios.TIOCMBIS, termios.TIOCM_RTS) not in reported
