@@ -45,6 +45,11 @@ def sound(
     from appliance.sound.render_file import render_file
 
     strings = load_show(show or default_show_path()).config.strings or StringsConfig()
+    if strings.of in ("hand", "couplings"):
+        raise StageError(
+            f"A file has one figure, which no hand holds: strings with `of: {strings.of}` would be silent. "
+            "They play on the stage."
+        )
     config = load_box(box).sound or SoundConfig()
     try:
         seconds = render_file(load_dance(recording).of_puppet(None), strings, config, file)

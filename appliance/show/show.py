@@ -25,6 +25,7 @@ from appliance.show.puppets import (
     MAX_HANDS,
     PuppetConfig,
     PuppetStart,
+    mover_problems,
     puppet_problems,
     require_each_joint_once,
 )
@@ -297,6 +298,10 @@ def load_show(directory: Path | str) -> Show:
         problems.extend(
             puppet_problems(config.puppets, config.cast, config.motion, config.lights.mappings, file)
         )
+        if config.strings is not None:
+            problems.extend(
+                mover_problems(config.strings.of, ("strings", "of"), config.cast, config.motion, file)
+            )
     if problems or skeleton is None:
         raise ConfigError(problems)
     return Show(config, directory, skeleton, file)

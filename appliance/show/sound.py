@@ -21,6 +21,12 @@ class StringsConfig(Section):
     """Strings that the dance plays: one for each bone, driven by its motion, coupled where bones meet."""
 
     cues: list[Name] = key("Cues in which they sound; []: always.", [], length=(0, 200))
+    of: Literal["body", "hand", "live", "couplings"] = key(
+        "Whose motion plays them. body: the first puppet's; hand: the turns of its first hand, all strings; "
+        "live: the live dancer's; couplings: each sounds as far as the joint at its bone's end moves as that "
+        "of another figure does, or as the hand's joint.",
+        "body",
+    )
     preset: Literal["strings", "voices", "percussion"] = key(
         "strings: bowed and struck; voices: bowed, with the resonances of a mouth; percussion: struck bars.",
         "strings",

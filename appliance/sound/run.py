@@ -28,6 +28,7 @@ from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
 from appliance.show.sound import SoundConfig, StringsConfig
 from appliance.sound.card import Card
+from appliance.sound.couplings import Couplings
 from appliance.sound.fallback import CARD_AWAY, DROPOUTS, NO_CARD, OF_THE_SOUND, STAGE_UNSEEN
 from appliance.sound.instrument import Instrument
 
@@ -72,6 +73,7 @@ class Sound:
     ) -> None:
         self.instrument: Instrument | None = None
         self._next: Instrument | None = None
+        self._couplings: Couplings | None = None
         self._changes_at = 0.0  # when the next one takes its place
         self._config, self._stage, self._show_state = config, stage, show_state
         self._say, self._fallbacks = say, fallbacks
@@ -102,6 +104,8 @@ class Sound:
             return
         if frame is not None and frame.tick != self._seen:
             self._seen, self._seen_at = frame.tick, frame.left
+            if self._couplings is not None:
+                self._couplings.look(frame)
         age_s = now - self._seen_at
         if age_s >= LOST_S:
             self.instrument.rest()
@@ -118,9 +122,19 @@ class Sound:
         frame, facts, instrument = stage.newest(now), stage.facts, self.instrument
         if frame is None or facts is None or instrument is None or frame.tick == self._danced:
             return
-        self._danced, positions = frame.tick, facts.led_in(frame).positions
-        if len(positions) == instrument.joints:  # else of a show whose strings have not come in yet
-            instrument.dance(positions, frame.frame_time)
+        self._danced, puppet = frame.tick, facts.led_in(frame)
+        if len(puppet.positions) != instrument.joints:  # the strings of this show have not come in yet
+            return
+        if instrument.of == "body":
+            instrument.dance(puppet.positions, frame.frame_time)
+        elif instrument.of == "couplings" and self._couplings is not None:
+            instrument.couple(self._couplings.shares, frame.frame_time)
+        elif instrument.of == "live" and frame.live.any():
+            instrument.dance(frame.live, frame.frame_time)
+        elif instrument.of == "hand" and frame.hands[:1].any():
+            instrument.turn(frame.hands[0], frame.frame_time)
+        else:
+            instrument.rest()
 
     def render(self, frames: int, show_state: ShowState) -> NDArray[np.float32]:
         """The next samples (frames, channels): for the card's thread, which is late for nothing else. It also
@@ -151,6 +165,7 @@ class Sound:
             self._say(card.trouble or "The sound card is back, and the strings sound.")
 
     def _begin(self, directory: Path) -> None:
+        self._couplings = None
         try:
             show = load_show(directory)
         except ConfigError as error:
@@ -160,6 +175,8 @@ class Sound:
         strings = show.config.strings
         self._next = None if strings is None else Instrument(show.skeleton, strings, self._config)
         self._strings = strings or StringsConfig()
+        if self._strings.of == "couplings":
+            self._couplings = Couplings(show.skeleton)
         name = show.config.name
         count = 0 if self._next is None else len(self._next.strings.bones)
         self._say(f"{name}: {count} strings." if count else f"{name} has no `strings:`, and is silent.")
