@@ -48,6 +48,7 @@ _MODULES = {  # in each a function or a group of the command's name
     "sensors": "appliance.cli.sensors.commands",
     "lights": "appliance.cli.lights_commands",
     "pair": "appliance.cli.pair",
+    "fleet": "appliance.cli.fleet",
     "sound": "appliance.cli.sound",
     "remote": "appliance.cli.remote",
     "learn": "appliance.cli.learn",

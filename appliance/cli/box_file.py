@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ipaddress
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,8 +13,9 @@ from appliance.box.durable import alone_in, write_beside, write_whole
 from appliance.box.served import is_loopback
 from appliance.cli.preflight import LATE_TURN_S, candidate_problems, publish
 from appliance.release.adoption import Outcome, Places, adopt, read_choice
-from appliance.release.arrivals import BOX, Arrival, look
+from appliance.release.arrivals import BOX, SHOW, Arrival, look
 from appliance.release.choice import CHOSEN, Choice
+from appliance.release.packed_show import require_known_maker, unpack_show
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError, Problem
 from appliance.show.venue_keys import venue_keys
@@ -112,9 +114,25 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
     }
 
 
-def adopt_show(chosen: Path, folder: Path, source: str) -> dict[str, Any]:
-    """Let the show in a folder dance from now on, as one from a stick would; for JSON, as `change`."""
-    return _adopt(chosen, look(source, folder), "show", True)
+def adopt_show(chosen: Path, folder: Path, source: str, now: bool = True) -> dict[str, Any]:
+    """Let the show in a folder dance, as one from a stick would; for JSON, as `change`."""
+    return _adopt(chosen, look(source, folder), "show", now)
+
+
+def take_show(chosen: Path, file: Path, now: bool) -> dict[str, Any]:
+    """The same with a packed show from another box; nothing of it stays beside what was adopted.
+
+    Raises StageError for a file that is no show, and for one whose maker the box file does not accept.
+    """
+    folder = file.parent
+    try:
+        unpack_show(file, folder)
+        console = load_box((Choice.read(chosen) or Choice()).first.box).console
+        if console is not None and console.show_keys is not None:
+            require_known_maker(folder / SHOW, console.show_keys)
+        return adopt_show(chosen, folder, "fleet", now)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def dance_again(chosen: Path, show: str) -> dict[str, Any]:

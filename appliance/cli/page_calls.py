@@ -73,6 +73,21 @@ def adopt_show(
     return box_file.adopt_show(_chosen(chosen), Path(folder), source)
 
 
+def pack_show(show: str, into: str) -> Any:
+    """Pack a show for other boxes."""
+    from appliance.release import packed_show
+
+    packed_show.pack_show(Path(show), Path(into))
+    return {}
+
+
+def take_show(file: str, now: bool, box: str | None = None, chosen: str | None = None) -> Any:
+    """Let a packed show from another box dance."""
+    from appliance.cli import box_file
+
+    return box_file.take_show(_chosen(chosen), Path(file), now)
+
+
 def use_rehearsal(journal: str, into: str) -> Any:
     """Write a live dancer's dance from the journal as recordings to learn from."""
     import shutil
@@ -150,7 +165,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     one.__name__: one
     for one in (
         *(about, pose_map, keep_cue, box_file, change_box_file, dance_again, adopt_show),
-        *(timelines, stretch, help_file, use_rehearsal),
+        *(pack_show, take_show, timelines, stretch, help_file, use_rehearsal),
     )
 }
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+from pathlib import Path
 from typing import Any
 
 from aiohttp import web
@@ -11,7 +13,8 @@ from aiohttp import web
 from appliance.pose.foreign_file import plain_json
 
 LARGEST_REQUEST = 4096  # bytes
-_SENT_WITHIN_S = 20.0
+_SENT_WITHIN_S, _FILE_WITHIN_S = 20.0, 900.0
+PART = 1 << 20
 
 
 async def said(request: web.Request, most: int = LARGEST_REQUEST) -> dict[str, Any]:
@@ -33,3 +36,28 @@ async def said(request: web.Request, most: int = LARGEST_REQUEST) -> dict[str, A
     if not isinstance(values, dict):
         raise web.HTTPBadRequest(text="This is no JSON object.")
     return values
+
+
+async def received(request: web.Request, path: Path, largest: int) -> None:
+    """Write the body into a file. Raises 503 where not all of it comes, or it is larger; no file is left."""
+    size, is_whole = 0, False
+    try:
+        async with asyncio.timeout(_FILE_WITHIN_S):
+            with new_file(path) as file:
+                async for part in request.content.iter_chunked(PART):
+                    size += len(part)
+                    if size > largest:
+                        raise OSError("it is too large")
+                    file.write(part)
+        is_whole = True
+    except (OSError, TimeoutError) as error:
+        raise web.HTTPServiceUnavailable(text=f"The file did not arrive whole ({error}).") from None
+    finally:
+        if not is_whole:
+            path.unlink(missing_ok=True)
+
+
+def new_file(path: Path) -> Any:
+    """A file for writing that only this user reads; no link is followed. Raises OSError."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW
+    return os.fdopen(os.open(path, flags, 0o600), "wb")

@@ -1,46 +1,36 @@
-"""The boxes in this network: found by avahi, each asked how it is."""
+"""The boxes in this network: found by avahi, each asked how it is; and this box's show goes to others."""
 
 from __future__ import annotations
 
 import asyncio
-import ssl
+import socket
 import time
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 import aiohttp
 from aiohttp import web
 
-from appliance.console.child import output_of
+from appliance.console.body import said
+from appliance.console.child import answer_of, output_of
 from appliance.console.guard import Guard
+from appliance.console.push import PASSES, Neighbour, Passes, push, unchecked
+from appliance.console.stage_view import StageView
 
 SERVICE = "_bunraku._tcp"
 _BROWSE = ("avahi-browse", "--resolve", "--terminate", "--parsable", "--no-db-lookup", SERVICE)
 _PATIENCE_S, _ANSWERS_WITHIN_S, _FRESH_S = 8.0, 3.0, 10.0
 MOST_BOXES = 20
 _LARGEST = 1 << 20
+_SENT_AT_ONCE, _PACKED_WITHIN_S = 4, 60.0
 _NO_AVAHI = "No other box can be found: install the Debian packages avahi-daemon and avahi-utils."
 
 
-class Neighbour(NamedTuple):
-    """A box as avahi knows it. host: its name in the network; version: of its release."""
-
-    name: str
-    host: str
-    address: str
-    port: int
-    version: str = ""
-    scheme: str = "http"
-
-    @property
-    def origin(self) -> str:
-        """Where its page is."""
-        return f"{self.scheme}://{self.address}:{self.port}"
-
-
-def neighbours(browsed: str) -> list[Neighbour]:
+def neighbours(printed: str) -> list[Neighbour]:
     """The boxes in what `avahi-browse --parsable` prints; the same box on two networks once."""
     found: dict[str, Neighbour] = {}
-    for line in browsed.splitlines():
+    for line in printed.splitlines():
         parts = line.split(";", 9)
         if len(parts) < 10 or parts[0] != "=" or parts[2] != "IPv4" or not parts[8].isdecimal():
             continue
@@ -65,41 +55,78 @@ def _unescaped(name: str) -> str:
     return bytes_.decode("utf-8", "replace")
 
 
-class Fleet:
-    """Looks at most once in ten seconds, however many browsers ask."""
+async def browsed() -> list[Neighbour]:
+    """The boxes that announce themselves now. Raises OSError where avahi is not there."""
+    try:
+        status, told, _ = await output_of(*_BROWSE, patience_s=_PATIENCE_S)
+    except (OSError, TimeoutError):
+        status, told = 1, b""
+    if status:
+        raise OSError(_NO_AVAHI)
+    return neighbours(told.decode("utf-8", "replace"))
 
-    def __init__(self, guard: Guard) -> None:
-        self._guard = guard
+
+async def asked(found: Iterable[Neighbour]) -> list[dict[str, Any]]:
+    """How each is; each box is its own authority, and only reading is done."""
+    patience = aiohttp.ClientTimeout(total=_ANSWERS_WITHIN_S)
+    connector = aiohttp.TCPConnector(ssl=unchecked())
+    async with aiohttp.ClientSession(connector=connector, timeout=patience) as session:
+        return list(await asyncio.gather(*(_asked(session, one) for one in found)))
+
+
+class Fleet:
+    """Looks at most once in ten seconds, however many browsers ask. state: where the page keeps things."""
+
+    def __init__(self, guard: Guard, state: Path, stage: StageView) -> None:
+        self._guard, self._stage = guard, stage
+        self._passes, self._packed = Passes(state / PASSES), state / "fleet.zip"
+        self._packing, self._is_packed = asyncio.Lock(), ""
+        self._sending = asyncio.Semaphore(_SENT_AT_ONCE)
         self._looking = asyncio.Lock()
+        self._found: dict[str, Neighbour] = {}
         self._seen: list[dict[str, Any]] = []
         self._seen_at = -_FRESH_S
 
     def routes(self) -> list[web.RouteDef]:
         """For the server."""
-        return [web.get("/api/fleet", self._serve)]
+        return [web.get("/api/fleet", self._serve), web.post("/api/fleet/push", self._push)]
 
     async def _serve(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
         async with self._looking:
             if time.monotonic() - self._seen_at > _FRESH_S:
-                self._seen = await self._look()
+                try:
+                    self._found = {one.host: one for one in await browsed()}
+                except OSError as error:
+                    raise web.HTTPServiceUnavailable(text=str(error)) from None
+                self._seen = await asked(self._found.values())
                 self._seen_at = time.monotonic()
         return web.json_response(self._seen)
 
-    async def _look(self) -> list[dict[str, Any]]:
-        try:
-            status, browsed, _ = await output_of(*_BROWSE, patience_s=_PATIENCE_S)
-        except (OSError, TimeoutError):
-            status, browsed = 1, b""
-        if status:
-            raise web.HTTPServiceUnavailable(text=_NO_AVAHI)
-        found = neighbours(browsed.decode("utf-8", "replace"))
-        without_check = ssl.create_default_context()  # each box is its own authority; only reading is done
-        without_check.check_hostname, without_check.verify_mode = False, ssl.CERT_NONE
-        patience = aiohttp.ClientTimeout(total=_ANSWERS_WITHIN_S)
-        connector = aiohttp.TCPConnector(ssl=without_check)
-        async with aiohttp.ClientSession(connector=connector, timeout=patience) as session:
-            return list(await asyncio.gather(*(_asked(session, one) for one in found)))
+    async def _push(self, request: web.Request) -> web.Response:
+        """{"host", "pin"}: this box's show to a box that was found; the PIN of that box once."""
+        self._guard.require_device(request)
+        values = await said(request)
+        host, pin = values.get("host"), values.get("pin", "")
+        one = self._found.get(host) if isinstance(host, str) else None
+        if one is None or not isinstance(pin, str):
+            raise web.HTTPNotFound(text="There is no such box in this network. Look for them again.")
+        show = self._stage.show_directory
+        if show is None:
+            raise web.HTTPConflict(text="No stage dances on this box: it has no show to send.")
+        await self._pack(show)
+        async with self._sending:
+            pushed = await push(one, self._packed, self._passes, pin, socket.gethostname())
+        return web.json_response(pushed._asdict())
+
+    async def _pack(self, show: Path) -> None:
+        """Once for each start of a stage: a show does not change while it is danced."""
+        async with self._packing:
+            if (
+                danced := f"{show} {self._stage.generation}"
+            ) != self._is_packed or not self._packed.is_file():
+                await answer_of("pack_show", _PACKED_WITHIN_S, show=str(show), into=str(self._packed))
+                self._is_packed = danced
 
 
 async def _asked(session: aiohttp.ClientSession, one: Neighbour) -> dict[str, Any]:

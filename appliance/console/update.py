@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from aiohttp import web
 
-from appliance.console.body import said
+from appliance.console.body import PART, new_file, received, said
 from appliance.console.guard import Guard
 from appliance.console.update_code import CODE_FILE
 
@@ -31,8 +31,6 @@ TRIES = 3
 _NAME = re.compile(r"bunraku_[0-9A-Za-z.+~:-]{1,60}_(?:amd64|arm64)\.deb(?:\.sig)?")
 _SIGNATURE = ".sig"
 _LARGEST = 300 << 20  # bytes; real packages have a third of that
-_SENT_WITHIN_S = 900.0
-_PART = 1 << 20
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # none is taken for another one
 _GROUPS, _GROUP = 3, 4
 
@@ -98,11 +96,10 @@ class Update:
         async with self._alone():
             self._make_room(name)
             try:
-                async with asyncio.timeout(_SENT_WITHIN_S):
-                    await self._receive(request, self._folder / name)
-            except (OSError, TimeoutError) as error:
+                await received(request, self._folder / name, _LARGEST)
+            except web.HTTPException:
                 self._remove()
-                raise web.HTTPServiceUnavailable(text=f"The file did not arrive whole ({error}).") from None
+                raise
         return web.json_response({"ready": self._ready()})
 
     async def _take_stick(self, request: web.Request) -> web.Response:
@@ -173,15 +170,6 @@ class Update:
         async with self._taking:
             yield
 
-    async def _receive(self, request: web.Request, path: Path) -> None:
-        size = 0
-        with _new(path) as file:
-            async for part in request.content.iter_chunked(_PART):
-                size += len(part)
-                if size > _LARGEST:
-                    raise OSError("it is larger than any update")
-                file.write(part)
-
     def _make_room(self, name: str) -> None:
         """One package and its signature; another one takes their place."""
         self._forget()
@@ -220,17 +208,12 @@ def _names(folder: Path) -> list[str]:
     return []
 
 
-def _new(path: Path) -> Any:
-    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW
-    return os.fdopen(os.open(path, flags, 0o600), "wb")
-
-
 def _copy(source: Path, path: Path) -> None:
     """A stick may hold anything: no link is followed, no pipe awaited."""
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
-    with os.fdopen(os.open(source, flags), "rb") as read, _new(path) as written:
-        for _ in range(_LARGEST // _PART):
-            part = read.read(_PART)
+    with os.fdopen(os.open(source, flags), "rb") as read, new_file(path) as written:
+        for _ in range(_LARGEST // PART):
+            part = read.read(PART)
             if not part:
                 return
             written.write(part)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import re
+from collections.abc import AsyncIterator, Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from aiohttp import web
 
-from appliance.console.body import said
+from appliance.console.body import received, said
 from appliance.console.child import answer_of
 from appliance.console.guard import Guard
 from appliance.console.learning import FOLDER as LEARNING
@@ -19,6 +21,8 @@ from appliance.console.learning import Learning
 from appliance.console.rehearsed import FOLDER as REHEARSED
 
 _LARGEST_FILE = 1 << 18  # bytes, as in show/yaml_file.py
+_LARGEST_SHOW = 400 << 20  # bytes; release/shelf.py takes no larger one
+_ARRIVED = "arrived"  # the folder of a show while it comes from another box
 _PATIENCE_S = 90.0  # the whole show is checked on a new box file, as from a stick
 _ANSWERED_S = 1.0  # the units that start anew are this process's too
 ANEW = "anew"  # cli/preflight.py
@@ -29,13 +33,20 @@ class Venue:
     """Each in a separate process, one at a time.
 
     runtime: where the box's processes meet; box: as in Settings; state: where the copy of the show with its
-    new cues lies, and what was learned.
+    new cues lies, and what was learned; show_goes: whether people see the show now.
     """
 
     def __init__(
-        self, guard: Guard, runtime: Path, box: dict[str, str], is_installed: bool, state: Path
+        self,
+        guard: Guard,
+        runtime: Path,
+        box: dict[str, str],
+        is_installed: bool,
+        state: Path,
+        show_goes: Callable[[], bool],
     ) -> None:
         self._guard, self._box, self._is_installed = guard, box, is_installed
+        self._show_goes = show_goes
         self._state = state
         self._anew = runtime / ANEW
         self._busy = asyncio.Lock()
@@ -46,6 +57,7 @@ class Venue:
             web.get("/api/box/file", self._file),
             web.post("/api/box/file", self._change),
             web.post("/api/box/show", self._dance_again),
+            web.post("/api/show", self._take_show),
             web.post("/api/cue/dance", partial(self._dance_here, REHEARSED, "rehearsal")),
             web.post("/api/learn/dance", partial(self._dance_here, LEARNING, "learning")),
         ]
@@ -75,17 +87,40 @@ class Venue:
     async def _dance_here(self, folder: str, source: str, request: web.Request) -> web.Response:
         self._guard.require_device(request)
         await said(request)
-        if not self._is_installed:
-            raise web.HTTPBadRequest(text="This box keeps no shows: give bunraku play the copy, with --show.")
+        self._require_shelf()
         if folder == LEARNING and Learning(self._state / folder).told().get("state") != "learned":
             raise web.HTTPConflict(text="No show was learned that reaches the bar.")
         return await self._done("adopt_show", folder=str(self._state / folder), source=source)
 
+    async def _take_show(self, request: web.Request) -> web.Response:
+        """The body is a show, packed by another box. It dances at once, or after the next power-on where a
+        show goes now.
+        """
+        self._guard.require_device(request)
+        self._require_shelf()
+        async with self._alone():
+            file = self._state / _ARRIVED / "show.zip"
+            file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            await received(request, file, _LARGEST_SHOW)
+            return await self._answered("take_show", file=str(file), now=not self._show_goes())
+
+    def _require_shelf(self) -> None:
+        if not self._is_installed:
+            raise web.HTTPBadRequest(text="This box keeps no shows: give bunraku play the copy, with --show.")
+
     async def _done(self, function: str, **keywords: Any) -> web.Response:
+        async with self._alone():
+            return await self._answered(function, **keywords)
+
+    @contextlib.asynccontextmanager
+    async def _alone(self) -> AsyncIterator[None]:
         if self._busy.locked():
             raise web.HTTPConflict(text="The box file is being checked already. Try again in a moment.")
         async with self._busy:
-            answer = await answer_of(function, _PATIENCE_S, **keywords, **self._box)
+            yield
+
+    async def _answered(self, function: str, **keywords: Any) -> web.Response:
+        answer = await answer_of(function, _PATIENCE_S, **keywords, **self._box)
         if json.loads(answer).get("anew"):
             asyncio.get_running_loop().call_later(_ANSWERED_S, self._anew.touch)
         return web.Response(body=answer, content_type="application/json")

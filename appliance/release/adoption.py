@@ -145,7 +145,8 @@ def _on_shelf(
             boxed = (box_id, shelf.furnish(original, places.moved))
         source = _named(arrival, with_show, with_box)
         return Pair(danced[1], boxed[1], f"{danced[0]}+{boxed[0]}", source), first_problems
-    return None, [*first_problems, f"{arrival.label.capitalize()} is refused. {_GOES_ON}"]
+    named = _named(arrival, arrival.show is not None, arrival.box is not None)
+    return None, [*first_problems, f"Refused: {named}. {_GOES_ON}"]
 
 
 def _combinations(arrival: Arrival) -> Iterator[tuple[bool, bool]]:

@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 SHOW, BOX = "show", "box.yaml"
-_LABELS = {"stick": "the stick", "page": "the page", "rehearsal": "the rehearsal", "learning": "the learning"}
+_LABELS = {
+    **{name: f"the {name}" for name in ("stick", "page", "rehearsal", "learning")},
+    "fleet": "another box",
+}
 _MOST_ENTRIES = 4000  # files, folders and everything else: on a damaged stick a folder may contain itself
 _UNREADABLE = [f"{SHOW}/?", 0, 0]  # it is there, and what reads it says that it cannot be read
 
@@ -17,7 +20,7 @@ _UNREADABLE = [f"{SHOW}/?", 0, 0]  # it is there, and what reads it says that it
 class Arrival(NamedTuple):
     """A show bundle, a box file, or both. listing: names, sizes and times of all files; [] without any."""
 
-    source: str  # stick, boot, page, rehearsal, learning
+    source: str  # stick, boot, page, rehearsal, learning, fleet
     folder: Path
     listing: list[list[Any]]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import yaml
 from appliance.box.durable import write_whole
 from appliance.pose.counted import counted
 from appliance.release.arrivals import SHOW
+from appliance.release.packed_show import pack_show
 from appliance.show.bundle import write_checksums
 from appliance.show.config_error import ConfigError
 from appliance.show.cue_writing import with_cue
@@ -21,7 +21,6 @@ from appliance.show.show import load_show
 
 ZIP = "show.zip"
 _OF = "of"  # which show.yaml the copy was made of
-_STICK = "bunraku"  # the folder on a stick in which the box looks
 
 
 def keep_cue(show: Path, folder: Path, cue: Mapping[str, Any]) -> str:
@@ -45,18 +44,7 @@ def keep_cue(show: Path, folder: Path, cue: Mapping[str, Any]) -> str:
         file.write_text(before, encoding="utf-8")
         raise
     write_checksums(copy)
-    _pack(copy, folder / ZIP)
+    pack_show(copy, folder / ZIP)
     return (
         f"The cue {cue['name']} is in the copy of the show, which has {counted(len(config.cues), 'cue')} now."
     )
-
-
-def _pack(copy: Path, path: Path) -> None:
-    """In the layout of a stick; the file is complete or not there at all."""
-    part = path.with_suffix(".part")
-    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed:
-        for one in sorted(copy.rglob("*")):
-            name = one.relative_to(copy)
-            if one.is_file() and not any(piece.startswith(".") for piece in name.parts):
-                packed.write(one, Path(_STICK, SHOW, name))
-    part.replace(path)

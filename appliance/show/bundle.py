@@ -13,6 +13,7 @@ from appliance.pose.foreign_file import content, opened, require_inside
 from appliance.show.config_error import Problem, nearest
 
 CHECKSUMS = "SHA256SUMS"
+SIGNATURE = f"{CHECKSUMS}.sig"  # `ssh-keygen -Y sign` writes it over the checksums
 WORKSHOP = ("checkpoint.pt", "training.json", "pictures")  # left there by a training: no part of the show
 LARGEST_FILE = 400_000_000  # bytes; a network has some 3 MB, a phrase some 5
 MOST_FILES = 4000
@@ -75,7 +76,7 @@ def bundle_files(directory: Path) -> list[str]:
         ]
         if len(names) > MOST_FILES:
             raise OSError(errno.E2BIG, f"it has more than {MOST_FILES} files", str(directory))
-    return sorted(name for name in names if name != CHECKSUMS)
+    return sorted(name for name in names if name not in (CHECKSUMS, SIGNATURE))
 
 
 def require_file(directory: Path, name: str) -> None:

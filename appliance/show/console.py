@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import AfterValidator, model_validator
 
 from appliance.show.report import ReportConfig
-from appliance.show.section import Section, key, refusal
+from appliance.show.section import LocalFile, Section, key, refusal
 
 
 def _address(text: str) -> str:
@@ -65,6 +65,12 @@ class ConsoleConfig(Section):
     rehearsal: bool = key(
         "Show the page Rehearsal (phrase, iterations, hands); false: a venue that plays the show as it is.",
         True,
+    )
+
+    show_keys: LocalFile | None = key(
+        "File with public keys, one a line: a show that another box sends has to be signed (`ssh-keygen -Y`) "
+        "with one of them. null: the PIN is enough.",
+        None,
     )
 
     report: ReportConfig | None = key(
