@@ -40,7 +40,7 @@ def numbers(box: Box, name: str) -> tuple[float, ...]:
     if lever is None or lever not in state:
         return ()
     fade = state[lever]
-    return (lever.reported(fade) if fade.seconds else lever.kind.reported(fade.value))[1]
+    return (lever.formatted(fade) if fade.seconds else lever.kind.formatted(fade.value))[1]
 
 
 def value(box: Box, part: str) -> tuple[float, ...]:

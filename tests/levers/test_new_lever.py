@@ -60,7 +60,7 @@ state, words = say(ShowState(show="A test"), "/haze", 0.5)
 assert words == "The haze goes to 50 % over 1.5 s."
 assert state.generation == state[HAZE].generation > 0, "the reply waits for the stage"
 assert state[HAZE].level(NOW + 0.75) == 0.25
-assert HAZE.told(state[HAZE]) == ("", (0.5, 1.5)), "as the journal notes the order"
+assert HAZE.formatted(state[HAZE]) == ("", (0.5, 1.5)), "as the journal notes the order"
 state, _ = say(state, "/cue", "mist")
 assert (state[HAZE].value, state[HAZE].seconds) == (0.25, 4.0)
 assert state[VEIL].value == "ink"

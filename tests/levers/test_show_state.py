@@ -120,7 +120,7 @@ def test_every_lever_comes_back_from_the_file_and_from_an_order_as_it_was() -> N
         assert lever is not None
         state = state.to(lever, value, NOW, 3.0)
         if lever is not CAMERA:
-            given, seconds = lever.given(*lever.told(state[lever]))
+            given, seconds = lever.given(*lever.formatted(state[lever]))
             assert given == value and type(given) is type(value)
             assert seconds == (0.0 if lever.fade_s is None else 3.0)
     assert unpacked(packed(state)) == state

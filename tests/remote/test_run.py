@@ -46,8 +46,8 @@ def test_what_cannot_be_heard_is_told(tmp_path: Path) -> None:
         text = f"timecode: {{source: art-net, port: {port}}}\nmidi: {{devices: [nanoKONTROL]}}\n"
         remote = remote_of(tmp_path, text, said, fallbacks)
         remote.turn(100.0)
-        told = remote.report(100.0)
-        assert (told["timecode"], told["state"], told["midi"]) == ("", "absent", [])
+        reported = remote.report(100.0)
+        assert (reported["timecode"], reported["state"], reported["midi"]) == ("", "absent", [])
         assert f"UDP port {port} on {HOST} cannot be opened for timecode" in said[0]
         active = {one.name: one.about for one in fallbacks.happened(100.0) if one.active}
         assert active == {"timecode-unheard": "", "midi-away": "nanoKONTROL"}

@@ -40,17 +40,17 @@ def hand_of(parts: StageParts) -> RemotePlace:
 def test_a_place_is_told_and_taken_back(parts: StageParts) -> None:
     hand = hand_of(parts)
     assert obey(Order("place", (0.25, 1.5, -0.5), "lShldr"), parts) == (True, "")
-    assert hand.reported == (0.25, 1.5, -0.5)
+    assert hand.given == (0.25, 1.5, -0.5)
     assert obey(Order("release", (), "lShldr"), parts) == (True, "")
-    assert hand.reported is None
+    assert hand.given is None
 
 
 def test_a_hand_that_is_let_hold_by_place_holds_its_joint_where_it_is(parts: StageParts) -> None:
     parts.led.stand()
     assert obey(Order("hand", (1.0,), "lShldr"), parts) == (True, "")
     hand = hand_of(parts)
-    assert hand.reported == pytest.approx(parts.led.frame.positions[hand.number].tolist())
-    assert any(hand.reported or ())
+    assert hand.given == pytest.approx(parts.led.frame.positions[hand.number].tolist())
+    assert any(hand.given or ())
 
 
 def test_what_a_hand_does_not_give_is_refused_in_words(parts: StageParts) -> None:
@@ -65,7 +65,7 @@ def test_what_a_hand_does_not_give_is_refused_in_words(parts: StageParts) -> Non
     ]:
         done, said = obey(order, parts)
         assert not done and message in said
-    assert hand_of(parts).reported is None
+    assert hand_of(parts).given is None
 
 
 def test_other_processes_know_which_joints_are_held_by_place(tmp_path: Path) -> None:
