@@ -107,6 +107,7 @@ def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
         heartbeat=tuple((one.host, one.port) for one in control.heartbeat),
         key_file=str(box.sensors.keys or ""),
         replies=tuple((one.host, one.port) for one in control.replies),
+        feedback=tuple((one.host, one.port) for one in control.feedback),
         foreign=foreign_ports(box),
         state=str(box.state_folder or ""),
     )

@@ -22,7 +22,7 @@ from appliance.show.box import load_box
 from appliance.show.bundle import named_show
 from appliance.stage.stage_error import StageError
 
-_PORT = 8080  # of a page, where an address has none
+_PORT = 8080  # where an address has none
 
 fleet = command_group("List the boxes in this network, and send a show to several of them.", True)
 

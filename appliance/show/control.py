@@ -37,6 +37,13 @@ class ReplyConfig(Section):
     port: int = key("The listener's UDP port.", 9001, within=(1, 65535))
 
 
+class FeedbackConfig(Section):
+    """A controller with motor faders or lit buttons."""
+
+    host: Ipv4 = key("The controller's IP address.", "127.0.0.1")
+    port: int = key("The UDP port on which it listens.", 9001, within=(1, 65535))
+
+
 class ControlConfig(Section):
     """Where commands by OSC arrive, and from whom."""
 
@@ -55,6 +62,13 @@ class ControlConfig(Section):
     replies: list[ReplyConfig] = key(
         "Receivers of each answer besides the sender of its command: desks often listen on another port than "
         "they send from.",
+        [],
+        length=(0, 16),
+    )
+
+    feedback: list[FeedbackConfig] = key(
+        "Controllers that hear where each lever is, at its own address, once another one has moved it, and "
+        "all of them every 10 s.",
         [],
         length=(0, 16),
     )

@@ -21,6 +21,7 @@ from appliance.pair.part import PartReader
 from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.fallback import LIVE_DROPPED, SENDER_NOT_LISTED
+from appliance.show_control.feedback import Feedback
 from appliance.show_control.foreign_sensors import ForeignSensors
 from appliance.show_control.gestures import Gestures
 from appliance.show_control.heartbeat import Heartbeat
@@ -71,6 +72,8 @@ class ControlProcess:
             opened.callback(self._heartbeat.close)
             self._replies = Listeners(settings.replies)
             opened.callback(self._replies.close)
+            self._feedback = Feedback(settings.feedback, now)
+            opened.callback(self._feedback.close)
             self._foreign = ForeignSensors(settings.foreign, folder)
             opened.callback(self._foreign.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
@@ -114,6 +117,7 @@ class ControlProcess:
         while taken < _AT_ONCE and (found := self._intake.take()) is not None:
             taken += 1
             self.handler.handle_datagram(*found, self._monotonic())
+            self._feedback.look(self.handler.show_state, self._monotonic(), found[1])
         ends_at = self._monotonic() + _LIVE_S
         for _ in range(_LIVE_AT_ONCE):
             if (found := self._intake.take_live()) is None:
@@ -141,6 +145,7 @@ class ControlProcess:
         self._gestures.look(now)
         self._health.reported = self.handler.report(self.port.strangers, now)
         self._health.publish_health(now)
+        self._feedback.look(self.handler.show_state, now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)
         for descriptor in self._foreign.opened(now):

@@ -23,6 +23,7 @@ class Settings:
     heartbeat: tuple[Listener, ...] = ()
     key_file: str = ""
     replies: tuple[Listener, ...] = ()
+    feedback: tuple[Listener, ...] = ()
     foreign: tuple[ForeignPort, ...] = ()
     state: str = ""
 
@@ -34,9 +35,10 @@ class Settings:
     def unpacked(cls, text: str) -> Settings:
         """From that argument."""
         values = json.loads(text)
-        heartbeat, replies = (
-            tuple((str(host), int(port)) for host, port in values[name]) for name in ("heartbeat", "replies")
-        )
+        listeners = {
+            name: tuple((str(host), int(port)) for host, port in values[name])
+            for name in ("heartbeat", "replies", "feedback")
+        }
         foreign = tuple(
             ForeignPort(
                 str(one["host"]),
@@ -46,5 +48,5 @@ class Settings:
             )
             for one in values["foreign"]
         )
-        changed = {"heartbeat": heartbeat, "replies": replies, "foreign": foreign}
-        return cls(**values | changed | {"senders": tuple(values["senders"])})
+        changed = {"foreign": foreign, "senders": tuple(values["senders"])}
+        return cls(**values | listeners | changed)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pty
 import re
-import shlex
 import socket
 import time
 import tty
@@ -25,7 +24,6 @@ from appliance.remote.run import Remote
 from appliance.remote.timecode import BY_NAME, at
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
-from appliance.show_control.command import command
 from appliance.show_control.midi_bindings import MidiBindings, checked
 from hw_sim.peers import HOST, free_ports
 
@@ -117,22 +115,6 @@ def test_a_box_file_that_cannot_be_is_refused_with_its_line(tmp_path: Path, text
     with pytest.raises(ConfigError, match=message) as refused:
         load_box(tmp_path / "box.yaml")
     assert re.search(r"box\.yaml:\d: ", str(refused.value))
-
-
-def test_the_examples_for_show_controllers_are_commands() -> None:
-    """As each program's manual has it: QLab and Companion with quotes, Eos with = and commas."""
-    table = (DOCS / "osc.md").read_text().partition("### Show controllers")[2].partition("\nFaders")[0]
-    rows = [line.split("|")[1:-1] for line in table.splitlines() if line.startswith("| ")][1:]
-    for program, _, *examples in rows:
-        for example in (cell.strip().strip("`") for cell in examples):
-            if "Eos" in program:
-                address, _, listed = example.partition("=")
-                words = listed.split(",") if listed else []
-            else:
-                address, *words = shlex.split(example)
-            numbers = [float(word) if re.fullmatch(r"[\d.]+", word) else word for word in words]
-            assert command(address, numbers).address == address
-    assert len(rows) == 3
 
 
 def test_two_boxes_on_one_port_hear_the_same_broadcast() -> None:

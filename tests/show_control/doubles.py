@@ -179,11 +179,13 @@ class ControlInThread:
         senders: Sequence[str] = (),
         heartbeat: Sequence[tuple[str, int]] = (),
         replies: Sequence[tuple[str, int]] = (),
+        feedback: Sequence[tuple[str, int]] = (),
     ) -> None:
         self.said: list[str] = []
         bound = open_port(host, 0)
         settings = Settings(
-            str(folder), bound.detach(), tuple(senders), tuple(heartbeat), str(key_file or ""), tuple(replies)
+            *(str(folder), bound.detach(), tuple(senders), tuple(heartbeat), str(key_file or "")),
+            *(tuple(replies), tuple(feedback)),
         )
         self.process = ControlProcess(settings, self.said.append)
         self.port = self.process.port.number
