@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from playwright.sync_api import BrowserContext, expect
 from playwright.sync_api import Page as Tab
 
 from tests.bundles import write_show
-from tests.console.browser import ON_BOTH, declared, press, unlocked_tab
+from tests.console.browser import ON_BOTH, await_true, declared, press, unlocked_tab
 from tests.console.page import Page, box_with_page
 from tests.system.box import Box
 from tests.system.lit import DIMMER, PAR, RIG, Node, artnet, node
@@ -22,6 +24,7 @@ from tests.system.test_projector import Projection
 pytestmark = pytest.mark.realtime
 
 RED = PAR + 1
+TRIES_FOR_S = 15.0  # after a drag the page tries its last step three times
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +54,7 @@ def test_the_rig_shines_on_the_page_and_is_walked_while_the_show_stands(
     box, page, lamps = hall
     tab = unlocked_tab(context, page, "picture")
     expect(tab.locator("#lamps button")).to_have_text(["head · 100 %", "par · 100 %", "second · 100 %"])
-    bright = tab.evaluate(LIT)
-    assert bright > 200
+    await_true(tab, f"({LIT})() > 200")
     press(tab, "#rig-walk")
     expect(tab.locator("#said")).to_contain_text("Stop it first")
     press(tab, '[data-page="tonight"]')
@@ -119,28 +121,19 @@ def test_a_corner_follows_the_finger_on_the_wall(
     press(tab, "#grid")
     expect(tab.locator("#grid")).to_have_attribute("aria-pressed", "true")
     wall.await_picture(lambda picture: bool(picture[:3, :3].any()))
-    pad, handle = (tab.locator(one).bounding_box() for one in ("#corners", "#corners button >> nth=0"))
-    assert pad is not None and handle is not None
-    way = 0.25 * pad["width"], 0.25 * pad["height"]
-    drag(tab, handle["x"] + 30, handle["y"] + 30, *way)
-    quarter = pytest.approx((0.25, 0.25), abs=0.01)
-    wait_until(lambda: _corner(box) == quarter, lambda: f"{_corner(box)} {tab.inner_text('#said')}")
+    pull(tab, "#corners button >> nth=0", lambda: _corner(box), (0.25, 0.25))
     wall.await_picture(lambda picture: not np.any(picture[:12, :20]))
-    corner = _corner(box)
+    before = _corner(box)
     first = tab.locator("#corners button").nth(0)
-    # A projector that is busy refuses, and the page says so: a person presses again.
-    wait_until(lambda: first.press("ArrowRight") or _corner(box)[0] > corner[0] + 0.001)
+    repeat(tab, lambda: first.press("ArrowRight"), lambda: _corner(box)[0] > before[0] + 0.001)
+    corner = _corner(box)
     press(tab, "#corners-reset")
     expect(tab.locator("#said")).to_contain_text("Hold the button")
     assert _corner(box)[0] > 0.2, "a tap does not reset"
-    wait_until(
-        lambda: hold(tab, "#corners-reset") or _corner(box) == pytest.approx((0, 0), abs=0.001),
-        lambda: f"{_corner(box)} {tab.inner_text('#said')}",
-    )
-    press(tab, "#corners-undo")
-    wait_until(lambda: _corner(box) == pytest.approx(corner, abs=0.01), lambda: f"{_corner(box)}")
+    repeat(tab, lambda: hold(tab, "#corners-reset"), lambda: _corner(box) == (0.0, 0.0))
+    repeat(tab, lambda: press(tab, "#corners-undo"), lambda: _corner(box) == pytest.approx(corner, abs=0.001))
     expect(tab.locator("#corners-shape")).to_have_attribute("points", re.compile(r"^0\.2\d+,0\.2\d+ 1,0 "))
-    wait_until(lambda: hold(tab, "#corners-reset") or _corner(box) == pytest.approx((0, 0), abs=0.001))
+    repeat(tab, lambda: hold(tab, "#corners-reset"), lambda: _corner(box) == (0.0, 0.0))
     wall.await_picture(lambda picture: bool(picture[:3, :3].any()))
     press(tab, "#grid")
     expect(tab.locator("#rig")).to_be_visible()
@@ -155,26 +148,50 @@ def test_a_point_of_the_mesh_follows_the_finger_on_the_wall(
     point = tab.locator('[data-point="12"]')
     expect(point).to_be_hidden()
     press(tab, "#mesh")
-    pad, handle = tab.locator("#corners").bounding_box(), point.bounding_box()
-    assert pad is not None and handle is not None
-    drag(tab, handle["x"] + 20, handle["y"] + 20, 0.1 * pad["width"], -0.1 * pad["height"])
 
     def pulled() -> tuple[float, float]:
-        file = box.box_file.with_name("projector.alignment")
-        warp = yaml.safe_load(file.read_text())["warp"] if file.is_file() else []
+        warp = _kept(box).get("warp", [])
         x, y = warp[12] if warp else (0.0, 0.0)
         return x, y
 
-    wait_until(lambda: pulled() == pytest.approx((0.1, -0.1), abs=0.01), lambda: tab.inner_text("#said"))
+    pull(tab, '[data-point="12"]', pulled, (0.1, -0.1))
     wall.await_picture(lambda picture: bool(picture.any()))
-    wait_until(lambda: hold(tab, "#mesh-reset") or pulled() == (0.0, 0.0), lambda: tab.inner_text("#said"))
+    repeat(tab, lambda: press(tab, "#corners-undo"), lambda: pulled() == pytest.approx((0, 0), abs=0.001))
+    pull(tab, '[data-point="12"]', pulled, (-0.05, 0.1))
+    repeat(tab, lambda: hold(tab, "#mesh-reset"), lambda: pulled() == (0.0, 0.0))
+
+
+def repeat(tab: Tab, act: Callable[[], None], is_done: Callable[[], bool]) -> None:
+    """Act until it is done. A projector that is busy refuses, and a person acts again; but not before the
+    page has stopped to try."""
+
+    def tried() -> bool:
+        act()
+        with contextlib.suppress(AssertionError):
+            wait_until(is_done, patience_s=TRIES_FOR_S)
+        return is_done()
+
+    wait_until(tried, lambda: tab.inner_text("#said"))
+
+
+def pull(tab: Tab, where: str, place: Callable[[], tuple[float, float]], wanted: tuple[float, float]) -> None:
+    """Drag a handle until the projector keeps it there; again for what is left of the way."""
+
+    def dragged() -> None:
+        pad, handle = tab.locator("#corners").bounding_box(), tab.locator(where).bounding_box()
+        assert pad is not None and handle is not None
+        (x, y), left, top = place(), handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2
+        drag(tab, left, top, (wanted[0] - x) * pad["width"], (wanted[1] - y) * pad["height"])
+
+    repeat(tab, dragged, lambda: place() == pytest.approx(wanted, abs=0.01))
 
 
 def hold(tab: Tab, where: str) -> None:
-    """Long enough for a button that asks for it."""
-    tab.locator(where).dispatch_event("pointerdown")
-    tab.wait_for_timeout(1100)
-    tab.locator(where).dispatch_event("pointerup")
+    """Until the button that asks for it lets go by itself."""
+    button = tab.locator(where)
+    button.dispatch_event("pointerdown")
+    expect(button).not_to_have_class(re.compile("holding"))
+    button.dispatch_event("pointerup")
 
 
 def drag(tab: Tab, x: float, y: float, dx: float, dy: float) -> None:
@@ -197,7 +214,10 @@ def drag(tab: Tab, x: float, y: float, dx: float, dy: float) -> None:
 
 def _corner(box: Box) -> tuple[float, float]:
     """Where the projector keeps the first corner."""
-    kept = box.box_file.with_name("projector.alignment")
-    corners = (yaml.safe_load(kept.read_text()) if kept.is_file() else {}).get("corners", [[0, 0]])
-    x, y = corners[0]
+    x, y = _kept(box).get("corners", [[0, 0]])[0]
     return float(x), float(y)
+
+
+def _kept(box: Box) -> dict[str, Any]:
+    file = box.box_file.with_name("projector.alignment")
+    return yaml.safe_load(file.read_text()) if file.is_file() else {}

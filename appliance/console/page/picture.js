@@ -23,7 +23,7 @@ const CORNER = {
 const POINT = {
   address: "/projector/warp",
   at: meshPoint,
-  show: layPoint,
+  show: pullTo,
   remember: (place) => note({ place, pull: pulls[place] ?? [0, 0] }),
 };
 // With edge blend: a step of each value, and how it is said.
@@ -130,13 +130,23 @@ function put(corners) {
 }
 
 // The mesh hangs between the corners, in perspective as on the wall (corners.py); its points are pulled from there.
-function meshPoint(place) {
-  const u = place % MESH / (MESH - 1), v = Math.floor(place / MESH) / (MESH - 1), [dx, dy] = pulls[place] ?? [0, 0];
+function hung(place) {
+  const u = place % MESH / (MESH - 1), v = Math.floor(place / MESH) / (MESH - 1);
   const [[x0, y0], [x1, y1], [x2, y2], [x3, y3]] = shown;
   const [ax, ay, bx, by] = [x1 - x2, y1 - y2, x3 - x2, y3 - y2], [sx, sy] = [x0 - x1 + x2 - x3, y0 - y1 + y2 - y3];
   const area = ax * by - ay * bx, g = (sx * by - sy * bx) / area, h = (ax * sy - ay * sx) / area, w = g * u + h * v + 1;
   const x = (x1 - x0 + g * x1) * u + (x3 - x0 + h * x3) * v + x0, y = (y1 - y0 + g * y1) * u + (y3 - y0 + h * y3) * v + y0;
-  return [x / w + dx, y / w + dy];
+  return [x / w, y / w];
+}
+
+function meshPoint(place) {
+  const [x, y] = hung(place), [dx, dy] = pulls[place] ?? [0, 0];
+  return [x + dx, y + dy];
+}
+
+function pullTo(place, point) {
+  pulls[place] = away(point, hung(place));
+  layPoint(place, point);
 }
 
 function lay(warp) {
@@ -231,7 +241,10 @@ function handle(place, what) {
     if (!way) return;
     event.preventDefault();
     if (!event.repeat) what.remember(place);
-    await command(what.address, place + 1, NUDGE * way[0], NUDGE * way[1]);
+    const [dx, dy] = [NUDGE * way[0], NUDGE * way[1]];
+    if (!await command(what.address, place + 1, dx, dy)) return;
+    const [x, y] = what.at(place);
+    what.show(place, [x + dx, y + dy]); // before the box tells of it: a reset right after is undone to here
   });
   return button;
 }
