@@ -43,12 +43,13 @@ class Outputs:
 
         A box that may not speak encodes and shares it nonetheless: its receivers' state goes on.
         """
+        shift_s = self.shift_s  # a box that learns now that it leads no longer has another one after that
         if self.may_speak is not None:
             is_muted = not self.may_speak()
             for one in self.receivers:
                 one.is_muted = is_muted
         times = frame.frame_time, frame.sensor_arrival
-        frame.frame_time, frame.sensor_arrival = (seconds + self.shift_s for seconds in times)
+        frame.frame_time, frame.sensor_arrival = (seconds + shift_s for seconds in times)
         self._osc.send_frame(frame)
         for output in self._posistagenet:
             output.send_frame(frame)

@@ -1,49 +1,93 @@
-"""Whether the network card that leads to the other box has a cable with something alive at its end."""
+"""Whether this box reaches its receivers: the network cards that lead to them, and their cables."""
 
 from __future__ import annotations
 
+import ipaddress
+import os
 import socket
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+
+from appliance.show.box import OutputsConfig
 
 _ROUTES, _CARDS = Path("/proc/net/route"), Path("/sys/class/net")
 _SETTLE_S = 0.08  # a box hears the other one within that time
+_FORWARDS_S = 32.0  # IEEE 802.1D: a switch may pass nothing on for two times 15 s after a cable came in
+_FIND_EACH_S = 0.25
 
 
 class Carrier:
-    """Holds a leader silent for a moment after its cable came back: another box may lead by now."""
+    """The cables of the cards that lead to the receivers.
 
-    def __init__(self, peers: Sequence[str], routes: Path = _ROUTES, cards: Path = _CARDS) -> None:
-        self._cards = tuple(
-            {name: cards / name / "carrier" for peer in peers for name in cards_to(peer, routes)}.values()
-        )
-        self._silent_until = float("-inf")
+    is_out: at the newest look none of these cards had something alive at its end. is_up: one had, or the
+    receivers need none. Neither: no card is known that leads to them.
+    """
 
-    def holds_silent(self, now: float) -> bool:
-        """Call it before each frame while the other box is not heard: some 20 microseconds."""
-        if self._cards and not any(_is_up(card) for card in self._cards):
-            self._silent_until = now + _SETTLE_S
-        return now < self._silent_until
+    def __init__(self, receivers: Iterable[str], routes: Path = _ROUTES, cards: Path = _CARDS) -> None:
+        """receivers: their addresses, or this machine's in their network."""
+        self._receivers = [one for one in receivers if not ipaddress.IPv4Address(one).is_loopback]
+        self._routes, self._folder = routes, cards
+        self._cards: list[Path] = []
+        self.is_out, self.is_up = False, not self._receivers
+        self._find_at = self._changed_at = float("-inf")
+
+    def look(self, now: float) -> None:
+        """Once a tick: some 10 microseconds."""
+        if not self._receivers:
+            return
+        if not self._cards and now >= self._find_at:
+            self._find_at = now + _FIND_EACH_S
+            self._cards = [self._folder / one / "carrier" for one in cards_to(self._receivers, self._routes)]
+        was_out, self.is_up = self.is_out, any(map(_is_up, self._cards))
+        self.is_out = bool(self._cards) and not self.is_up
+        if was_out is not self.is_out:
+            self._changed_at = now
+
+    def may_speak(self, now: float, heard: float) -> bool:
+        """A leader whose cable came back is silent until it has heard the other box: that may lead by now.
+
+        heard: when that was last heard.
+        """
+        return not self.is_out and (heard > self._changed_at or now - self._changed_at >= _SETTLE_S)
+
+    def is_heard_nonetheless(self, heard: float) -> bool:
+        """Whether another link still joins the two boxes while the receivers' cable is out."""
+        return self.is_out and heard > self._changed_at + _SETTLE_S
+
+    def knows_silence(self, now: float, heard: float) -> bool:
+        """Whether a follower that hears nothing knows by it that the leader is gone."""
+        return not self.is_out and (heard > self._changed_at or now - self._changed_at >= _FORWARDS_S)
 
 
-def cards_to(peer: str, routes: Path = _ROUTES) -> list[str]:
-    """Names of the network cards whose networks the address is in, without loopback."""
-    (address,) = struct.unpack("=I", socket.inet_aton(peer))
-    found = []
+def receivers_of(outputs: OutputsConfig) -> Iterator[str]:
+    """Addresses that lead to the receivers."""
+    yield from (one.host for one in outputs.osc)
+    yield from (one.interface for one in outputs.posistagenet)
+    yield from (address for one in outputs.dmx if (address := one.interface or one.host))
+
+
+def cards_to(addresses: Iterable[str], routes: Path = _ROUTES) -> list[str]:
+    """Names of the network cards by which datagrams to these addresses leave, each once."""
     try:
-        lines = routes.read_text().splitlines()[1:]
+        rows = [line.split() for line in routes.read_text().splitlines()[1:]]
     except OSError:
         return []
-    for line in lines:
-        name, network, _, _, _, _, _, mask, *_ = line.split()
-        if int(mask, 16) and name != "lo" and address & int(mask, 16) == int(network, 16):
-            found.append(name)
-    return found
+    found: dict[str, None] = {}
+    for address in addresses:
+        (number,) = struct.unpack("=I", socket.inet_aton(address))
+        ways = [(int(row[7], 16), row[0]) for row in rows if number & int(row[7], 16) == int(row[1], 16)]
+        if ways:
+            found[max(ways, key=lambda way: way[0].bit_count())[1]] = None
+    return [*found]
 
 
 def _is_up(card: Path) -> bool:
     try:
-        return card.read_text().strip() == "1"
+        descriptor = os.open(card, os.O_RDONLY)
+        try:
+            return os.read(descriptor, 1) == b"1"
+        finally:
+            os.close(descriptor)
     except OSError:  # it is switched off
         return False

@@ -44,7 +44,8 @@ class PairSettings:
 class Pair:
     """Nothing here waits (but `await_datagram`), raises or logs.
 
-    is_ready: this box could take over; the stage sets it. wants_keyframe: the other box asked for one.
+    is_ready: this box could take over; reaches: see Roles.look; the stage sets both. wants_keyframe: the
+    other box asked for one.
     same_show: whether the other box has the same show and software, as far as it was heard.
     """
 
@@ -53,6 +54,7 @@ class Pair:
         self.roles = Roles(settings.is_first, now, settings.silent_s)
         self.offset = ClockOffset()
         self.is_ready = self.wants_keyframe = False
+        self.reaches = True
         self.same_show = True
         self.trouble = ""  # why nothing can be heard or sent
         self._fingerprint = fingerprint
@@ -97,7 +99,10 @@ class Pair:
     def look(self, now: float) -> None:
         """Hear what has come, and change the role where it is time."""
         self._hear(now)
-        self.roles.look(now, self.is_ready)
+        led = self.leads
+        self.roles.look(now, self.is_ready, self.reaches)
+        if led and not self.leads:
+            self.follow_anew()
 
     def beat(self, now: float) -> None:
         """That this box is there, and what it does; twice, since one may be lost."""

@@ -13,6 +13,9 @@ YIELDS_S = 0.15  # a leader that gave back and hears nobody leads again
 SHORT_S = 2.0  # a box that lost the lead so soon after it had taken it waits longer before it takes it again
 MOST_PATIENCE_S = 0.3
 PATIENCE_FOR_S = 10.0
+CABLE_S = 3.0  # a card says that its cable is out within that time
+FRESH_S = 0.1  # a lead is given only to a box that was heard so lately
+SILENCE, CABLE = "the other one is silent", "this box's cable is out"
 
 
 class Role(IntEnum):
@@ -71,9 +74,9 @@ class Roles:
         return self._peer
 
     @property
-    def heard_leader(self) -> float:
-        """When the other box was heard leading."""
-        return self._heard_leader
+    def heard(self) -> float:
+        """When the other box was last heard."""
+        return self._heard
 
     def hear(self, heard: Heard, now: float, is_ready: bool) -> None:
         """A datagram of the other box, authentic and new. is_ready: this box could take over."""
@@ -102,31 +105,39 @@ class Roles:
         """The box is ready to hear: from now on it waits."""
         self._since = now
 
-    def look(self, now: float, is_ready: bool) -> None:
-        """Changes that are due by time; call it at least once a tick."""
+    def look(self, now: float, is_ready: bool, reaches: bool = True) -> None:
+        """Changes that are due by time; call it at least once a tick.
+
+        reaches: this box reaches the receivers. One whose cable is out hears nobody, and nobody hears it: it
+        does not take over, and gives up the lead that it took before it knew. One that is switched on without
+        a cable dances, and follows any box that leads.
+        """
         if now - self._deposed_at > PATIENCE_FOR_S:
             self.patience_s = self.silent_s
         if self.role is Role.WAITS:
             if now - self._since >= (FIRST_WAITS_S if self.is_first else SECOND_WAITS_S):
-                self._lead(now, "no other box leads")
-        elif self.role is Role.FOLLOWS:
+                self._lead(now, "no other box leads", int(reaches))
+        elif self.role is Role.FOLLOWS and reaches:
             silent_s = now - max(self._heard_leader, self._since)
             if silent_s > (self.patience_s if is_ready else max(UNREADY_WAITS_S, self.patience_s)):
                 self.takeovers += 1
-                self._lead(now, "the other one is silent")
+                self._lead(now, SILENCE)
         elif self.role is Role.YIELDS and now - self._since > YIELDS_S:
             self._lead(now, "the other one did not take it")
+        elif self.leads and not reaches and self.why == SILENCE and now - self._since < CABLE_S:
+            self.epoch -= 1
+            self._become(Role.FOLLOWS, now, CABLE)
 
     def give_back(self, now: float) -> bool:
         """Ask the other box to lead, which could; whether it is asked."""
         peer = self._peer
-        if not self.leads or not self.peer_lives(now) or peer is None or not peer.is_ready:
+        if not self.leads or now - self._heard > FRESH_S or peer is None or not peer.is_ready:
             return False
         self._become(Role.YIELDS, now, "given back")
         return True
 
-    def _lead(self, now: float, why: str) -> None:
-        self.epoch += 1
+    def _lead(self, now: float, why: str, step: int = 1) -> None:
+        self.epoch += step
         self._become(Role.LEADS, now, why)
 
     def _become(self, role: Role, now: float, why: str) -> None:

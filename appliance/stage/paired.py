@@ -19,12 +19,13 @@ from appliance.box.snapshot import packed, restore, shift_times
 from appliance.dancer.loop import Loop
 from appliance.levers import show_state as states
 from appliance.levers.show_state import ShowState
-from appliance.pair.carrier import Carrier
+from appliance.pair.carrier import Carrier, receivers_of
 from appliance.pair.pair import Pair, PairSettings
 from appliance.pair.part import BoxPart, PartWriter
 from appliance.pair.roles import Role
 from appliance.recorder.record import DAMAGED, EVENT, ORDER, TICK, facts_of_run, layout_of
 from appliance.sensor.wire import KEY_BYTES
+from appliance.show.box import OutputsConfig
 from appliance.show.config_error import ConfigError, Problem
 from appliance.show.pair import PairConfig
 from appliance.show.show import Show
@@ -46,6 +47,7 @@ _MOST_BEHIND = 25  # messages, so some 0.5 s: a jump that far is better than no 
 _CALL_EACH_S, _CALLS_FOR_S = 0.25, 3.0  # after that a wearable greets by itself
 _OWN_STATE_S = 1.0  # a box that lost the lead may take it back from where it stood, until it follows
 _FRESH_LOOK_S = 0.004
+_GIVE_EACH_S = 1.0
 _OTHERS = frozenset(("run", "pid", "show_directory", "python", "numpy", "onnxruntime"))
 TOLERANCE_DEGREES = 0.5  # between processors of two kinds; beyond it the leader's state is fetched again
 
@@ -84,6 +86,7 @@ class PairedStage:
     def __init__(
         self,
         config: PairConfig,
+        outputs: OutputsConfig,
         show: Show,
         parts: StageParts,
         wearing: SensorFit,
@@ -107,7 +110,8 @@ class PairedStage:
         if made is not None:
             parts.make_by(_made_here_or_again(show, parts, made))
         self._part = PartWriter(folder)
-        self._carrier = Carrier(config.peer)
+        self._carrier = Carrier(receivers_of(outputs))
+        self._give_at = float("-inf")
         self._items: list[bytes] = []
         self._sent_state: ShowState | None = None
         self._state_due = 0
@@ -152,6 +156,7 @@ class PairedStage:
             frame = self._tick.frame
             self.pair.give_keyframe(_PLACE.pack(frame.tick, frame.frame_time) + packed(self._tick))
         self.pair.answer(now)
+        self._look_at_cable(now)
         self._write_part(now)
 
     def flush(self, now: float) -> None:
@@ -185,6 +190,7 @@ class PairedStage:
             self._beat_at = now
             self.pair.beat(now)
             self._own_link.overhear(now)
+            self._look_at_cable(now)
             self._write_part(now)
         self.pair.ask(now)
         if not self.pair.same_show:
@@ -198,7 +204,8 @@ class PairedStage:
         else:
             time.sleep(_REST_S)
         follows = self._has_danced and self.pair.behind <= _MOST_BEHIND
-        self.pair.is_ready = follows or now - self._led_until < _OWN_STATE_S
+        own = now - self._led_until < _OWN_STATE_S
+        self.pair.is_ready = (follows or own) and not self._carrier.is_out
 
     def give_back(self, now: float) -> tuple[bool, str]:
         """Let the other box lead; whether it was asked to, and a sentence."""
@@ -280,9 +287,19 @@ class PairedStage:
         now = time.monotonic()
         if now - self._looked_at > _FRESH_LOOK_S:
             self._look(now)
-        if not self.pair.roles.peer_lives(now) and self._carrier.holds_silent(now):
-            return False
-        return self.pair.leads
+        return self.pair.leads and self._carrier.may_speak(now, self.pair.roles.heard)
+
+    def _look_at_cable(self, now: float) -> None:
+        """A leader whose own cable is out gives the lead away, where another link still joins the two."""
+        carrier, roles = self._carrier, self.pair.roles
+        carrier.look(now)
+        if roles.role is Role.FOLLOWS:
+            self.pair.reaches = carrier.knows_silence(now, roles.heard)
+        else:
+            self.pair.reaches = not carrier.is_out if roles.leads else carrier.is_up
+        if roles.leads and carrier.is_heard_nonetheless(roles.heard) and now >= self._give_at:
+            self._give_at = now + _GIVE_EACH_S
+            self.give_back(now)
 
     def _write_part(self, now: float) -> None:
         roles = self.pair.roles

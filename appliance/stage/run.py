@@ -214,9 +214,10 @@ class Stage:
 
         if self.recorder is None:
             return None  # what the other box would follow is what the recorder notes; it was said why not
+        pair, outputs, made = self.box.pair, self.box.outputs, self.made[0].loop if self.made else None
         paired = PairedStage(
-            *(self.box.pair, self.show, self.parts, self.wearing, self.tick, self.reconciler),
-            *(self.sharing.folder, self._say_and_note, self.made[0].loop if self.made else None),
+            *(pair, outputs, self.show, self.parts, self.wearing, self.tick, self.reconciler),
+            *(self.sharing.folder, self._say_and_note, made),
         )
         self.recorder.tap = paired.note
         return paired

@@ -13,6 +13,7 @@ import struct
 import subprocess
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
@@ -159,9 +160,10 @@ class Seen:
         ]
 
     def clear(self) -> None:
-        """Forget what came."""
+        """Forget what came, but for the last half second."""
+        since = time.time() - 0.5
         for one in (self.osc, self._bundles, self.psn, self.sacn, self.artnet):
-            one.clear()
+            del one[: sum(came[0] < since for came in list(one))]
 
 
 def _messages(data: bytes) -> list[tuple[str, list[Any]]]:
@@ -220,6 +222,13 @@ class PairedBox(Process):
         """Whether its lights have come since it was switched on."""
         return "Lights:" in self.output[self._spoke :]
 
+    def prefer_lights(self) -> None:
+        """As on a machine where nothing but the box runs: the lights need not wait for other programs."""
+        for pid in _descendants(self.process.pid):
+            if has_argument(pid, "lights"):
+                with contextlib.suppress(PermissionError):
+                    os.sched_setscheduler(pid, os.SCHED_RR, os.sched_param(1))
+
     def waited_ms(self) -> dict[str, float]:
         """For how long the kernel has let its stage and its lights wait for a processor."""
         stage = self.process.pid
@@ -233,14 +242,27 @@ class PairedBox(Process):
 
     def signal(self, number: int) -> None:
         """To all its processes: power, or a machine that hangs."""
-        for pid in [self.process.pid, *_descendants(self.process.pid)]:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, number)
+        everyone = [self.process.pid, *_descendants(self.process.pid)]
+        with _at_once():
+            for pid in everyone:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, number)
 
     def cut_power(self) -> None:
         """All processes at once."""
         self.signal(signal.SIGKILL)
         self.process.wait()
+
+
+@contextlib.contextmanager
+def _at_once() -> Iterator[None]:
+    """No other program runs between two steps of this thread."""
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(85))
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def _descendants(pid: int) -> list[int]:
@@ -393,6 +415,18 @@ class Hall:
             return len(lead) == len(parts) and sum(lead) == 1
 
         wait_until(are_ready, lambda: "\n".join(box.output for box in self.boxes.values()))
+
+    def await_whole(self) -> None:
+        """Until they are a pair, and the lights of both have come."""
+        self.await_pair()
+        wait_until(lambda: all(box.is_lit for box in self.boxes.values()), "the lights never came")
+        for box in self.boxes.values():
+            box.prefer_lights()
+
+    @property
+    def epoch(self) -> int:
+        """How often the lead has changed, as the box has it that leads."""
+        return next(part.epoch for box in self.boxes.values() if (part := box.part) and part.leads)
 
     @property
     def leader(self) -> str:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import pytest
 
 from appliance.pair.roles import (
+    CABLE,
+    CABLE_S,
     FIRST_WAITS_S,
     MOST_PATIENCE_S,
     SECOND_WAITS_S,
@@ -121,6 +123,32 @@ def test_a_lead_that_was_short_makes_the_next_takeover_slower() -> None:
     assert one.role is Role.FOLLOWS and one.patience_s == 2 * SILENT_S
     one.look(60.0, False)
     assert one.patience_s == SILENT_S
+
+
+def test_a_follower_whose_cable_is_out_leaves_the_lead_where_it_is() -> None:
+    one = following(epoch=3)
+    one.look(5.0, True, reaches=False)
+    assert one.role is Role.FOLLOWS and one.epoch == 3
+
+
+def test_a_follower_that_took_over_before_its_card_told_of_the_cable_steps_back() -> None:
+    first, second = following(True, epoch=3), following(epoch=3)
+    second.look(1.0, True)
+    assert second.leads and second.epoch == 4
+    second.look(1.0 + CABLE_S - 0.1, True, reaches=False)
+    assert second.role is Role.FOLLOWS and second.epoch == 3 and second.why == CABLE
+    first.look(1.0, True)  # it led long before
+    first.look(1.0 + CABLE_S + 0.1, True, reaches=False)
+    assert first.leads
+
+
+def test_a_box_that_was_switched_on_without_a_cable_gives_way_to_any_leader() -> None:
+    newcomer, other = roles(True), leading(False)
+    newcomer.look(FIRST_WAITS_S, False, reaches=False)
+    assert newcomer.leads and newcomer.epoch < other.epoch
+    newcomer.hear(Heard(Role.LEADS, other.epoch, True), 9.0, False)
+    other.hear(Heard(Role.LEADS, 0, True), 9.0, True)
+    assert newcomer.role is Role.FOLLOWS and other.leads
 
 
 @dataclass

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import random
-from pathlib import Path
 
 import pytest
 
 from appliance.pair import wire
-from appliance.pair.carrier import Carrier, cards_to
 from appliance.pair.clock_offset import ClockOffset
 from appliance.pair.roles import Heard, Role
 from appliance.pair.stream import KEPT, MOST_PART, Incoming, Outgoing, body_of, numbers_in
@@ -114,20 +112,3 @@ def test_the_shortest_way_tells_how_far_clocks_are_apart() -> None:
     for number in range(100):
         offset.hear(100.0 + number, 40.0 + number + 0.0003 + 0.01 * (number % 7))
     assert offset.seconds == pytest.approx(-60.0 + 0.0003)
-
-
-def test_a_cable_that_comes_back_leaves_time_to_hear_the_other_box(tmp_path: Path) -> None:
-    routes = tmp_path / "route"
-    routes.write_text(
-        "Iface\tDestination\n" + "\t".join(["eth0", "00004D0A", *"00000", "00FFFFFF", "0"]) + "\n"
-    )
-    assert cards_to("10.77.0.2", routes) == ["eth0"] and cards_to("10.78.0.2", routes) == []
-    (tmp_path / "eth0").mkdir()
-    card = tmp_path / "eth0" / "carrier"
-    card.write_text("1\n")
-    carrier = Carrier(["10.77.0.2"], routes, tmp_path)
-    assert not carrier.holds_silent(1.0)
-    card.write_text("0\n")
-    assert carrier.holds_silent(2.0)
-    card.write_text("1\n")
-    assert carrier.holds_silent(2.05) and not carrier.holds_silent(2.1)

@@ -1,0 +1,90 @@
+"""The cables of the cards that lead to the receivers: who is silent, and who takes over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from appliance.pair.carrier import Carrier, cards_to, receivers_of
+from appliance.show.box import OutputsConfig
+
+NEVER = float("-inf")
+
+
+@pytest.fixture
+def routes(tmp_path: Path) -> Path:
+    rows = [("eth1", "00000000", "00000000"), ("eth0", "00004D0A", "00FFFFFF")]
+    path = tmp_path / "route"
+    lines = ["\t".join([name, network, *"00000", mask, "0"]) for name, network, mask in rows]
+    path.write_text("\n".join(["Iface\tDestination", *lines]) + "\n")
+    return path
+
+
+def plugged(folder: Path, card: str, text: str) -> None:
+    (folder / card).mkdir(exist_ok=True)
+    (folder / card / "carrier").write_text(f"{text}\n")
+
+
+def test_the_card_to_an_address_is_that_of_the_narrowest_network(routes: Path, tmp_path: Path) -> None:
+    assert cards_to(["10.77.0.2"], routes) == ["eth0"] and cards_to(["10.78.0.2"], routes) == ["eth1"]
+    assert cards_to(["10.77.0.2", "10.77.0.3"], routes) == ["eth0"]
+    assert cards_to(["10.77.0.2"], tmp_path / "none") == []
+
+
+def test_receivers_are_reached_by_their_address_or_by_the_boxs_own() -> None:
+    outputs = OutputsConfig.model_validate(
+        {
+            "osc": [{"host": "10.77.0.9"}],
+            "posistagenet": [{"interface": "10.77.0.1"}],
+            "dmx": [
+                {"wire": "sacn", "universe": 1, "interface": "10.0.0.1"},
+                {"wire": "artnet", "universe": 2, "host": "10.0.0.7"},
+                {"wire": "udmx", "universe": 3},
+            ],
+        }
+    )
+    assert [*receivers_of(outputs)] == ["10.77.0.9", "10.77.0.1", "10.0.0.1", "10.0.0.7"]
+
+
+def test_a_leader_whose_cable_comes_back_listens_first(routes: Path, tmp_path: Path) -> None:
+    plugged(tmp_path, "eth0", "1")
+    carrier = Carrier(["10.77.0.9"], routes, tmp_path)
+    carrier.look(1.0)
+    assert carrier.is_up and carrier.may_speak(1.0, NEVER) and carrier.knows_silence(1.0, NEVER)
+    plugged(tmp_path, "eth0", "0")
+    carrier.look(2.0)
+    assert carrier.is_out and not carrier.may_speak(2.0, 2.0) and not carrier.knows_silence(2.0, 2.0)
+    assert not carrier.is_heard_nonetheless(2.01) and carrier.is_heard_nonetheless(2.2)
+    plugged(tmp_path, "eth0", "1")
+    carrier.look(3.0)
+    assert not carrier.may_speak(3.05, 2.5) and carrier.may_speak(3.05, 3.01) and carrier.may_speak(3.1, 2.5)
+
+
+def test_a_follower_whose_cable_comes_back_leaves_a_switch_time_to_forward(
+    routes: Path, tmp_path: Path
+) -> None:
+    plugged(tmp_path, "eth0", "0")
+    carrier = Carrier(["10.77.0.9"], routes, tmp_path)
+    carrier.look(1.0)
+    plugged(tmp_path, "eth0", "1")
+    carrier.look(2.0)
+    assert not carrier.knows_silence(20.0, 0.5) and carrier.knows_silence(20.0, 19.9)
+    assert carrier.knows_silence(40.0, 0.5)
+
+
+def test_one_of_two_cables_is_enough(routes: Path, tmp_path: Path) -> None:
+    plugged(tmp_path, "eth0", "0")
+    plugged(tmp_path, "eth1", "1")
+    carrier = Carrier(["10.77.0.9", "192.168.1.5"], routes, tmp_path)
+    carrier.look(1.0)
+    assert carrier.is_up and not carrier.is_out
+
+
+def test_a_box_without_a_network_is_never_out(tmp_path: Path) -> None:
+    carrier = Carrier(["127.0.0.1"], tmp_path / "none", tmp_path)
+    carrier.look(1.0)
+    assert carrier.is_up and not carrier.is_out
+    unknown = Carrier(["10.77.0.9"], tmp_path / "none", tmp_path)
+    unknown.look(1.0)
+    assert not unknown.is_up and not unknown.is_out and unknown.may_speak(1.0, NEVER)
