@@ -1,6 +1,6 @@
 #!/bin/bash
 # Builds the root of a box: Debian 13, what the box needs of it, and a release of bunraku installed into it.
-# shellcheck disable=SC2016  # $(REPO_URI), $1 and ${Package} below are for other programs than this shell
+# shellcheck disable=SC2016  # $1 and ${Package} below are for other programs than this shell
 set -euo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -69,9 +69,7 @@ sources() {
         return
     fi
     local debian security
-    debian=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian' | sort -u | head -n 1)
-    security=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian-Security' |
-        sort -u | head -n 1)
+    debian=$(mirror Debian) security=$(mirror Debian-Security)
     [ -n "$debian" ] || fail "no Debian mirror among this machine's apt sources. Name one: MIRROR='deb URL trixie main'"
     printf 'deb %s trixie main non-free-firmware\n' "$debian"
     [ "$extra" != pi ] || printf 'deb %s trixie-backports main\n' "$debian"

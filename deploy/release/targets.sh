@@ -33,39 +33,23 @@ fetch_wheels() {
         "${platforms[@]}" --dest "$folder" "$@"
 }
 
-# Fetches Debian 13's packages $3... for the processor $1 and unpacks them into $2, by an apt that knows nothing of this
-# machine's packages.
-fetch_debian() {
-    local arch=$1 folder=$2 apt=$2.apt mirror package
-    shift 2
-    # shellcheck disable=SC2016 # apt's own pattern
-    mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian' | sort -u | head -n 1)
-    [ -n "$mirror" ] || { echo "No Debian mirror among this machine's apt sources, for: $*" >&2; return 1; }
-    rm -rf "$apt" "$folder"
-    mkdir -p "$apt/state/lists/partial" "$apt/cache/archives/partial" "$folder"
-    printf 'deb [arch=%s signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] %s trixie main\n' \
-        "$arch" "$mirror" >"$apt/sources.list"
-    touch "$apt/status"
-    (
-        cd "$apt"
-        export APT_CONFIG=$apt/apt.conf
-        printf '%s\n' "Dir::State \"$apt/state\";" "Dir::State::status \"$apt/status\";" "Dir::Cache \"$apt/cache\";" \
-            "Dir::Etc::sourcelist \"$apt/sources.list\";" 'Dir::Etc::sourceparts "/dev/null";' \
-            "APT::Architecture \"$arch\";" "APT::Architectures { \"$arch\"; };" 'APT::Sandbox::User "root";' \
-            'Acquire::Languages "none";' >apt.conf
-        apt-get -qq update && apt-get -qq download "$@"
-    ) || { echo "$* for $arch did not come from Debian. Is there a network?" >&2; return 1; }
-    for package in "$apt"/*.deb; do dpkg-deb --extract "$package" "$folder"; done
-    rm -rf "$apt"
-}
+# The public half of the key file $1, which may be either half.
+public_half() { case $1 in *.pub) cat "$1" ;; *) ssh-keygen -y -f "$1" ;; esac | cut -d ' ' -f 1,2; }
+
+# Where this machine's own packages with the label $1 (Debian, Debian-Security) come from.
+# shellcheck disable=SC2016 # apt's own pattern
+mirror() { apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' "Label: $1" | sort -u | head -n 1; }
 
 # The box's Python, on this machine: its own where it has one, else Debian 13's beside this system.
 target_python() {
     local folder=${checkout:?}/build/release/python-$PYTHON loader
     [ ! -x "/usr/bin/python$PYTHON" ] || { "/usr/bin/python$PYTHON" "$@"; return; }
-    [ -x "$folder/usr/bin/python$PYTHON" ] ||
-        fetch_debian "$(dpkg --print-architecture)" "$folder" "python$PYTHON-minimal" "libpython$PYTHON-minimal" \
-            "libpython$PYTHON-stdlib" libc6 zlib1g libexpat1
-    loader=$(find "$folder" -name 'ld-linux-*.so.*' -not -type l | head -n 1)
+    if [ ! -d "$folder" ]; then
+        mmdebstrap --quiet --mode=chrootless --variant=extract --include="libpython$PYTHON-stdlib,python$PYTHON-minimal" \
+            trixie "$folder.part" "deb $(mirror Debian) trixie main" >&2 ||
+            { echo "Debian's Python $PYTHON did not come. Is mmdebstrap installed, and is there a network?" >&2; return 1; }
+        mv "$folder.part" "$folder"
+    fi
+    loader=$(find "$folder/usr/lib" -name 'ld-linux-*.so.*' -not -type l | head -n 1)
     PYTHONHOME=$folder/usr "$loader" --library-path "$(dirname "$loader")" "$folder/usr/bin/python$PYTHON" "$@"
 }

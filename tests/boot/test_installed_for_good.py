@@ -11,8 +11,8 @@ from tests.boot.box import STAGE, Box, standing
 from tests.boot.disk import DataDisk
 from tests.boot.figures import Figures
 from tests.boot.hall import Hall
-from tests.boot.root import release
 from tests.boot.trial import changed_release
+from tests.deploy.made_package import made_package
 
 RELEASES = "/data/bunraku-releases"
 _STAGE = "appliance/stage/run.py"
@@ -25,11 +25,11 @@ pytestmark = pytest.mark.boot
 
 
 @pytest.fixture(scope="module")
-def on_the_stick(image: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def on_the_stick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Release 9.9.4: one of its units is another one, and its stage can be told to fail."""
     folder = tmp_path_factory.mktemp("stick") / "release"
     unit = "[Service]\nTasksMax=47\n"
-    return changed_release(release(image), folder, "9.9.4", _STAGE, _FAILS_WHEN_TOLD, unit)
+    return changed_release(made_package(), folder, "9.9.4", _STAGE, _FAILS_WHEN_TOLD, unit)
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from tests.boot.disk import DataDisk
 from tests.boot.figures import Figures
 from tests.boot.hall import Hall
 from tests.boot.pauses import lives, longest_pause_s
-from tests.boot.root import release
 from tests.boot.trial import changed_release
+from tests.deploy.made_package import made_package
 
 _CANNOT_DANCE = "raise ImportError('this release cannot dance')\n"
 _CANNOT_START = (
@@ -42,10 +42,10 @@ def touring(
         yield box
 
 
-def _install(box: Box, image: Path, stick: Path, version: str, last_lines: str) -> str:
+def _install(box: Box, stick: Path, version: str, last_lines: str) -> str:
     """Lay this release on the stick, and install it while the box dances; what is said."""
     shutil.rmtree(stick / "release", ignore_errors=True)
-    changed_release(release(image), stick / "release", version, "appliance/stage/run.py", last_lines)
+    changed_release(made_package(), stick / "release", version, "appliance/stage/run.py", last_lines)
     box.hall.audience.forget()
     box.await_frames(50)
     return box.machine.run(
@@ -53,9 +53,9 @@ def _install(box: Box, image: Path, stick: Path, version: str, last_lines: str) 
     )
 
 
-def test_a_release_that_fails_its_preflight_never_dances(image: Path, touring: Box, stick: Path) -> None:
+def test_a_release_that_fails_its_preflight_never_dances(touring: Box, stick: Path) -> None:
     box = touring
-    said = _install(box, image, stick, "9.9.1", _CANNOT_DANCE)
+    said = _install(box, stick, "9.9.1", _CANNOT_DANCE)
     assert "status 1" in said and "this release cannot dance" in said, said
     seen = box.await_frames(50, time.time())
     assert lives(box.hall.audience.frames) == 1 and lives(seen) == 1, "the dance was interrupted"
@@ -64,10 +64,10 @@ def test_a_release_that_fails_its_preflight_never_dances(image: Path, touring: B
 
 
 def test_a_release_that_does_not_start_gives_way_to_the_old_one(
-    image: Path, touring: Box, stick: Path, figures: Figures
+    touring: Box, stick: Path, figures: Figures
 ) -> None:
     box = touring
-    said = _install(box, image, stick, "9.9.2", _CANNOT_START)
+    said = _install(box, stick, "9.9.2", _CANNOT_START)
     assert "status 1" in said and "which dances" in said, said
     assert box.await_frames(50, time.time())
     figures.note("update that does not start: time without frames", longest_pause_s(box.hall.audience.frames))
@@ -75,12 +75,10 @@ def test_a_release_that_does_not_start_gives_way_to_the_old_one(
     assert "9.9.2" not in current, said
 
 
-def test_a_sound_release_takes_over_while_it_dances(
-    image: Path, touring: Box, stick: Path, figures: Figures
-) -> None:
+def test_a_sound_release_takes_over_while_it_dances(touring: Box, stick: Path, figures: Figures) -> None:
     box = touring
     began = time.time()
-    said = _install(box, image, stick, "9.9.3", "")
+    said = _install(box, stick, "9.9.3", "")
     assert "status 0" in said, said
     figures.note("installing a release while it dances", time.time() - began, limit=60.0)
     assert box.await_frames(50, time.time())

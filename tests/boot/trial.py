@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from tests.boot.root import MAKER
+from tests.deploy.made_package import MAKER
 from tests.deploy.small_release import sign
 
 TREE = "opt/bunraku/unpacked"

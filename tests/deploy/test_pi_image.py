@@ -56,7 +56,7 @@ def make_root(folder: Path) -> Path:
 
 def make_image(root: Path, out: Path) -> Path:
     environment = {**os.environ, "SOURCE_DATE_EPOCH": "1700000000"}
-    made = [IMAGE / "mkimage.sh", "--fast", root, out]
+    made = [IMAGE / "mkimage.sh", root, out]
     done = subprocess.run(made, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return out

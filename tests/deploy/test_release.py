@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import ROOT
-from tests.deploy.small_release import make_key
+from tests.deploy.made_package import MAKER, made_package
 
 RELEASE = ROOT / "deploy" / "release"
 LINE = re.compile(r"(?P<name>[A-Za-z0-9_.]+)==(?P<version>[0-9][0-9A-Za-z.]*) --hash=sha256:[0-9a-f]{64}")
@@ -82,15 +82,14 @@ def test_every_script_teaches_its_use(script: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made() -> Path:
     """A package of this working tree; what is in it comes from build/release, or from the network once."""
-    folder = tmp_path_factory.mktemp("made")
-    command = [RELEASE / "make-deb", "--quick", "--out", folder, "--key", make_key(folder / "keys")]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if "Is there a network" in done.stderr:
-        pytest.skip(f"No package can be made here: {done.stderr.strip().splitlines()[-1]}")
-    assert done.returncode == 0, done.stderr
-    return next(folder.glob("*.deb"))
+    try:
+        return made_package()
+    except RuntimeError as error:
+        if "Is there a network" in str(error):
+            pytest.skip(f"No package can be made here: {error}")
+        raise
 
 
 @pytest.fixture(scope="module")
@@ -112,8 +111,8 @@ def test_a_package_is_signed_with_the_key_that_it_names(made: Path, unpacked: Pa
             stdin=package,
             check=True,
         )
-    assert keys.read_text().split()[2:] == (made.parent / "keys/maker.pub").read_text().split()[:2]
-    private = (made.parent / "keys/maker").read_bytes().splitlines()[2]
+    assert keys.read_text().split()[2:] == MAKER.with_suffix(".pub").read_text().split()[:2]
+    private = MAKER.read_bytes().splitlines()[2]
     assert not [path for path in unpacked.rglob("*") if path.is_file() and private in path.read_bytes()]
 
 
