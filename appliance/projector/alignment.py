@@ -47,7 +47,7 @@ class Alignment:
 
     @staticmethod
     def of_box(config: ProjectorConfig) -> Alignment:
-        """What the box file says."""
+        """The box file's values."""
         chosen = Alignment(WHOLE, config.mirror, config.brightness)
         blend = config.edge_blend
         return chosen if blend is None else replace(chosen, overlap=blend.overlap, blend_gamma=blend.gamma)

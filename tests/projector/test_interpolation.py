@@ -148,6 +148,20 @@ def test_the_trail_is_the_last_moments_newest_last() -> None:
         assert world.shape == (2, 4)
 
 
+def test_two_boxes_draw_the_same_moment() -> None:
+    """Whenever each was switched on: cameras, haze and dust move with the dance's own time."""
+    found = []
+    for start in (10.0, 5000.0):
+        poses = following(stage(range(200), start=start), 0.02)
+        for now in start + np.arange(1.0, 3.0, 1 / 60):
+            poses.take(now)
+        moment = poses.moment(start + 2.503)
+        assert moment is not None
+        found.append((moment.time_s, *moment.trail_times))
+    assert found[0] == pytest.approx(found[1], abs=1e-6)
+    assert found[0][0] == pytest.approx(2.503 - WAY_S, abs=1e-6), "one tick behind, 20 ms ahead"
+
+
 def test_a_slower_stage_is_followed_so_slowly_that_it_cannot_be_seen() -> None:
     ring = stage(range(100))
     ring.frames_to_come += stage(range(100, 300), way_s=0.012).frames_to_come
