@@ -124,7 +124,8 @@ class Continuation(Takeover):
         rows = slice(self._head, self._head + self._length)
         flat, places = self._laid.reshape(-1, 4), self._network.places
         np.multiply(self._rows[rows], self._signs, out=self._laid)
-        self._over(flat, window[:, places].reshape(-1, 4), 1.0 - self.share, out=flat)
+        if self.share < 1.0:
+            self._over(flat, window[:, places].reshape(-1, 4), 1.0 - self.share, out=flat)
         self._window[:] = window
         self._window[:, places] = self._laid
         path = self._moved(roots)
@@ -209,7 +210,7 @@ class Continuation(Takeover):
             if seen is not None and self.follow != FREE:
                 score = self._partner.scores(seen, whole)
                 suits += 2 * (self.follow - FREE) * ANSWERING * (score - score.mean()) / (score.std() + 1e-6)
-        ways = np.array([_ends(self._place, move) for move in moves[:, :, -ROOT:]])
+        ways = _ends(self._place, moves[:, :, -ROOT:])
         away = np.linalg.norm(ways - (self._home if self.goal is None else self.goal), axis=-1)
         away = away[:, -1] if self.goal is None else away.mean(axis=1)
         near = ROAM_M if self.goal is None else 0.0
@@ -276,11 +277,12 @@ def _way(step: FloatArray, heading: float) -> Array:
 
 
 def _ends(place: Array, ways: FloatArray) -> Array:
-    """Where each of the steps (T, 4) ends: x, z (T, 2) metres; place: x, z, heading before them."""
-    heading = place[2] + np.cumsum(ways[:, 2].astype(float)) - ways[:, 2]
+    """Where each of the steps (..., T, 4) ends: x, z (..., T, 2) metres; place: x, z, heading before them."""
+    left, ahead, turn, _ = np.moveaxis(ways.astype(float), -1, 0)
+    heading = place[2] + np.cumsum(turn, axis=-1) - turn
     cosine, sine = np.cos(heading), np.sin(heading)
-    moved = np.stack([cosine * ways[:, 0] + sine * ways[:, 1], cosine * ways[:, 1] - sine * ways[:, 0]], 1)
-    ends: Array = place[:2] + np.cumsum(moved, axis=0)
+    moved = np.stack([cosine * left + sine * ahead, cosine * ahead - sine * left], -1)
+    ends: Array = place[:2] + np.cumsum(moved, axis=-2)
     return ends
 
 
