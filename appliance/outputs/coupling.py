@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 
-ROWS = 48  # of a trail: row 0 now, row i ROW_S * i seconds ago
+ROWS = 48  # a trail: row 0 is now, row i was ROW_S * i seconds ago
 ROW_S = 0.025  # 48 of them reach 1.175 s back
 LAGS = 8  # rows by which a limb may follow: 0.2 s
 LIVELY = 0.55  # figure heights a second (root mean square) of a limb that fully takes part
