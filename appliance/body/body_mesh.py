@@ -8,7 +8,7 @@ from appliance.body.rest_pose import anatomy_of
 from appliance.body.sculpture import Sculpture, sculpture
 from appliance.body.skinning import BodyMesh, weights_of
 from appliance.body.surface import Finer, Grid, finer_grid, surface_of
-from appliance.body.volumes import grid_around, sampled
+from appliance.body.volumes import grid_around, sampled, settled
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
@@ -23,7 +23,9 @@ def body_mesh(skeleton: Skeleton) -> BodyMesh:
     groups = (body.trunk, *body.limbs)
     grid = grid_around(groups, SPACING * anatomy.height)
     finer = [_finer(body, grid, box) for box in body.details]
-    vertices, normals, faces = surface_of(sampled(body.trunk, body.limbs, grid), grid, finer)
+    vertices, _, faces = surface_of(sampled(body.trunk, body.limbs, grid), grid, finer)
+    places, slopes = settled(body.trunk, body.limbs, vertices.astype(np.float64), grid.spacing)
+    vertices, normals = places.astype(np.float32), slopes.astype(np.float32)
     movers = [mover for group in groups for mover in group.movers]
     joints, weights = weights_of(vertices, faces, movers, anatomy.part_of)
     return BodyMesh(

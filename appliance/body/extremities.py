@@ -12,11 +12,12 @@ from appliance.pose.quaternion import Array
 
 _UP = np.array([0.0, 1.0, 0.0])
 _LEVEL = np.array([1.0, 0.0, 1.0])
-FINGER = (0.0052, 0.0040)  # radii at knuckle and tip, in heights
-THUMB = (0.0070, 0.0048)
-FAN = 0.10  # how far fingers spread, metres aside for each metre from the knuckle: else they stick together
+FINGER = (0.0061, 0.0045)  # radii at knuckle and tip, in heights
+THUMB = (0.0078, 0.0056)
+CURL = 0.30  # how far the tip of a relaxed finger is on the palm's side, in lengths of the finger
+FAN = 0.08  # how far fingers spread, metres aside for each metre from the knuckle: else they stick together
 THUMB_AWAY = 0.22
-TIP = 0.004  # the skin goes on beyond the last bone, in heights
+TIP = 0.010  # the skin goes on beyond the last bone, in heights
 WEB = 0.16  # share of the finger that the palm's skin covers
 _HAND = 0.105  # length of a hand whose fingers the skeleton lacks, in heights
 _FOOT = 0.125
@@ -35,6 +36,10 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
     aside = np.linalg.svd(knuckles - knuckles.mean(axis=0))[2][0]
     if float((_furthest(anatomy, thumb, wrist) - knuckles.mean(axis=0)) @ aside) < 0.0:
         aside = -aside
+    palm = np.cross(knuckles.mean(axis=0) - wrist, aside)
+    palm = palm / np.linalg.norm(palm)
+    if float((wrist - anatomy.positions[anatomy.trunk[0]]) @ anatomy.across) < 0.0:
+        palm = -palm
     steps: list[Step] = []
     middle = float((knuckles @ aside).mean())
     half = max(0.5 * float(np.ptp(knuckles @ aside)), 1e-6)
@@ -42,7 +47,7 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
     chains: list[tuple[list[tuple[int, Array]], Array]] = []
     for finger, knuckle in zip(fingers, knuckles, strict=True):
         fan = FAN * (float(knuckle @ aside) - middle) / half
-        chain = _fanned(anatomy, finger, knuckle, fan * aside)
+        chain = _relaxed(anatomy, finger, knuckle, fan * aside, CURL * palm)
         chains.append((chain, knuckle))
     steps += _palm(joint, wrist, [knuckle for _, knuckle in chains], aside, height)
     for chain, knuckle in chains:
@@ -51,7 +56,7 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
         steps.append(Slab(joint, knuckle, web, 0.0062 * height, 0.0050 * height, 0.006 * height, aside))
     thumb_at = anatomy.positions[thumb]
     base = wrist + 0.30 * (thumb_at - wrist)
-    chain = _fanned(anatomy, thumb, base, THUMB_AWAY * aside)
+    chain = _relaxed(anatomy, thumb, base, THUMB_AWAY * aside, 0.3 * CURL * palm)
     steps.append(Slab(joint, base, chain[0][1], 0.0125 * height, 0.0100 * height, 0.014 * height, aside))
     steps += _finger(chain, THUMB, height, aside)
     thick = FINGER[0] * height
@@ -68,19 +73,27 @@ def _palm(joint: int, wrist: Array, knuckles: list[Array], aside: Array, height:
     return steps
 
 
-def _fanned(anatomy: Anatomy, finger: int, base: Array, fan: Array) -> list[tuple[int, Array]]:
-    """(joint, where it is) along a finger, then its tip; `fan` (3,): metres aside for each metre."""
-    points: list[tuple[int, Array]] = []
-    for owner, start, end in anatomy.bones([finger, *anatomy.below(finger)]):
-        if not points:
-            points.append((owner, start + fan * float(np.linalg.norm(start - base))))
-        points.append((owner, end + fan * float(np.linalg.norm(end - base))))
-    if not points:
-        points = [(finger, anatomy.positions[finger])] * 2
-    (_, last), (owner, tip) = points[-2:]
+def _relaxed(anatomy: Anatomy, finger: int, base: Array, fan: Array, curl: Array) -> list[tuple[int, Array]]:
+    """(joint, where it is) along a finger with its tip, each bone in two halves.
+
+    fan (3,): metres aside for each metre from `base`; curl (3,): the tip's way to the palm in lengths."""
+    bones = anatomy.bones([finger, *anatomy.below(finger)])
+    if not bones:
+        return [(finger, anatomy.positions[finger])] * 2
+    owner, last, tip = bones[-1]
     way = (tip - last) / max(float(np.linalg.norm(tip - last)), 1e-9)
-    points[-1] = (owner, tip + TIP * anatomy.height * way)
-    return points
+    bones[-1] = owner, last, tip + TIP * anatomy.height * way
+    points = [(bones[0][0], bones[0][1])]
+    for owner, start, end in bones:
+        points += [(owner, 0.5 * (start + end)), (owner, end)]
+    first, whole = points[0][1], max(float(np.linalg.norm(points[-1][1] - points[0][1])), 1e-9)
+
+    def bent(place: Array) -> Array:
+        along = float(np.linalg.norm(place - first))
+        there: Array = place + fan * float(np.linalg.norm(place - base)) + curl * along * along / whole
+        return there
+
+    return [(owner, bent(place)) for owner, place in points]
 
 
 def _finger(
@@ -89,7 +102,7 @@ def _finger(
     """Its bones, each a little thinner."""
     widths = height * np.linspace(*radii, len(chain))
     return [
-        Slab(owner, start, end, float(first), float(last), 0.003 * height, aside)
+        Slab(owner, start, end, float(first), float(last), 0.0, aside)
         for ((_, start), (owner, end)), (first, last) in zip(pairwise(chain), pairwise(widths), strict=True)
     ]
 
@@ -176,7 +189,7 @@ def foot(anatomy: Anatomy, joint: int) -> list[Step]:
     steps: list[Step] = [
         part(ankle, at(-0.016, 0.0, 0.017), (0.0175, 0.0180), 0.010),  # heel
         part(at(-0.014, 0.0, high), at(-0.022, 0.0, 0.022), (0.0090, 0.0140), 0.012),  # tendon
-        part(ankle, at(ball, -0.012, 0.0125), (0.0185, 0.0125), 0.014),  # instep
+        part(ankle, at(ball, -0.011, 0.0125), (0.0185, 0.0125), 0.022),  # instep
         part(
             at(-0.012, 0.004, 0.014), at(ball - 0.006, 0.015, 0.0105), (0.0150, 0.0105), 0.014
         ),  # outer edge
@@ -184,7 +197,7 @@ def foot(anatomy: Anatomy, joint: int) -> list[Step]:
     ]
     for sign, above in ((-1.0, 0.006), (1.0, 0.002)):
         steps.append(
-            Ball(joint, at(0.000, sign * 0.0165, high + above), height * np.array([0.010, 0.011, 0.008]),
+            Ball(joint, at(0.000, sign * 0.0135, high + above), height * np.array([0.011, 0.013, 0.008]),
                  np.array([ahead, _UP, outwards]), 0.008 * height)
         )  # fmt: skip
     reach = (long / height) - ball + 0.016

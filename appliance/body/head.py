@@ -12,20 +12,21 @@ from appliance.pose.quaternion import Array
 
 _UP = np.array([0.0, 1.0, 0.0])
 _REACH = 0.115  # from the head joint to the crown, where the skeleton does not say
-_NECK = 0.0285  # radius
+_NECK = 0.0310  # radius
 
 # Places as (to the front, upwards, to the side) from the middle of the head, radii and softness, in heights.
 Place = tuple[float, float, float]
 _BALLS: tuple[tuple[Place, Place, float], ...] = (
-    ((-0.006, 0.010, 0.0), (0.061, 0.050, 0.0485), 0.0),  # cranium
-    ((-0.036, -0.002, 0.0), (0.033, 0.036, 0.038), 0.020),  # back of the head
+    ((-0.004, 0.010, 0.0), (0.0565, 0.050, 0.0480), 0.0),  # cranium
+    ((-0.030, -0.004, 0.0), (0.0290, 0.036, 0.037), 0.024),  # back of the head
     ((0.026, 0.012, 0.0), (0.029, 0.034, 0.039), 0.020),  # forehead
     ((0.022, -0.026, 0.0), (0.029, 0.036, 0.034), 0.020),  # face
     ((0.036, -0.059, 0.0), (0.0135, 0.0115, 0.013), 0.016),  # chin
 )
 _BALLS_BY_SIDE: tuple[tuple[Place, Place, float], ...] = (
     ((0.033, -0.019, 0.026), (0.013, 0.011, 0.012), 0.014),  # cheekbone
-    ((-0.008, -0.016, 0.0460), (0.0085, 0.0160, 0.0060), 0.006),  # ear
+    ((-0.009, -0.010, 0.0465), (0.0100, 0.0115, 0.0050), 0.006),  # ear
+    ((-0.006, -0.023, 0.0445), (0.0065, 0.0090, 0.0045), 0.006),  # ear lobe
     ((0.020, -0.036, 0.020), (0.018, 0.018, 0.016), 0.024),  # cheek
 )
 _SLABS_BY_SIDE: tuple[tuple[Place, Place, tuple[float, float], float], ...] = (
@@ -97,6 +98,9 @@ def neck(anatomy: Anatomy) -> list[Step]:
     up, _ = _head_axis(anatomy, last)
     into = places[last] + 0.035 * height * up - 0.006 * height * anatomy.forward
     steps.append(Slab(last, places[last], into, radius, 0.9 * radius, soft, anatomy.across))
+    nape = places[last] + height * (0.028 * up - 0.024 * anatomy.forward)
+    behind = places[first] - 0.010 * height * anatomy.forward
+    steps.append(Slab(first, behind, nape, 0.024 * height, 0.017 * height, 0.024 * height, anatomy.across))
     pit = places[first] + (0.040 * anatomy.forward - 0.014 * _UP) * height
     for sign in (1.0, -1.0):
         ear = places[last] + (0.022 * up + sign * 0.031 * anatomy.across - 0.010 * anatomy.forward) * height

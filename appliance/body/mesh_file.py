@@ -26,7 +26,7 @@ from appliance.pose.foreign_file import content, require_inside
 from appliance.pose.skeleton import Skeleton
 
 MESH_FILE = "body.npz"
-MODEL = 2  # another number where sculpture, surface or weights change: files of before are made again
+MODEL = 3  # another number where sculpture, surface or weights change: files of before are made again
 LARGEST_BYTES = 4_000_000
 _LARGEST_UNPACKED = 16_000_000
 _DIGITS = 6  # decimals in the key: a skeleton that was written as text has the same
@@ -57,7 +57,7 @@ def read_mesh(folder: Path, skeleton: Skeleton) -> BodyMesh | None:
         with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
             if str(loaded["key"]) != mesh_key(skeleton):
                 return None
-            return _unpacked({name: loaded[name] for name in loaded.files}, len(skeleton))
+            return unpacked({name: loaded[name] for name in loaded.files}, len(skeleton))
     except _UNREADABLE:
         return None
 
@@ -145,7 +145,7 @@ def _numbers(planes: NDArray[np.uint8]) -> NDArray[np.int32]:
     return joined
 
 
-def _unpacked(arrays: Arrays, joint_count: int) -> BodyMesh | None:
+def unpacked(arrays: Arrays, joint_count: int) -> BodyMesh | None:
     """The surface of these arrays; None if they do not fit. Raises ValueError, LookupError, TypeError."""
     low, high = arrays["vertices"].astype(np.float32)
     vertices = np.ascontiguousarray((arrays["step"] * (low + 256.0 * high)).T + arrays["low"], np.float32)

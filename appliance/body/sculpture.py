@@ -20,11 +20,12 @@ _UP = np.array([0.0, 1.0, 0.0])
 # Along the spine from below the pelvis to the neck (1): half the width as a share of the hips' and of the
 # shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.
 _SPINE = np.array([-0.14, 0.00, 0.12, 0.24, 0.36, 0.50, 0.66, 0.80, 0.91, 1.00])
-_OF_HIPS = np.array([0.20, 0.95, 0.92, 0.70, 0.40, 0.20, 0.00, 0.00, 0.00, 0.00])
+_OF_HIPS = np.array([0.10, 0.90, 0.92, 0.70, 0.40, 0.20, 0.00, 0.00, 0.00, 0.00])
 _OF_SHOULDERS = np.array([0.00, 0.00, 0.00, 0.10, 0.30, 0.50, 0.72, 0.78, 0.60, 0.25])
-_FLESH = np.array([0.030, 0.044, 0.040, 0.036, 0.032, 0.035, 0.036, 0.030, 0.018, 0.014])
-_DEPTH = np.array([0.036, 0.056, 0.056, 0.052, 0.050, 0.056, 0.062, 0.058, 0.042, 0.030])
-_AHEAD = np.array([0.000, -0.002, 0.000, 0.004, 0.008, 0.012, 0.014, 0.010, 0.000, -0.002])
+_FLESH = np.array([0.012, 0.034, 0.037, 0.034, 0.031, 0.034, 0.036, 0.030, 0.018, 0.014])
+_DEPTH = np.array([0.026, 0.053, 0.055, 0.051, 0.048, 0.054, 0.061, 0.058, 0.042, 0.030])
+_AHEAD = np.array([0.000, -0.002, 0.001, 0.007, 0.012, 0.012, 0.010, 0.008, 0.000, -0.002])
+_SMALL = 0.07  # heights: larger parts of a head need no small cells
 _BELOW = 0.05  # heights that the pelvis reaches below its joint
 
 
@@ -48,7 +49,8 @@ def sculpture(anatomy: Anatomy) -> Sculpture:
     face = head(anatomy)
     if face:
         limbs.append(Group((*neck(anatomy), *face), 0.022 * anatomy.height))
-        details.append(_box(face))
+        small = [step for step in face if float(np.ptp(step.box, axis=0).max()) < _SMALL * anatomy.height]
+        details += [_box(small)] if small else []
     body = Group((*_trunk(anatomy), *_back_and_chest(anatomy)), 0.0)
     covered = {solid.owner for group in limbs for solid in group.movers}
     covered |= {
@@ -91,27 +93,23 @@ def _trunk(anatomy: Anatomy) -> list[Step]:
     along = np.linspace(begins[0], begins[-1], pieces + 1)
     axis = np.stack([np.interp(along, begins, [end[i] for end in ends]) for i in range(3)], axis=1)
     shares = along / whole
-    wide = (
-        _at(shares, _OF_HIPS) * hips + _at(shares, _OF_SHOULDERS) * shoulders + _at(shares, _FLESH) * height
+    of_hips, of_shoulders, flesh, depth, ahead = (
+        _curve(shares, _SPINE, table) for table in (_OF_HIPS, _OF_SHOULDERS, _FLESH, _DEPTH, _AHEAD)
     )
-    deep = _at(shares, _DEPTH) * height
-    axis = axis + _at(shares, _AHEAD)[:, None] * height * anatomy.forward
+    wide = of_hips * hips + of_shoulders * shoulders + flesh * height
+    deep = depth * height
+    axis = axis + ahead[:, None] * height * anatomy.forward
     owners = [spine[min(int(np.searchsorted(begins, at, side="right")) - 1, len(spine) - 2)] for at in along]
-    movers = tuple(
-        Slab(owner, low, high, d, d, 0.0, anatomy.across, max(w - d, 0.0), max(w - d, 0.0))
-        for owner, low, high, w, d in zip(owners, axis, axis[1:], wide.tolist(), deep.tolist(), strict=False)
-    )
-    front = np.cross(np.cross(anatomy.across, anatomy.forward), anatomy.across)
-    return [Loft(axis, wide, deep, anatomy.across, front / np.linalg.norm(front), 0.0, movers)]
+    return [_loft(owners, axis, wide, deep, anatomy.across, 0.0)]
 
 
-def _at(along: Array, table: Array) -> Array:
-    """The table's smooth curve (cubic Hermite, Catmull and Rom's slopes) at places along the spine."""
-    slopes = np.gradient(table, _SPINE)
-    right = np.clip(np.searchsorted(_SPINE, along), 1, len(_SPINE) - 1)
+def _curve(along: Array, places: Array, table: Array) -> Array:
+    """A smooth curve (cubic Hermite, Catmull and Rom's slopes) through a table's values at its places."""
+    slopes = np.gradient(table, places)
+    right = np.clip(np.searchsorted(places, along), 1, len(places) - 1)
     left = right - 1
-    step = _SPINE[right] - _SPINE[left]
-    t = np.clip((along - _SPINE[left]) / step, 0.0, 1.0)
+    step = places[right] - places[left]
+    t = np.clip((along - places[left]) / step, 0.0, 1.0)
     low, high = table[left], table[right]
     curve: Array = (
         low * (1 + 2 * t) * (1 - t) ** 2
@@ -196,7 +194,7 @@ def _limb(anatomy: Anatomy, trunk: int, first: int) -> tuple[Group, list[Step]]:
         shape = _muscles_of(anatomy, chain, place, long, is_leg)
         steps += shape
     steps += _root_of_limb(anatomy, trunk, chain[: begin + 1], is_leg)
-    return Group(tuple(steps), (0.048 if is_leg else 0.020) * anatomy.height, tuple(bones)), end
+    return Group(tuple(steps), (0.026 if is_leg else 0.020) * anatomy.height, tuple(bones)), end
 
 
 def _muscles_of(
@@ -207,69 +205,134 @@ def _muscles_of(
     if len(long) == 2 and anatomy.is_person:
         upper = place == long[0]
         table = (_THIGH if upper else _SHANK) if is_leg else (_UPPER_ARM if upper else _FOREARM)
-        return _shaped(anatomy, chain[place], *bone, table, is_leg)
+        return _shaped(anatomy, chain[place], *bone, table, is_leg, 0.004 if upper else 0.012)
     return _bone(anatomy, chain[place], chain[place + 1], is_leg)
 
 
-# Muscles: from (share of the bone, forwards, outwards, radius) to the same, and the softness; in heights.
+# Sections along a bone: share of it, forwards, outwards, half the width, half the depth. Muscles on it: from
+# (share of the bone, forwards, outwards, radius) to the same, and the softness. In heights.
+_Section = tuple[float, float, float, float, float]
 _Point = tuple[float, float, float, float]
 _Muscles = tuple[tuple[_Point, _Point, float], ...]
-_THIGH: _Muscles = (
-    ((0.16, 0.000, -0.003, 0.0440), (0.60, 0.000, 0.000, 0.0380), 0.0),
-    ((0.60, 0.000, 0.000, 0.0380), (0.97, -0.001, 0.000, 0.0300), 0.0),
-    ((0.20, 0.017, 0.006, 0.0330), (0.62, 0.012, 0.004, 0.0290), 0.020),  # the front
-    ((0.30, -0.014, 0.000, 0.0320), (0.85, -0.010, 0.000, 0.0240), 0.020),  # the back
-    ((0.06, -0.004, -0.014, 0.0350), (0.42, 0.000, -0.010, 0.0300), 0.020),  # the inside
-    ((0.76, 0.008, -0.010, 0.0200), (0.90, 0.008, -0.008, 0.0180), 0.012),  # above the knee
-    ((0.98, 0.0145, 0.000, 0.0155), (1.00, 0.0150, 0.000, 0.0155), 0.012),  # kneecap
+
+
+@dataclass(frozen=True)
+class _Flesh:
+    sections: tuple[_Section, ...]
+    muscles: _Muscles
+
+
+_THIGH = _Flesh(
+    (
+        (0.04, -0.002, -0.006, 0.0390, 0.0440),
+        (0.16, 0.001, -0.005, 0.0460, 0.0510),
+        (0.34, 0.004, -0.003, 0.0465, 0.0510),
+        (0.54, 0.004, -0.001, 0.0425, 0.0460),
+        (0.74, 0.003, 0.001, 0.0370, 0.0400),
+        (0.88, 0.002, 0.001, 0.0325, 0.0350),
+        (1.00, 0.002, 0.000, 0.0314, 0.0330),
+    ),
+    (
+        ((0.30, 0.016, 0.010, 0.0330), (0.62, 0.010, 0.012, 0.0260), 0.024),  # the outer front
+        ((0.62, 0.012, -0.013, 0.0220), (0.88, 0.012, -0.012, 0.0170), 0.020),  # drop above the knee
+        ((0.28, -0.022, -0.004, 0.0280), (0.72, -0.018, -0.004, 0.0200), 0.024),  # the back
+        ((0.94, 0.0200, 0.000, 0.0130), (1.02, 0.0215, 0.000, 0.0125), 0.008),  # kneecap
+    ),
 )
-_SHANK: _Muscles = (
-    ((0.00, -0.001, 0.000, 0.0290), (0.30, -0.004, 0.000, 0.0275), 0.0),
-    ((0.30, -0.004, 0.000, 0.0275), (1.00, 0.000, 0.000, 0.0175), 0.0),
-    ((0.06, 0.012, 0.000, 0.0130), (0.85, 0.007, 0.000, 0.0100), 0.012),  # shin
-    ((0.12, -0.014, -0.008, 0.0200), (0.36, -0.015, -0.007, 0.0220), 0.012),  # calf
-    ((0.10, -0.013, 0.009, 0.0190), (0.32, -0.014, 0.008, 0.0200), 0.012),
-    ((0.36, -0.015, -0.005, 0.0200), (0.66, -0.010, 0.000, 0.0120), 0.014),
-    ((0.60, -0.011, 0.000, 0.0110), (1.00, -0.011, 0.000, 0.0080), 0.012),  # tendon
+_SHANK = _Flesh(
+    (
+        (0.00, 0.002, 0.000, 0.0314, 0.0330),
+        (0.08, 0.000, 0.000, 0.0308, 0.0318),
+        (0.20, -0.003, 0.001, 0.0326, 0.0328),
+        (0.32, -0.006, 0.001, 0.0338, 0.0345),
+        (0.48, -0.004, 0.000, 0.0298, 0.0300),
+        (0.66, -0.002, 0.000, 0.0228, 0.0245),
+        (0.82, -0.003, 0.000, 0.0182, 0.0215),
+        (0.93, -0.003, 0.000, 0.0170, 0.0210),
+        (1.00, -0.002, 0.000, 0.0180, 0.0205),
+    ),
+    (
+        ((0.22, -0.018, -0.012, 0.0170), (0.42, -0.018, -0.010, 0.0150), 0.020),  # calf
+        ((0.20, -0.017, 0.011, 0.0165), (0.35, -0.018, 0.011, 0.0150), 0.020),
+        ((0.10, 0.017, -0.003, 0.0120), (0.66, 0.011, -0.002, 0.0080), 0.016),  # shin
+        ((0.70, -0.015, 0.000, 0.0085), (1.00, -0.017, 0.000, 0.0080), 0.016),  # tendon
+    ),
 )
-_UPPER_ARM: _Muscles = (
-    ((0.00, 0.000, 0.000, 0.0265), (0.45, 0.000, 0.000, 0.0240), 0.0),
-    ((0.45, 0.000, 0.000, 0.0240), (1.00, 0.000, 0.000, 0.0205), 0.0),
-    ((0.02, 0.000, 0.005, 0.0275), (0.40, 0.000, 0.007, 0.0180), 0.016),  # shoulder muscle
-    ((0.32, 0.009, 0.000, 0.0170), (0.72, 0.008, 0.000, 0.0165), 0.014),  # biceps
-    ((0.24, -0.010, 0.000, 0.0180), (0.66, -0.008, 0.000, 0.0165), 0.014),  # triceps
-    ((0.97, -0.008, 0.000, 0.0145), (1.01, -0.008, 0.000, 0.0140), 0.008),  # elbow
+_UPPER_ARM = _Flesh(
+    (
+        (0.00, 0.000, 0.000, 0.0245, 0.0250),
+        (0.18, 0.000, 0.001, 0.0260, 0.0270),
+        (0.40, 0.001, 0.000, 0.0240, 0.0270),
+        (0.62, 0.001, 0.000, 0.0220, 0.0265),
+        (0.84, 0.000, 0.000, 0.0210, 0.0220),
+        (1.00, 0.000, 0.000, 0.0220, 0.0195),
+    ),
+    (
+        ((0.05, 0.000, 0.006, 0.0250), (0.36, 0.000, 0.006, 0.0160), 0.014),  # shoulder muscle
+        ((0.38, 0.011, 0.000, 0.0160), (0.66, 0.010, 0.000, 0.0160), 0.020),  # biceps
+        ((0.26, -0.012, 0.002, 0.0170), (0.56, -0.011, 0.001, 0.0150), 0.020),  # triceps
+        ((0.97, -0.010, 0.000, 0.0120), (1.01, -0.010, 0.000, 0.0115), 0.012),  # elbow
+    ),
 )
-_FOREARM: _Muscles = (
-    ((0.00, 0.000, 0.000, 0.0205), (0.26, 0.001, 0.000, 0.0225), 0.0),
-    ((0.26, 0.001, 0.000, 0.0225), (0.98, 0.000, 0.000, 0.0130), 0.0),
-    ((0.05, 0.007, 0.007, 0.0150), (0.34, 0.005, 0.004, 0.0150), 0.012),
-    ((0.08, 0.003, -0.008, 0.0140), (0.36, 0.003, -0.005, 0.0140), 0.012),
-    ((0.80, 0.006, 0.000, 0.0110), (1.00, 0.0075, 0.000, 0.0105), 0.010),  # flat at the wrist
-    ((0.80, -0.006, 0.000, 0.0110), (1.00, -0.0075, 0.000, 0.0105), 0.010),
+_FOREARM = _Flesh(
+    (
+        (0.00, 0.000, 0.000, 0.0220, 0.0195),
+        (0.12, 0.002, 0.000, 0.0240, 0.0225),
+        (0.26, 0.003, 0.000, 0.0240, 0.0240),
+        (0.48, 0.002, 0.000, 0.0205, 0.0215),
+        (0.70, 0.001, 0.000, 0.0160, 0.0180),
+        (0.88, 0.000, 0.000, 0.0132, 0.0172),
+        (1.00, 0.000, 0.000, 0.0130, 0.0178),
+    ),
+    (
+        ((0.04, 0.009, 0.008, 0.0130), (0.38, 0.009, 0.004, 0.0120), 0.018),
+        ((0.10, 0.003, -0.010, 0.0130), (0.40, 0.003, -0.007, 0.0120), 0.018),
+    ),
 )
 
 
 def _shaped(
-    anatomy: Anatomy, owner: int, start: Array, end: Array, muscles: _Muscles, is_leg: bool
+    anatomy: Anatomy, owner: int, start: Array, end: Array, flesh: _Flesh, is_leg: bool, softness: float
 ) -> list[Step]:
-    """Muscles along a bone. Forwards: the figure's front; outwards: away from the body's middle, of an arm
-    that is held to the side upwards."""
+    """Flesh along a bone, melted into what is beyond it by `softness` heights.
+
+    Forwards: the figure's front; outwards: away from the body's middle, of an arm that is held to the side
+    upwards."""
     height = anatomy.height
     bone = end - start
     front = anatomy.forward - bone * float(anatomy.forward @ bone) / max(float(bone @ bone), 1e-12)
     if float(np.linalg.norm(front)) < 0.2:
-        return [cone(anatomy, owner, start, end, (muscles[0][0][3] * height, muscles[1][1][3] * height), 0.0)]
+        ends = flesh.sections[0][3] * height, flesh.sections[-1][3] * height
+        return [cone(anatomy, owner, start, end, ends, 0.0)]
     front = front / np.linalg.norm(front)
     side = np.cross(front, bone / np.linalg.norm(bone))
     away = start - anatomy.positions[anatomy.trunk[0]]
     outside = anatomy.across * float(away @ anatomy.across) if is_leg else _UP + 0.2 * away
     side = side if float(side @ outside) >= 0.0 else -side
-    steps: list[Step] = []
-    for low, high, softness in muscles:
+    table = np.array(flesh.sections)
+    shares = np.linspace(table[0, 0], table[-1, 0], 24)
+    ahead, out, wide, deep = (
+        height * _curve(shares, table[:, 0], table[:, column]) for column in (1, 2, 3, 4)
+    )
+    axis = start + shares[:, None] * bone + ahead[:, None] * front + out[:, None] * side
+    steps: list[Step] = [_loft([owner] * len(axis), axis, wide, deep, side, softness * height)]
+    for low, high, soft in flesh.muscles:
         a, b = (start + p[0] * bone + height * (p[1] * front + p[2] * side) for p in (low, high))
-        steps.append(cone(anatomy, owner, a, b, (low[3] * height, high[3] * height), softness))
+        steps.append(cone(anatomy, owner, a, b, (low[3] * height, high[3] * height), soft))
     return steps
+
+
+def _loft(
+    owners: Sequence[int], axis: Array, wide: Array, deep: Array, across: Array, softness: float
+) -> Loft:
+    """Sections with a volume for each piece that says what moves it; owners: the joint of each section."""
+    movers = tuple(
+        Slab(owner, low, high, thin, thin, 0.0, across, half, half)
+        for owner, low, high, thin, half in zip(
+            owners, axis, axis[1:], np.minimum(wide, deep), np.maximum(wide - deep, 0.0), strict=False
+        )
+    )
+    return Loft(axis, wide, deep, across, softness, movers)
 
 
 def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Step]:
@@ -293,24 +356,27 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
     start, ahead = places[chain[-1]], anatomy.forward
     away = float((start - places[trunk]) @ anatomy.across)
     out = anatomy.across * (1.0 if away >= 0 else -1.0)
-    if is_leg:
-        axes, soft = np.array([out, _UP, ahead]), 0.028 * height
-        seat = start + height * (-0.028 * ahead - 0.012 * out - 0.022 * _UP)
-        hip = start + height * (0.003 * out - 0.030 * _UP)
-        return [
-            Ball(trunk, seat, height * np.array([0.044, 0.050, 0.040]), axes, soft),
-            Ball(chain[-1], hip, height * np.array([0.036, 0.056, 0.044]), axes, soft),
-        ]
     owner = chain[-2] if len(chain) > 1 else trunk
+    if is_leg:
+        axes, soft = np.array([out, _UP, ahead]), 0.030 * height
+        seat = start + height * (-0.030 * ahead - 0.010 * out - 0.024 * _UP)
+        hip = start + height * (-0.012 * out - 0.010 * _UP - 0.006 * ahead)
+        groin = start - 0.75 * abs(away) * out - height * (0.052 * _UP - 0.010 * ahead)
+        inside = start - height * (0.150 * _UP + 0.016 * out)
+        return [
+            Ball(trunk, seat, height * np.array([0.042, 0.048, 0.040]), axes, soft),
+            Ball(owner, hip, height * np.array([0.042, 0.052, 0.036]), axes, soft),
+            cone(anatomy, chain[-1], groin, inside, (0.016 * height, 0.026 * height), 0.03),
+        ]
     thick = 0.0290 * height
     inner = start - 0.85 * abs(away) * out
     notch = inner + height * (0.040 * ahead + 0.002 * _UP)
     top = start + height * (0.020 * _UP + 0.012 * ahead - 0.012 * out)
     nape = start - abs(away) * out + height * (0.046 * _UP - 0.004 * ahead)
-    flank = start - 0.10 * height * _UP - 0.25 * abs(away) * out - 0.020 * height * ahead
+    flank = start - height * (0.150 * _UP - 0.014 * ahead) - 0.30 * abs(away) * out
     breast = start - 0.55 * abs(away) * out + height * (0.034 * ahead - 0.036 * _UP)
-    blade = start - 0.45 * abs(away) * out - height * (0.026 * ahead + 0.012 * _UP)
-    tip = blade + height * (0.006 * out - 0.062 * _UP - 0.012 * ahead)
+    blade = start - 0.45 * abs(away) * out - height * (0.022 * ahead + 0.012 * _UP)
+    tip = blade + height * (0.004 * out - 0.060 * _UP - 0.004 * ahead)
     across = anatomy.across
     return [
         Slab(owner, inner, start, 0.026 * height, thick, 0.012 * height, across),
@@ -320,9 +386,15 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
         Slab(owner, notch, top, 0.0090 * height, 0.0100 * height, 0.007 * height, across),  # collarbone
         Slab(trunk, breast, start, 0.024 * height, 0.022 * height, 0.020 * height, across),  # chest muscle
         Slab(
-            trunk, flank, start, 0.022 * height, 0.020 * height, 0.020 * height, across
+            trunk,
+            flank,
+            start - 0.010 * height * ahead,
+            0.004 * height,
+            0.022 * height,
+            0.040 * height,
+            across,
         ),  # broad back muscle
-        Slab(owner, blade, tip, 0.016 * height, 0.010 * height, 0.028 * height, across, 0.020 * height, 0.0),
+        Slab(owner, blade, tip, 0.015 * height, 0.009 * height, 0.034 * height, across, 0.020 * height, 0.0),
         Slab(
             owner, blade + 0.012 * height * _UP, start, 0.013 * height, 0.014 * height, 0.018 * height, across
         ),
@@ -366,7 +438,10 @@ def _twigs(anatomy: Anatomy, covered: set[int]) -> list[Group]:
 
 
 def _extremity(anatomy: Anatomy, chain: Sequence[int]) -> int:
-    """The place in a limb's chain of its hand or foot: behind its last long bone."""
+    """The place in a limb's chain of its hand or foot: what is named so, else behind its last long bone."""
+    feet = [place for place, joint in enumerate(chain) if place and joint in anatomy.skeleton.feet]
+    if feet:
+        return feet[0]
     long = [p for p in range(1, len(chain)) if anatomy.length(chain[p]) > LONG_BONE * anatomy.height]
     return long[-1] if long else len(chain) - 1
 

@@ -121,15 +121,16 @@ class Cut:
 
 @dataclass(frozen=True)
 class Loft:
-    """Elliptical sections along a polyline `axis` (N, 3), rounded at its ends; `wide` (N,), `deep` (N,): half
-    the width towards `across` and half the depth towards `front`, metres; movers: which joints move it.
+    """Elliptical sections across the straight line between the ends of `axis` (N, 3), rounded at its ends.
+
+    wide (N,), deep (N,): half the width towards `across` and half the depth at a right angle to it, metres;
+    movers: which joints move it.
     """
 
     axis: Array
     wide: Array
     deep: Array
     across: Array
-    front: Array
     softness: float
     movers: tuple[Slab, ...]
     removes: bool = False
@@ -142,28 +143,21 @@ class Loft:
 
     def distance(self, x: Array, y: Array, z: Array) -> Array:
         """Metres from its surface, negative inside, of points as a slab takes them."""
-        nearest = np.full(np.broadcast_shapes(x.shape, y.shape, z.shape), np.inf, np.float32)
-        off = [np.zeros_like(nearest) for _ in range(5)]
-        for number in range(len(self.axis) - 1):
-            start, bone = self.axis[number], self.axis[number + 1] - self.axis[number]
-            length2 = max(float(bone @ bone), 1e-12)
-            dx, dy, dz = (
-                (value - np.float32(at)).astype(np.float32)
-                for value, at in zip((x, y, z), start, strict=True)
-            )
-            part = np.clip(_dot(dx, dy, dz, bone) / np.float32(length2), 0.0, 1.0)
-            dx, dy, dz = (d - part * np.float32(b) for d, b in zip((dx, dy, dz), bone, strict=True))
-            squared = dx * dx + dy * dy + dz * dz
-            closer = squared < nearest
-            nearest = np.where(closer, squared, nearest)
-            wide, deep = (
-                np.float32(table[number]) + np.float32(table[number + 1] - table[number]) * part
-                for table in (self.wide, self.deep)
-            )
-            upwards = np.cross(self.across, self.front)
-            new = (*(_dot(dx, dy, dz, way) for way in (self.across, self.front, upwards)), wide, deep)
-            off = [np.where(closer, now, before) for now, before in zip(new, off, strict=True)]
-        aside, ahead, beyond, wide, deep = off
+        line = self.axis[-1] - self.axis[0]
+        line = line / max(float(np.linalg.norm(line)), 1e-9)
+        side = perpendicular(self.across, line)
+        ways = line, side, np.cross(line, side)
+        places = np.maximum.accumulate((self.axis - self.axis[0]) @ line)
+        dx, dy, dz = (
+            (value - np.float32(at)).astype(np.float32)
+            for value, at in zip((x, y, z), self.axis[0], strict=True)
+        )
+        up, aside, ahead = (_dot(dx, dy, dz, way) for way in ways)
+        centres = ((self.axis - self.axis[0]) @ way for way in ways[1:])
+        middle, before, wide, deep = (
+            np.interp(up, places, table).astype(np.float32) for table in (*centres, self.wide, self.deep)
+        )
+        aside, ahead, beyond = aside - middle, ahead - before, up - np.clip(up, 0.0, np.float32(places[-1]))
         first = np.sqrt((aside / wide) ** 2 + (ahead / deep) ** 2 + (beyond / deep) ** 2)
         steep = np.sqrt((aside / wide**2) ** 2 + (ahead / deep**2) ** 2 + (beyond / deep**2) ** 2)
         away: Array = first * (first - np.float32(1.0)) / np.maximum(steep, np.float32(1e-6))
@@ -232,6 +226,49 @@ def smooth_minimum(a: Array, b: Array, softness: float) -> Array:
     near = np.maximum(np.float32(softness) - np.abs(a - b), 0.0)
     joined: Array = np.minimum(a, b) - near * near * np.float32(0.25 / softness)
     return joined
+
+
+def settled(trunk: Group, limbs: Sequence[Group], points: Array, spacing: float) -> tuple[Array, Array]:
+    """Points (V, 3) near the surface moved onto it, by a quarter of the `spacing` at most, and the surface's
+    normals there (V, 3): fingers get round that cells almost as wide as they leave knobbly."""
+    start, step = points, 0.7 * spacing
+    ways = step * np.concatenate([np.eye(3), -np.eye(3)])
+    while True:
+        sides = _field_at(trunk, limbs, (points + ways[:, None]).reshape(-1, 3), spacing).reshape(6, -1)
+        slope = ((sides[:3] - sides[3:]) / (2 * step)).T
+        steep = np.linalg.norm(slope, axis=1, keepdims=True)
+        if points is not start:
+            return points, slope / np.maximum(steep, 1e-9)
+        away = _field_at(trunk, limbs, points, spacing)[:, None] / np.maximum(steep, 0.5)
+        points = start - np.clip(away, -0.25 * spacing, 0.25 * spacing) * slope / np.maximum(steep, 1e-9)
+
+
+def _field_at(trunk: Group, limbs: Sequence[Group], points: Array, spacing: float) -> Array:
+    """The field that `sampled` samples, at points (V, 3)."""
+    body = _group_at(trunk, points, spacing)
+    total = body.copy()
+    for limb in limbs:
+        near = _near([solid.box for solid in limb.solids], points, max(MARGIN * spacing, limb.softness))
+        alone = _group_at(limb, points[near], spacing)
+        total[near] = np.minimum(total[near], smooth_minimum(body[near], alone, limb.softness))
+    return total
+
+
+def _group_at(group: Group, points: Array, spacing: float) -> Array:
+    field = np.full(len(points), FAR * spacing)
+    for part in group.steps:
+        near = _near([part.box], points, max(MARGIN * spacing, part.softness))
+        sign = -1.0 if part.removes else 1.0
+        new = part.distance(*points[near].T)
+        field[near] = sign * smooth_minimum(sign * field[near], new, part.softness)
+    return field
+
+
+def _near(boxes: Sequence[tuple[Array, Array]], points: Array, around: float) -> NDArray[np.bool_]:
+    low = np.min([box[0] for box in boxes], axis=0) - around
+    high = np.max([box[1] for box in boxes], axis=0) + around
+    inside: NDArray[np.bool_] = ((points >= low) & (points <= high)).all(axis=1)
+    return inside
 
 
 def perpendicular(side: Array, direction: Array) -> Array:

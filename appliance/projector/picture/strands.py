@@ -15,7 +15,7 @@ STEP = 0.02  # figure heights from one point of a strand to the next
 POINTS = 28  # steps of a strand
 OFF = 0.018  # figure heights from the nearest vertex: a strand that is further off has run past a tip
 TAPER = 7  # steps in which a strand ends
-SPACING = 0.045  # figure heights between where strands start
+SPACING = 0.048  # figure heights between where strands start
 TURN = 0.35  # how far a strand turns around its limb, per length that it runs along it
 
 Floats = NDArray[np.float32]
