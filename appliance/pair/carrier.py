@@ -6,7 +6,7 @@ import ipaddress
 import os
 import socket
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from appliance.show.box import OutputsConfig
@@ -14,6 +14,7 @@ from appliance.show.box import OutputsConfig
 _ROUTES, _CARDS = Path("/proc/net/route"), Path("/sys/class/net")
 _SETTLE_S = 0.08  # a box hears the other one within that time
 _FORWARDS_S = 32.0  # IEEE 802.1D: a switch may pass nothing on for two times 15 s after a cable came in
+_ON_THE_WAY_S = 0.02  # what came by a cable was sent before it was out
 _FIND_EACH_S = 0.25
 
 
@@ -44,6 +45,11 @@ class Carrier:
         if was_out is not self.is_out:
             self._changed_at = now
 
+    def is_apart(self, peers: Sequence[str]) -> bool:
+        """Whether datagrams to these addresses leave by other cards than those to the receivers."""
+        outputs = cards_to(self._receivers, self._routes)
+        return bool(outputs) and not {*outputs} & {*cards_to(peers, self._routes)}
+
     def may_speak(self, now: float, heard: float) -> bool:
         """A leader whose cable came back is silent until it has heard the other box: that may lead by now.
 
@@ -53,7 +59,7 @@ class Carrier:
 
     def is_heard_nonetheless(self, heard: float) -> bool:
         """Whether another link still joins the two boxes while the receivers' cable is out."""
-        return self.is_out and heard > self._changed_at + _SETTLE_S
+        return self.is_out and heard > self._changed_at + _ON_THE_WAY_S
 
     def knows_silence(self, now: float, heard: float) -> bool:
         """Whether a follower that hears nothing knows by it that the leader is gone."""

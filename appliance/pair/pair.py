@@ -8,13 +8,22 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from appliance.pair import wire
 from appliance.pair.clock_offset import ClockOffset
 from appliance.pair.roles import Heard, Role, Roles
-from appliance.pair.stream import Incoming, Outgoing, Parts, body_of, numbers_in, part_in, parts_of
+from appliance.pair.stream import (
+    Incoming,
+    Outgoing,
+    Parts,
+    body_of,
+    count_of,
+    numbers_in,
+    part_in,
+    parts_of,
+)
 from appliance.pair.wire import Codec
 
 _AT_ONCE = 256  # datagrams in one look
@@ -59,7 +68,8 @@ class Pair:
         self.trouble = ""  # why nothing can be heard or sent
         self._fingerprint = fingerprint
         self._codec = Codec(settings.key, fingerprint)
-        self._peers = [(peer, settings.port) for peer in settings.peers]
+        # One for each link: datagrams that wait for a dead one's address fill their socket's buffer.
+        self._links = [(_udp_socket(), (peer, settings.port)) for peer in settings.peers]
         self._socket: socket.socket | None = None
         self._poll = select.poll()
         self._open_at = float("-inf")
@@ -80,9 +90,9 @@ class Pair:
         return self.roles.leads
 
     @property
-    def counts(self) -> dict[str, int]:
-        """Datagrams by fate."""
-        return self._codec.counts
+    def has_other_secret(self) -> bool:
+        """Whether all datagrams that came were signed with another secret."""
+        return not self._codec.others and self._codec.counts["tag"] > 0
 
     @property
     def behind(self) -> int:
@@ -131,7 +141,7 @@ class Pair:
         """The leader: the state after the newest message, for the other box."""
         self.wants_keyframe = False
         self._keyframe = self._outgoing.number, keyframe
-        self._keyframe_parts = deque(range(len([*parts_of(0, keyframe)])))
+        self._keyframe_parts = deque(range(count_of(keyframe)))
 
     def forget_state(self) -> None:
         """The follower: what it knows is of no use; the leader is asked for a keyframe."""
@@ -189,13 +199,15 @@ class Pair:
 
     def close(self) -> None:
         """Free the port."""
+        for link, _ in self._links:
+            link.close()
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
     def _open(self, now: float) -> None:
         self._open_at = now + _TRY_AGAIN_S
-        made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+        made = _udp_socket()
         try:
             made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
             made.bind((self.settings.host, self.settings.port))
@@ -272,15 +284,13 @@ class Pair:
 
     def _send(self, kind: int, now: float, body: bytes = b"", to: int = 0) -> None:
         if self._socket is None:
-            return
+            return  # it could not take over: it hears nothing
         heard = Heard(self.roles.role, self.roles.epoch, self.is_ready and self.same_show)
         data = self._codec.pack(kind, heard, now, body, to)
-        for peer in self._peers:
+        for link, peer in self._links:
             with contextlib.suppress(OSError):  # no network there at this moment
-                self._socket.sendto(data, peer)
+                link.sendto(data, peer)
 
 
-def settings_line(settings: PairSettings, others: Iterable[str] = ()) -> str:
-    """For people: who this box is in the pair."""
-    which = "first" if settings.is_first else "second"
-    return f"This box is the {which} of a pair; the other one is at {' and '.join(others or settings.peers)}."
+def _udp_socket() -> socket.socket:
+    return socket.socket(socket.AF_INET, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)

@@ -14,25 +14,27 @@ from appliance.levers.show_state import ShowState, packed, unpacked
 
 FILE, KIND = "pair", "pair"
 STATE_FILE = "pair_state"
-_PART = struct.Struct("<BBBId")  # leads, is ready, peer lives; epoch; when it was written
+_PART = struct.Struct("<BBBBId")  # leads, speaks, is ready, peer lives; epoch; when it was written
 _LARGEST_STATE = 16384
 STALE_S = 0.07  # a stage whose last entry is older sends nothing
 
 
 class BoxPart(NamedTuple):
-    """leads: this box's stage speaks. is_ready: it could take over. peer_lives: the other box was there when
-    this was written, in monotonic seconds.
+    """leads: the other box follows this one. speaks: receivers get its frames; not while its cable is out.
+    is_ready: it could take over. peer_lives: the other box was there when this was written, in monotonic
+    seconds.
     """
 
     leads: bool
+    speaks: bool
     is_ready: bool
     peer_lives: bool
     epoch: int
     written: float
 
     def may_speak(self, now: float) -> bool:
-        """Whether lights may send: the stage leads. One that died has handed over if the other box lives."""
-        return self.leads and (now - self.written < STALE_S or not self.peer_lives)
+        """Whether lights may send: the stage speaks. One that died has handed over if the other box lives."""
+        return self.speaks and (now - self.written < STALE_S or not self.peer_lives)
 
 
 class PartWriter:
@@ -68,8 +70,8 @@ class PartReader:
         """None: no stage of a pair has written here."""
         if (found := self._part.read()) is None or len(found) != _PART.size:
             return None
-        leads, is_ready, peer_lives, epoch, written = _PART.unpack(found)
-        return BoxPart(bool(leads), bool(is_ready), bool(peer_lives), epoch, written)
+        leads, speaks, is_ready, peer_lives, epoch, written = _PART.unpack(found)
+        return BoxPart(bool(leads), bool(speaks), bool(is_ready), bool(peer_lives), epoch, written)
 
     def state(self) -> ShowState | None:
         """The leader's show state, the same object until it changes."""

@@ -16,9 +16,14 @@ ASK_AGAIN_S = 0.015
 _MOST_ASKED = 64
 
 
+def count_of(message: bytes) -> int:
+    """How many bodies a message has."""
+    return max(1, -(-len(message) // MOST_PART))
+
+
 def parts_of(number: int, message: bytes, wanted: Iterable[int] | None = None) -> Iterator[bytes]:
     """A message as bodies of datagrams: all of them, or those of these places."""
-    parts = max(1, -(-len(message) // MOST_PART))
+    parts = count_of(message)
     for part in range(parts) if wanted is None else wanted:
         if part < parts:
             yield _PART.pack(number, part, parts) + message[part * MOST_PART : (part + 1) * MOST_PART]

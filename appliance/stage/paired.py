@@ -122,8 +122,7 @@ class PairedStage:
         self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
         self._role = self.pair.roles.role
         self._led_until = self._took_over_at = self._call_at = float("-inf")
-        self._has_begun = False
-        self._looked_at = self._beat_at = self._work_s = 0.0
+        self._looked_at = self._beat_at = 0.0
         self.resyncs = 0
         self._hear_leader()
 
@@ -165,6 +164,16 @@ class PairedStage:
             self.pair.publish(b"".join(self._items), now)
             self._items.clear()
 
+    def begin(self, now: float) -> None:
+        """The box is ready to hear the other one."""
+        self.pair.roles.begin(now)
+        name, peers = self._settings.name, self._settings.peers
+        if self._carrier.is_apart(peers):
+            self._say(
+                f"{name.capitalize()} ({' and '.join(peers)}) is in no network of the outputs: if the link "
+                "fails, both send. Give its address in the outputs' network as the first `peer:`."
+            )
+
     def may_dance(self, now: float) -> bool:
         """The leader, before a tick: whether it still leads."""
         self._look(now)
@@ -177,9 +186,6 @@ class PairedStage:
         """
         self.pair.await_datagram(0.004 if self.pair.is_ready else 0.01)
         now = clock.now()
-        if not self._has_begun:
-            self._has_begun = True
-            self.pair.roles.begin(now)
         self._look(now)
         if self.pair.leads:
             for message in self.pair.take_rest():
@@ -241,6 +247,10 @@ class PairedStage:
         name, roles = self._settings.name, self.pair.roles
         if self.pair.trouble:
             return f"The pair's port cannot be opened ({self.pair.trouble}): no box takes over. Free it."
+        if self.pair.has_other_secret:
+            return (
+                f"{name.capitalize()} of the pair has another secret: it cannot follow. Copy the file to it."
+            )
         if not roles.peer_lives(now):
             return (
                 f"{name.capitalize()} of the pair is not heard: the show goes on, and nobody would take "
@@ -303,8 +313,9 @@ class PairedStage:
 
     def _write_part(self, now: float) -> None:
         roles = self.pair.roles
-        part = BoxPart(roles.leads, self.pair.is_ready, roles.peer_lives(now), roles.epoch, now)
-        self._part.write(part)
+        speaks = roles.leads and self._carrier.may_speak(now, roles.heard)
+        flags = roles.leads, speaks, self.pair.is_ready, roles.peer_lives(now)
+        self._part.write(BoxPart(*flags, roles.epoch, now))
 
     def _hear_leader(self) -> None:
         parts = self._parts

@@ -161,6 +161,8 @@ class Stage:
         if self.show.config.dancer.seed is None:
             self._say_and_note(f"The answer's noise has the seed {self.parts.liveliness.seed}.")
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
+        if self.paired is not None:
+            self.paired.begin(clock.now())
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             if self.paired is not None and not self._may_dance(clock):
                 continue

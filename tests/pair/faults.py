@@ -26,7 +26,7 @@ import numpy as np
 
 from appliance.sensor.keys import create_keys
 from tests.bundles import write_show
-from tests.pair.hall import FIRST, SECOND, Hall, HallRadio
+from tests.pair.hall import FIRST, SECOND, Hall, HallRadio, other
 from tests.system.lit import RIG
 from tests.system.processes import wait_until
 from tests.system.wearables import Wearables
@@ -45,10 +45,6 @@ LIMITS = {
     "flaps": 0,
 }
 Undo = Callable[[], None]
-
-
-def other(address: str) -> str:
-    return SECOND if address == FIRST else FIRST
 
 
 def kill_stage(hall: Hall, leader: str) -> Undo:

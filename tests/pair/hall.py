@@ -23,19 +23,24 @@ import yaml
 from appliance.pair.part import BoxPart, PartReader
 from appliance.sensor import wire
 from hw_sim import osc_receiver
-from tests.system.namespace import Namespace
+from tests.system.namespace import Cable, Namespace
 from tests.system.processes import BUNRAKU, Process, children, has_argument, run, wait_until
 
 _PSN_FRAME = 18  # after two heads of chunks, the time and the version (PosiStageNet 2.03, section 3.2)
 HALL, FIRST, SECOND = "10.77.0.9", "10.77.0.1", "10.77.0.2"
 PAIR_PORT, OSC_PORT, CONTROL_PORT, SENSORS_PORT = 9760, 9004, 9002, 9750
 KEY = "00112233445566778899aabbccddeeff"
+DIRECT = {FIRST: "10.78.0.1", SECOND: "10.78.0.2"}
 AHEAD_S = {FIRST: 3000.0, SECOND: 0.0}  # their monotonic clocks: the first one was switched on earlier
 _KIND = 3  # where a packet of a wearable has its kind
 _HELLO, _ASSIGNMENT, _CALL = (
     next(kind for kind, layout in wire.LAYOUTS.items() if layout.name == name)
     for name in ("Hello", "Assignment", "Call")
 )
+
+
+def other(address: str) -> str:
+    return SECOND if address == FIRST else FIRST
 
 
 def _ip(*words: str) -> None:
@@ -308,11 +313,20 @@ class Hall:
     """A context: two boxes on one switch. first, second: None until they are switched on."""
 
     def __init__(
-        self, folder: Path, show: Path, *, relayed: bool = True, paired: bool = True, **more: Any
+        self,
+        folder: Path,
+        show: Path,
+        *,
+        relayed: bool = True,
+        paired: bool = True,
+        direct: bool = False,
+        **more: Any,
     ) -> None:
-        """more: of the box file. Without `paired` the boxes know nothing of each other."""
+        """more: of the box file. direct: a cable between the boxes beside the switch. Without `paired` the
+        boxes know nothing of each other.
+        """
         self.folder, self.show, self._relayed, self._more = folder, show, relayed, more
-        self._paired = paired
+        self._paired, self._direct = paired, direct
         self._opened = ExitStack()
         self.boxes: dict[str, PairedBox] = {}
 
@@ -349,6 +363,9 @@ class Hall:
             _ip("-n", network.name, "link", "set", "eth0", "up")
             _ip("-n", network.name, "route", "add", "default", "via", HALL)
             self.ends[address] = end
+        if self._direct:
+            one, two = self.networks.values()
+            self.pull_direct = Cable(one, f"{DIRECT[FIRST]}/24", two, f"{DIRECT[SECOND]}/24").pull_out
         self.relay = Relay(self.hall)
         opened.callback(self.relay.close)
         self.seen = Seen(self.hall)
@@ -382,7 +399,7 @@ class Hall:
             "realtime": {"priority": 75},  # above a box of another test
             "pair": {
                 "role": "first" if is_first else "second",
-                "peer": [peer],
+                "peer": [peer, *([DIRECT[other(address)]] if self._direct else ())],
                 "host": "0.0.0.0",
                 "port": PAIR_PORT,
                 "secret": "pair.key",

@@ -88,3 +88,9 @@ def test_a_box_without_a_network_is_never_out(tmp_path: Path) -> None:
     unknown = Carrier(["10.77.0.9"], tmp_path / "none", tmp_path)
     unknown.look(1.0)
     assert not unknown.is_up and not unknown.is_out and unknown.may_speak(1.0, NEVER)
+
+
+def test_a_pair_whose_link_takes_another_way_than_the_outputs_is_known(routes: Path, tmp_path: Path) -> None:
+    carrier = Carrier(["10.77.0.9"], routes, tmp_path)
+    assert carrier.is_apart(["192.168.1.5"]) and not carrier.is_apart(["192.168.1.5", "10.77.0.2"])
+    assert not Carrier(["127.0.0.1"], routes, tmp_path).is_apart(["10.77.0.2"])

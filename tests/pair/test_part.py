@@ -23,7 +23,7 @@ NOW = 100.0
 
 
 def part(leads: bool, peer_lives: bool = True, epoch: int = 1, written: float = NOW) -> BoxPart:
-    return BoxPart(leads, True, peer_lives, epoch, written)
+    return BoxPart(leads, leads, True, peer_lives, epoch, written)
 
 
 def test_lights_of_a_stage_that_died_are_silent_only_where_the_other_box_took_over() -> None:
@@ -31,6 +31,7 @@ def test_lights_of_a_stage_that_died_are_silent_only_where_the_other_box_took_ov
     assert not part(True).may_speak(NOW + 2 * STALE_S)
     assert part(True, peer_lives=False).may_speak(NOW + 60.0)
     assert not part(False).may_speak(NOW)
+    assert not part(True)._replace(speaks=False).may_speak(NOW)  # its cable is out
 
 
 def test_a_stage_without_a_pair_leaves_no_part_behind(tmp_path: Path) -> None:

@@ -8,9 +8,11 @@ import pytest
 
 from appliance.pair import wire
 from appliance.pair.clock_offset import ClockOffset
+from appliance.pair.pair import Pair, PairSettings
 from appliance.pair.roles import Heard, Role
 from appliance.pair.stream import KEPT, MOST_PART, Incoming, Outgoing, body_of, numbers_in
 from appliance.pair.wire import BEAT, MESSAGE, Codec
+from hw_sim.peers import free_ports
 
 KEY, PRINT = bytes(range(16)), b"same    "
 LEADS = Heard(Role.LEADS, 3, True)
@@ -112,3 +114,21 @@ def test_the_shortest_way_tells_how_far_clocks_are_apart() -> None:
     for number in range(100):
         offset.hear(100.0 + number, 40.0 + number + 0.0003 + 0.01 * (number % 7))
     assert offset.seconds == pytest.approx(-60.0 + 0.0003)
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_another_secret_is_told_from_a_box_that_is_away(same: bool) -> None:
+    port, hosts = free_ports(1)[0], ("127.0.0.1", "127.0.0.2")
+    keys = (KEY, KEY if same else bytes(16))
+    one, other = (
+        Pair(PairSettings("", number == 0, hosts[number], port, [hosts[1 - number]], key, 0.042), PRINT, 0.0)
+        for number, key in enumerate(keys)
+    )
+    assert not one.has_other_secret
+    for _ in range(3):
+        for box in (one, other):
+            box.beat(0.0)
+            box.look(0.0)
+    assert one.has_other_secret is other.has_other_secret is not same
+    assert one.roles.peer_lives(0.0) is same
+    one.close(), other.close()
