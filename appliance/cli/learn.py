@@ -165,6 +165,8 @@ class Learner:
         else:
             shutil.rmtree(out, ignore_errors=True)
             command += ["--recordings", wanted.recordings, *self._train]
+            if wanted.begins_with:
+                command += ["--from", wanted.begins_with]
             if not {"--steps", "--minutes"} & set(self._train):
                 command += ["--minutes", f"{TRAINING_SHARE * wanted.minutes:g}"]
         status, said = self._run(command, "training", pauses=True)

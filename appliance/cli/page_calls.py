@@ -103,6 +103,20 @@ def use_rehearsal(journal: str, into: str) -> Any:
     return {"name": f"box/{written.folder.name}", "seconds": written.seconds}
 
 
+def check_recording(file: str, name: str) -> Any:
+    """Read a recording that came by the page; name: for messages."""
+    from appliance.pose.bvh import BvhError, read_bvh
+    from appliance.stage.stage_error import StageError
+
+    try:
+        seconds = read_bvh(Path(file)).seconds
+    except (BvhError, OSError) as error:
+        raise StageError(str(error).replace(file, name)) from None
+    if seconds < 1.0:
+        raise StageError(f"{name}: there is less than a second of dance in it. Export the recording again.")
+    return {"seconds": seconds}
+
+
 def help_file(
     out: str,
     journal: str | None,
@@ -165,7 +179,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     one.__name__: one
     for one in (
         *(about, pose_map, keep_cue, box_file, change_box_file, dance_again, adopt_show),
-        *(pack_show, take_show, timelines, stretch, help_file, use_rehearsal),
+        *(pack_show, take_show, timelines, stretch, help_file, use_rehearsal, check_recording),
     )
 }
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
+import re
 import shutil
 import time
 from importlib.util import find_spec
@@ -13,14 +15,20 @@ from typing import Any
 from aiohttp import web
 
 from appliance.box.child import environment
-from appliance.console.body import said
+from appliance.console.body import received, said
 from appliance.console.child import answer_of, own_child
 from appliance.console.guard import Guard
 from appliance.console.learning import FOLDER, RECORDINGS, STUDIO_MISSING, USUAL_MIN, Learning, Wanted
+from appliance.console.stage_view import StageView
 from appliance.pose.recorded_minutes import recorded_minutes
+from appliance.show.bundle import bundled_shows
 
 STICK = Path("/media/bunraku/bunraku") / RECORDINGS
-_EXPORTED_S, _ENDS_WITHIN_S = 120.0, 10.0
+_EXPORTED_S, _ENDS_WITHIN_S, _CHECKED_S = 120.0, 10.0, 60.0
+LARGEST_RECORDING, LEFT_FREE = 64 << 20, 1 << 30  # bytes; ten minutes of a figure with fingers have 60 MB
+MOST_UPLOADED = 500
+DANCES = "this show"  # the one on the stage
+_FILE = re.compile(r"(?!\.)[^/\\\x00-\x1f]{1,96}\.bvh", re.IGNORECASE)
 _RUNS = "Something is being learned already. Wait for its end, or end it."
 
 
@@ -32,9 +40,16 @@ class Learn:
     """
 
     def __init__(
-        self, guard: Guard, state: Path, journal: str | None, box: dict[str, str], is_installed: bool
+        self,
+        guard: Guard,
+        state: Path,
+        journal: str | None,
+        box: dict[str, str],
+        is_installed: bool,
+        stage: StageView,
     ) -> None:
         self._guard, self._journal, self._box, self._is_installed = guard, journal, box, is_installed
+        self._stage, self._uploading = stage, asyncio.Lock()
         self._recordings, self._learning = state / RECORDINGS, Learning(state / FOLDER)
         self._child: asyncio.subprocess.Process | None = None
 
@@ -45,6 +60,7 @@ class Learn:
             web.post("/api/learn", self._begin),
             web.post("/api/learn/end", self._end),
             web.post("/api/learn/rehearsal", self._use_rehearsal),
+            web.post("/api/learn/recording", self._take_recording),
         ]
 
     async def go_on(self) -> None:
@@ -68,6 +84,7 @@ class Learn:
             {
                 "studio": "" if has_studio() else STUDIO_MISSING,
                 "recordings": listed,
+                "shows": [DANCES] * (self._stage.show_directory is not None) + list(bundled_shows()),
                 "journal": self._journal is not None,
                 "runs": self._learning.wanted() is not None,
                 "progress": self._learning.told(),
@@ -80,7 +97,9 @@ class Learn:
         self._guard.require_device(request)
         values = await said(request)
         name, minutes = values.get("recordings"), values.get("minutes", USUAL_MIN)
-        folder = self._folder(name)
+        folder, begins_with = self._folder(name), self._show(values.get("begins_with", ""))
+        if begins_with is None:
+            raise web.HTTPBadRequest(text="There is no such show to begin with.")
         if folder is None or not isinstance(minutes, int | float) or not 1 <= minutes <= 720:
             raise web.HTTPBadRequest(text="Choose a folder of recordings, and 1 to 720 minutes.")
         if not has_studio():
@@ -89,7 +108,7 @@ class Learn:
             raise web.HTTPConflict(text=_RUNS)
         try:
             await asyncio.to_thread(shutil.rmtree, self._learning.show, True)
-            self._learning.want(Wanted(str(folder), float(minutes)))
+            self._learning.want(Wanted(str(folder), float(minutes), begins_with))
             if not self._is_installed:
                 await self._start()
         except OSError as error:
@@ -114,6 +133,40 @@ class Learn:
         return web.Response(
             body=await answer_of("use_rehearsal", _EXPORTED_S, **places), content_type="application/json"
         )
+
+    async def _take_recording(self, request: web.Request) -> web.Response:
+        """The body is a BVH file; ?name= is its name. It is read once, as a training would read it."""
+        self._guard.require_device(request)
+        name = request.query.get("name", "")
+        if _FILE.fullmatch(name) is None:
+            raise web.HTTPBadRequest(text="Recordings are BVH files, such as solo.bvh.")
+        folder = self._recordings / time.strftime("uploaded-%Y-%m-%d", time.localtime())
+        async with self._uploading:
+            part = folder / f".{name}.part"  # no recording until it is whole and was read
+            try:
+                folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+                for left in folder.glob(".*.part"):  # by a power cut
+                    left.unlink()
+                if shutil.disk_usage(folder).free < LEFT_FREE + LARGEST_RECORDING:
+                    raise web.HTTPInsufficientStorage(text="The disk is nearly full. Delete what you can.")
+                if sum(1 for _ in folder.iterdir()) >= MOST_UPLOADED:
+                    raise web.HTTPInsufficientStorage(text="That is enough for one day. Begin with these.")
+                await received(request, part, LARGEST_RECORDING)
+                read = await answer_of("check_recording", _CHECKED_S, file=str(part), name=name)
+                part.replace(folder / name)
+            except OSError as error:
+                raise web.HTTPServiceUnavailable(text=f"It cannot be kept ({error.strerror}).") from None
+            finally:
+                part.unlink(missing_ok=True)
+                with contextlib.suppress(OSError):
+                    folder.rmdir()  # where nothing is in it
+        return web.json_response({"name": f"box/{folder.name}"} | json.loads(read))
+
+    def _show(self, name: Any) -> str | None:
+        """The show to begin with, for `bunraku train --from`; None: it was not offered."""
+        if name == DANCES and self._stage.show_directory is not None:
+            return str(self._stage.show_directory)
+        return name if name == "" or name in bundled_shows() else None
 
     def _listed(self) -> list[dict[str, Any]]:
         """The folders with recordings on the box and on the stick."""

@@ -25,10 +25,13 @@ _SILENT_S = 120.0  # a step of a large network on a slow machine, with the check
 
 
 class Wanted(NamedTuple):
-    """recordings: their folder; minutes: for all of it, from reading to the check."""
+    """recordings: their folder; minutes: for all of it, from reading to the check; begins_with: the folder or
+    the name of the show whose dancer learns on, "": a new dancer.
+    """
 
     recordings: str
     minutes: float = USUAL_MIN
+    begins_with: str = ""
 
 
 class Learning:
@@ -49,11 +52,13 @@ class Learning:
         """The current request; None: nothing, or nothing that can be read."""
         try:
             said = stored_json(self._wanted)
-            recordings, minutes = said["recordings"], said["minutes"]
-        except (OSError, ValueError, TypeError, KeyError):
+            recordings, minutes, before = said["recordings"], said["minutes"], said.get("begins_with", "")
+        except (OSError, ValueError, TypeError, KeyError, AttributeError):
             return None
-        is_sound = isinstance(recordings, str) and isinstance(minutes, int | float)
-        return Wanted(recordings, float(minutes)) if is_sound else None
+        is_sound = (
+            isinstance(recordings, str) and isinstance(minutes, int | float) and isinstance(before, str)
+        )
+        return Wanted(recordings, float(minutes), before) if is_sound else None
 
     def end(self) -> None:
         """Nothing is wanted any more; what was learned so far stays."""

@@ -91,7 +91,7 @@ async def _serve(settings: Settings) -> int:
     rehearsed = Path(settings.devices).parent / FOLDER
     state, show_goes = Path(settings.devices).parent, Proving(folder).show_goes
     venue = Venue(guard, folder, settings.box, settings.is_installed, state, show_goes)
-    learn = Learn(guard, Path(settings.devices).parent, settings.journal, settings.box, settings.is_installed)
+    learn = Learn(guard, state, settings.journal, settings.box, settings.is_installed, stage)
     night = Night(stage, box, Path(settings.devices).parent, folder)
     helping = Help(guard, box, logs, folder, settings.journal, settings.box)
     hands, rig = Hands(guard, desk, folder), Rig(folder)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page as Tab
 from playwright.sync_api import expect
 
+from appliance.console.learn import LARGEST_RECORDING
 from appliance.console.learning import FOLDER, RECORDINGS, Learning, Wanted
 from appliance.console.settings import WHERE
 from appliance.pose.bvh import write_bvh
 from tests.bundles import swaying_phrase
-from tests.console.browser import ON_BOTH, press, unlock
+from tests.console.browser import ON_A_LAPTOP, ON_BOTH, press, unlock
 from tests.console.page import Page, page_alone
 from tests.system.box import Box
 from tests.system.processes import wait_until
@@ -40,15 +42,63 @@ def test_two_touches_begin_and_it_waits_for_the_show(tab: Tab, venue: tuple[Box,
     folder = tab.locator("#learn-folders button")
     expect(folder).to_have_text("box/mine · 1 files, 0.1 min")
     expect(tab.locator("#learn-begin")).to_be_disabled()
+    tab.evaluate(
+        "window.touches = 0; addEventListener('click', (one) => { touches += one.isTrusted; }, true)"
+    )
     press(tab, "#learn-folders button")
     press(tab, "#learn-begin")
     expect(tab.locator("#learn-said")).to_contain_text("Waiting until the show stops")
     learning = Learning(kept / FOLDER)
     wait_until(lambda: learning.told().get("share") == 0.0)
     assert learning.wanted() is not None and not learning.show.exists(), "nothing is trained"
+    assert tab.evaluate("touches") == 2
     press(tab, "#learn-end")
     expect(tab.locator("#learn-said")).to_contain_text("The show stays as it is")
     assert learning.wanted() is None
+
+
+@ON_A_LAPTOP
+def test_recordings_from_the_browser_are_learned_from_another_show(
+    tab: Tab, venue: tuple[Box, Page], tmp_path: Path
+) -> None:
+    kept = kept_of(venue[0])
+    write_bvh(tmp_path / "solo.bvh", swaying_phrase())
+    (tmp_path / "torn.bvh").write_bytes((tmp_path / "solo.bvh").read_bytes()[:2000])
+    unlock(tab, venue[1])
+    press(tab, '[data-page="rehearsal"]')
+    tab.locator("#learn-files").set_input_files([tmp_path / "solo.bvh"])
+    uploaded = tab.locator("#learn-folders button", has_text="box/uploaded-")
+    expect(uploaded).to_contain_text("1 files, 0.1 min")
+    expect(uploaded).to_have_attribute("aria-pressed", "true")
+    (folder,) = (kept / RECORDINGS).glob("uploaded-*")
+    assert (folder / "solo.bvh").read_bytes() == (tmp_path / "solo.bvh").read_bytes()
+    tab.locator("#learn-files").set_input_files([tmp_path / "torn.bvh"])
+    expect(tab.locator("#learn-said")).to_contain_text("torn.bvh: there is less than a second")
+    assert [one.name for one in folder.iterdir()] == ["solo.bvh"]
+    tab.select_option("#learn-show", "martial")
+    press(tab, "#learn-begin")
+    learning = Learning(kept / FOLDER)
+    wait_until(lambda: learning.wanted() is not None)
+    assert learning.wanted() == Wanted(str(folder), 60.0, "martial")
+    press(tab, "#learn-end")
+    shutil.rmtree(folder)
+
+
+def test_what_is_uploaded_is_bounded_and_a_recording(venue: tuple[Box, Page], kept: Path) -> None:
+    page = Page(venue[1].port, venue[1].box_file)
+    body = (kept / RECORDINGS / "mine" / "sway.bvh").read_bytes()
+    assert page.post("/api/learn/recording?name=x.bvh", body).status == 401
+    page.unlock()
+    for name in ("x.fbx", ".x.bvh", "..%2Fx.bvh", "a%2Fb.bvh", "%00.bvh", "", "x" * 120 + ".bvh"):
+        assert page.post(f"/api/learn/recording?name={name}", body).status == 400, name
+    for torn in (b"", b"no recording", body[:3000]):
+        refused = page.post("/api/learn/recording?name=x.bvh", torn)
+        assert refused.status == 404 and refused.text.startswith("x.bvh:"), refused
+    assert page.post("/api/learn/recording?name=x.bvh", bytes(LARGEST_RECORDING + 1)).status == 503
+    assert not list((kept / RECORDINGS).glob("uploaded-*")), "nothing is left of what was refused"
+    for name in ("/etc", "martial_show", "..", 7, None):
+        answer = page.post("/api/learn", {"recordings": "box/mine", "begins_with": name})
+        assert answer.status == 400 and "no such show" in answer.text, name
 
 
 def test_only_listed_folders_and_known_devices(venue: tuple[Box, Page], kept: Path) -> None:

@@ -4,6 +4,7 @@ import { showChoices } from "./choices.js";
 import { ask, withPin } from "./device.js";
 import { byId } from "./elements.js";
 import { twice } from "./hold.js";
+import { sent } from "./update.js";
 import { number, translated, words } from "./words.js";
 
 const LOOK_MS = 2000, LISTED_WITHIN_MS = 20_000, ADOPTED_WITHIN_MS = 120_000;
@@ -11,7 +12,8 @@ let timer = 0, chosen = "", isRead = false;
 
 export function initLearn() {
   byId("learn-open").addEventListener("click", () => withPin(read));
-  byId("learn-begin").addEventListener("click", async () => tell(await ask("/api/learn", { recordings: chosen })));
+  byId("learn-begin").addEventListener("click", async () => tell(await ask("/api/learn", { recordings: chosen, begins_with: byId("learn-show").value })));
+  byId("learn-files").addEventListener("change", upload);
   byId("learn-end").addEventListener("click", async () => tell(await ask("/api/learn/end", {})));
   twice(byId("learn-dance"), dance, "sure_now");
   byId("learn-rehearsal").addEventListener("click", async () => {
@@ -37,7 +39,7 @@ async function read() {
   isRead = true;
   const answer = await request("/api/learn", undefined, LISTED_WITHIN_MS);
   if (answer.status !== 200) return say(translated(answer.message) || words("no_page"));
-  const { studio, recordings, journal, runs, progress, can_dance: canDance, show } = answer.value;
+  const { studio, recordings, shows, journal, runs, progress, can_dance: canDance, show } = answer.value;
   byId("learn-part").hidden = false;
   byId("learn-open").hidden = true;
   chosen = recordings.some((one) => one.name === chosen) ? chosen : "";
@@ -50,6 +52,9 @@ async function read() {
     chosen = name;
     read();
   });
+  const offered = ["", ...shows].map((name) => new Option(name || words("learn_new"), name, false, name === byId("learn-show").value));
+  byId("learn-show").replaceChildren(...offered);
+  byId("learn-from").hidden = byId("learn-files").closest(".row").hidden = runs;
   byId("learn-begin").hidden = runs || !recordings.length;
   byId("learn-begin").disabled = !chosen || studio !== "";
   byId("learn-end").hidden = !runs;
@@ -84,6 +89,18 @@ async function dance() {
   const answer = await ask("/api/learn/dance", {}, ADOPTED_WITHIN_MS);
   const problems = answer.value?.problems?.map((one) => one.message).join(" ");
   say(answer.status === 200 ? problems || answer.value.message : translated(answer.message) || words("no_page"));
+}
+
+async function upload() {
+  let answer;
+  for (const file of byId("learn-files").files) {
+    answer = await sent(file, "/api/learn/recording", say);
+    if (answer.status !== 200) break;
+    chosen = JSON.parse(answer.message).name;
+  }
+  byId("learn-files").value = "";
+  await read();
+  if (answer?.status !== 200) say(translated(answer?.message ?? "") || words("no_page"));
 }
 
 function tell(answer) {

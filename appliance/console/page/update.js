@@ -43,12 +43,12 @@ async function take(name) {
   else refuse(answer);
 }
 
-// One after the other. XMLHttpRequest, because fetch does not report the progress of an upload.
+// One after the other.
 async function sendFiles() {
   byId("update-form").hidden = true;
   let ready = null;
   for (const file of [...byId("update-file").files].sort((one, other) => other.size - one.size)) {
-    const answer = await sent(file);
+    const answer = await sent(file, "/api/update/file", say);
     if (answer.status !== 200) return refuse(answer);
     ready = JSON.parse(answer.message).ready;
   }
@@ -58,15 +58,16 @@ async function sendFiles() {
   return undefined;
 }
 
-function sent(file) {
+// XMLHttpRequest, because fetch does not report the progress of an upload.
+export function sent(file, where, tell) {
   return new Promise((answered) => {
     const asked = new XMLHttpRequest();
     asked.upload.onprogress = (event) => {
-      say(words("update_sends", { name: file.name, percent: Math.floor((100 * event.loaded) / event.total) }));
+      tell(words("update_sends", { name: file.name, percent: Math.floor((100 * event.loaded) / event.total) }));
     };
     asked.onload = () => answered({ status: asked.status, message: asked.responseText });
     asked.onerror = () => answered({ status: 0, message: "" });
-    asked.open("POST", `/api/update/file?name=${encodeURIComponent(file.name)}`);
+    asked.open("POST", `${where}?name=${encodeURIComponent(file.name)}`);
     asked.send(file);
   });
 }
