@@ -8,7 +8,7 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from appliance.pair import wire
@@ -32,6 +32,7 @@ _ASK_KEYFRAME_S = 0.06
 _BUFFER_BYTES = 1 << 20
 REPEATS = 2  # each message is sent again in the two ticks after it
 _TRY_AGAIN_S = 1.0
+_STALE_S = 0.1  # the kernel keeps datagrams for an address that does not answer, and sends them seconds later
 _KEYFRAME = 0  # first number of a question for a keyframe; messages are numbered from 1
 
 
@@ -58,8 +59,14 @@ class Pair:
     same_show: whether the other box has the same show and software, as far as it was heard.
     """
 
-    def __init__(self, settings: PairSettings, fingerprint: bytes, now: float) -> None:
-        self.settings = settings
+    def __init__(
+        self,
+        settings: PairSettings,
+        fingerprint: bytes,
+        now: float,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.settings, self._monotonic = settings, monotonic
         self.roles = Roles(settings.is_first, now, settings.silent_s)
         self.offset = ClockOffset()
         self.is_ready = self.wants_keyframe = False
@@ -72,7 +79,7 @@ class Pair:
         self._links = [(_udp_socket(), (peer, settings.port)) for peer in settings.peers]
         self._socket: socket.socket | None = None
         self._poll = select.poll()
-        self._open_at = float("-inf")
+        self._open_at = self._heard_at = float("-inf")
         self._outgoing, self._incoming = Outgoing(), Incoming()
         self._before: deque[list[bytes]] = deque(maxlen=REPEATS)  # bodies of the newest messages
         self._to_repeat: deque[int] = deque(maxlen=64)
@@ -107,7 +114,11 @@ class Pair:
             self._poll.poll(1000.0 * seconds)
 
     def look(self, now: float) -> None:
-        """Hear what has come, and change the role where it is time."""
+        """Hear what has come, and change the role where it is time.
+
+        All that came before `now` is heard before the silence is judged, and counts as heard after that:
+        however long this process is held up in between, it takes none for silent that is not.
+        """
         self._hear(now)
         led = self.leads
         self.roles.look(now, self.is_ready, self.reaches)
@@ -223,30 +234,32 @@ class Pair:
             if now >= self._open_at:
                 self._open(now)
             return
-        for _ in range(_AT_ONCE):
-            try:
-                data = self._socket.recv(wire.LARGEST + 1)
-            except BlockingIOError:
-                return
-            except OSError:
-                continue  # what an earlier datagram met: nobody there
+        came = list[bytes]()
+        with contextlib.suppress(OSError):
+            while len(came) < _AT_ONCE:
+                came.append(self._socket.recv(wire.LARGEST + 1))
+        now, before = self._monotonic(), self._heard_at
+        for data in came:
             found = self._codec.accept(data)
             if self._codec.greeting:
                 self._greet(now)
             if found is not None:
-                self._take(found, now)
+                self._take(found, now, now - before)
+        self._heard_at = now
 
     def _greet(self, now: float) -> None:
         to, self._codec.greeting = self._codec.greeting, 0
         self._send(wire.BEAT, now, to=to)
 
-    def _take(self, found: wire.Datagram, now: float) -> None:
+    def _take(self, found: wire.Datagram, now: float, waited_s: float) -> None:
+        """waited_s: at most so long it has waited here."""
         self.same_show = found.fingerprint == self._fingerprint
         start = self._codec.others
         if start != self._start:
             self.offset.restart()
         self.offset.hear(found.sent, now)
-        self.roles.hear(found.heard, now, self.is_ready)
+        if now - found.sent - self.offset.seconds < _STALE_S + waited_s:
+            self.roles.hear(found.heard, now, self.is_ready)
         if (
             found.heard.role is Role.LEADS
             and not self.leads

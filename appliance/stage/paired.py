@@ -155,7 +155,6 @@ class PairedStage:
             frame = self._tick.frame
             self.pair.give_keyframe(_PLACE.pack(frame.tick, frame.frame_time) + packed(self._tick))
         self.pair.answer(now)
-        self._look_at_cable(now)
         self._write_part(now)
 
     def flush(self, now: float) -> None:
@@ -186,6 +185,7 @@ class PairedStage:
         """
         self.pair.await_datagram(0.004 if self.pair.is_ready else 0.01)
         now = clock.now()
+        self._look_at_cable(now)
         self._look(now)
         if self.pair.leads:
             for message in self.pair.take_rest():
@@ -196,7 +196,6 @@ class PairedStage:
             self._beat_at = now
             self.pair.beat(now)
             self._own_link.overhear(now)
-            self._look_at_cable(now)
             self._write_part(now)
         self.pair.ask(now)
         if not self.pair.same_show:
@@ -295,6 +294,7 @@ class PairedStage:
         if not self.pair.leads:
             return False
         now = time.monotonic()
+        self._look_at_cable(now)
         if now - self._looked_at > _FRESH_LOOK_S:
             self._look(now)
         return self.pair.leads and self._carrier.may_speak(now, self.pair.roles.heard)

@@ -116,19 +116,47 @@ def test_the_shortest_way_tells_how_far_clocks_are_apart() -> None:
     assert offset.seconds == pytest.approx(-60.0 + 0.0003)
 
 
-@pytest.mark.parametrize("same", [True, False])
-def test_another_secret_is_told_from_a_box_that_is_away(same: bool) -> None:
+def pair_of(*keys: bytes, clock: list[float]) -> list[Pair]:
+    """Both boxes on this machine, with a clock that stands where the test puts it."""
     port, hosts = free_ports(1)[0], ("127.0.0.1", "127.0.0.2")
-    keys = (KEY, KEY if same else bytes(16))
-    one, other = (
-        Pair(PairSettings("", number == 0, hosts[number], port, [hosts[1 - number]], key, 0.042), PRINT, 0.0)
+    settings = (
+        PairSettings("", number == 0, hosts[number], port, [hosts[1 - number]], key, 0.042)
         for number, key in enumerate(keys)
     )
-    assert not one.has_other_secret
+    made = [Pair(one, PRINT, clock[0], lambda: clock[0]) for one in settings]
     for _ in range(3):
-        for box in (one, other):
-            box.beat(0.0)
-            box.look(0.0)
+        for box in made:
+            box.beat(clock[0])
+            box.look(clock[0])
+    return made
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_another_secret_is_told_from_a_box_that_is_away(same: bool) -> None:
+    one, other = pair_of(KEY, KEY if same else bytes(16), clock=[0.0])
     assert one.has_other_secret is other.has_other_secret is not same
     assert one.roles.peer_lives(0.0) is same
+    one.close(), other.close()
+
+
+def test_a_box_that_was_held_up_takes_none_for_silent_and_a_late_datagram_for_nothing() -> None:
+    clock = [0.0]
+    one, other = pair_of(KEY, KEY, clock=clock)
+    clock[0] = 1.0
+    one.look(1.0)
+    assert one.leads
+    one.beat(1.0)
+    other.look(1.0)
+    other.is_ready = True
+    assert other.roles.role is Role.FOLLOWS
+    one.beat(1.95)
+    clock[0] = 2.0
+    other.look(1.0)  # it was stopped after it had read its clock
+    other.look(2.01)
+    assert other.roles.role is Role.FOLLOWS
+    heard = other.roles.heard
+    one.beat(1.5)
+    clock[0] = 2.02
+    other.look(2.02)
+    assert other.roles.heard == heard
     one.close(), other.close()
