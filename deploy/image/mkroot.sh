@@ -8,15 +8,14 @@ repository=$(cd "$here/../.." && pwd)
 
 usage() {
     cat <<'END'
-usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--deb FILE] [--key KEY] [--debian TAR] OUT
+usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] --deb FILE [--debian TAR] OUT
 
-Builds the root file system of a box into OUT: a tar where OUT ends with .tar, else a folder.
+Builds the root file system of a box into the folder OUT.
 
   --arch ARCH        amd64 (default) or arm64. A foreign one's packages are unpacked, and what their own scripts
                      would do is done from here: of that processor's programs only three run (qemu-user-static).
   --without-kernel   no kernel, no firmware: for systemd-nspawn
-  --deb FILE         the package of a box that `make deb` made; left out: one made now from the working tree
-  --key KEY          sign that one, so that the box knows whose releases it takes; --next-key KEY.pub as there
+  --deb FILE         the package of a box that `make deb` made
   --debian TAR       keeps Debian's part in TAR, and takes it from there the next time
 
 Must run as root, with mmdebstrap. Debian packages come from where this machine's own come from
@@ -29,21 +28,20 @@ fail() {
     exit 1
 }
 
-arch=amd64 kernel=yes deb='' debian='' out='' signing=()
+arch=amd64 kernel=yes deb='' debian='' out=''
 while [ $# -gt 0 ]; do
     case $1 in
         --arch) arch=${2:?--arch needs amd64 or arm64}; shift 2 ;;
         --without-kernel) kernel=no; shift ;;
         --deb) deb=${2:?--deb needs a file}; shift 2 ;;
-        --key | --next-key) signing+=("$1" "${2:?$1 needs a key file}"); shift 2 ;;
         --debian) debian=${2:?--debian needs a file}; shift 2 ;;
         --help | -h) usage; exit 0 ;;
         -*) fail "unknown option $1. See mkroot.sh --help." ;;
         *) out=$1; shift ;;
     esac
 done
-[ -n "$out" ] || { usage >&2; exit 2; }
-out=$(realpath -m "$out") # dpkg's scripts do not find a relative one
+[[ -n $out && -n $deb ]] || { usage >&2; exit 2; }
+root=$(realpath -m "$out") # dpkg's scripts do not find a relative one
 [ "$(id -u)" = 0 ] || fail "needs root: it makes device nodes and installs packages into a new root."
 command -v mmdebstrap >/dev/null || fail "mmdebstrap is missing. Install it: apt-get install mmdebstrap"
 case $arch in
@@ -78,8 +76,7 @@ sources() {
 
 work=$(mktemp -d "${TMPDIR:-/tmp}/bunraku-root.XXXXXX")
 trap 'rm -rf "$work"' EXIT
-mkdir -p "$(dirname "$out")"
-if [[ $out == *.tar ]]; then root=$work/root; else root=$out; fi
+mkdir -p "$(dirname "$root")"
 
 debian() {
     local options=(--variant=apt) hooks=() pattern packages
@@ -148,12 +145,8 @@ debian_kept() {
 # An older systemd than the box's does not know `u!`.
 users() { cat "$@" "$root"/usr/lib/sysusers.d/*.conf | sed 's/^u!/u/' | systemd-sysusers --root="$root" - 2>/dev/null; }
 
-# The package as on any box, made now from the working tree unless one was named.
+# The package as on any box.
 install_release() {
-    if [ -z "$deb" ]; then
-        "$repository/deploy/release/make-deb" --arch "$arch" --out "$work" "${signing[@]}"
-        deb=$(ls "$work"/bunraku_*.deb)
-    fi
     if [ $foreign = yes ]; then
         dpkg --root="$root" --force-script-chrootless --force-architecture --no-triggers --install "$deb" &&
             prepare_show
@@ -213,8 +206,4 @@ debian_kept
 install_release
 settle
 rm -rf "$root/var/cache/ldconfig" # its file has times in it
-if [[ $out == *.tar ]]; then
-    tar -C "$root" --numeric-owner --sort=name -cf "$out.part" .
-    mv "$out.part" "$out"
-fi
-echo "$out: $(du -sh "$root" | cut -f 1) unpacked"
+echo "$root: $(du -sh "$root" | cut -f 1) unpacked"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import ROOT
 from tests.deploy.box_root import BoxRoot, refused, taken
 from tests.deploy.small_release import CLOCK, UNITS, package_of
 
@@ -113,33 +114,18 @@ def partition(box: BoxRoot, tmp_path: Path) -> Iterator[str]:
     subprocess.run(["losetup", "--detach", found], check=True)
 
 
-def test_data_gets_a_partition_that_keeps_what_was_there(
-    box: BoxRoot, partition: str, tmp_path: Path
-) -> None:
+def test_a_partition_becomes_data_with_what_was_there(box: BoxRoot, partition: str) -> None:
+    """By the page's command and its line for fstab."""
     keys = box.path / "data/bunraku/keys/sensors.keys"
     keys.parent.mkdir(parents=True)
     keys.write_text("left-wrist: {}\n")
     (box.path / "mnt").mkdir(exist_ok=True)
-    done = box.call("sh", "-c", f"rm -f /etc/fstab; touch /etc/fstab; bunraku-release data {partition}")
-    # /etc of a box made from the image is in memory; here it is an overlay, too.
-    assert "what is written to /etc is gone at power-off" in done.stderr
-    there = "stat() { echo ext2/ext3; }; source /usr/sbin/bunraku-release"
-    done = box.call(
-        "bash",
-        "-c",
-        f"{there} data {partition} && findmnt -n -o TARGET {partition} && "
-        f"cat /data/bunraku/keys/sensors.keys && bash -c '{there} data {partition}'",
-    )
-    assert f"/data is on {partition} from now on" in done.stdout, done.stderr
-    assert "/data\nleft-wrist: {}\n" in done.stdout
-    [line] = [one for one in (box.path / "etc/fstab").read_text().splitlines() if "/data" in one]
-    assert line.startswith("UUID=") and "nofail" in line
-
-
-def test_a_partition_is_never_formatted_nor_guessed(box: BoxRoot, partition: str) -> None:
-    assert "there is no partition '/dev/nowhere'" in box.release("data", "/dev/nowhere").stderr
-    subprocess.run(["dd", "if=/dev/zero", f"of={partition}", "bs=64k", "count=2", "status=none"], check=True)
-    done = box.release("data", partition)
-    assert done.returncode == 1
-    assert "no file system, ext4 is needed. Nothing was changed." in done.stderr
-    assert f"mkfs.ext4 -L data {partition}" in done.stderr
+    page = (ROOT / "docs/touring.md").read_text().partition("### A place that lasts")[2].split("`")
+    copies = next(one for one in page if one.startswith("sudo mount")).replace("sudo ", "")
+    line = next(one for one in page if one.startswith("UUID=..."))
+    named = f"$(blkid -o export {partition} | grep ^UUID=)"
+    said = f"{copies.replace('/dev/sda1', partition)}; echo {line.replace('UUID=...', named)} >/etc/fstab"
+    done = box.call("sh", "-ec", f"rm -f /etc/fstab; {said}; mount /data; cat /data/bunraku/keys/*")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "left-wrist: {}\n"
+    assert "nosuid" in box.call("sh", "-c", "mount /data; findmnt -n -o OPTIONS /data").stdout

@@ -88,7 +88,7 @@ def _folder(host: HostView, folder: Path, mounted: Sequence[Mount]) -> Finding:
         return better(
             what,
             f"{message} It is on {disk.kind}, which a power cut can damage: {_SAVED} may be lost with it.",
-            "`sudo mkfs.ext4 -L data /dev/sdX1` on an empty one, `sudo bunraku release data /dev/sdX1`.",
+            "`sudo mkfs.ext4 -L data /dev/sdX1` on an empty one, and its line in fstab (docs/touring.md).",
         )
     if free < min(LEAST_FREE_BYTES, LEAST_FREE_SHARE * whole):
         return better(
