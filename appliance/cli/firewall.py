@@ -94,11 +94,15 @@ def _remote(box: BoxConfig) -> Iterator[str]:
 
 
 def _pair(box: BoxConfig) -> Iterator[str]:
-    """The other box of a pair."""
+    """The other box of a pair, and boxes in step."""
     pair = box.pair
     if pair is not None and not is_loopback(pair.host):
         where = f"{_to(pair.host)}ip saddr {{ {', '.join(pair.peer)} }}"
         yield f'{where} udp dport {pair.port} accept comment "the other box"'
+    locked = box.locked
+    if locked is not None and not is_loopback(locked.host):
+        for host, port in locked.ends:
+            yield f'{_to(locked.host)}ip saddr {host} udp dport {port} accept comment "a box in step"'
 
 
 def _page(box: BoxConfig) -> Iterator[str]:

@@ -14,6 +14,7 @@ from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
 from appliance.show.foreign_sensors import MOST as MOST_FOREIGN
 from appliance.show.foreign_sensors import ForeignSensorConfig
+from appliance.show.locked import LockedConfig
 from appliance.show.opening_hours import HoursConfig
 from appliance.show.osc import OscConfig, osc_misfits
 from appliance.show.pair import PairConfig
@@ -213,6 +214,7 @@ class BoxConfig(Section):
     )
     journal: JournalConfig = part(JournalConfig)
     pair: PairConfig | None = key("A second box that takes over when this one is silent; null: none.", None)
+    locked: LockedConfig | None = key("Boxes that dance in step, frame by frame; null: none.", None)
 
     @model_validator(mode="after")
     def _programs_are_heard(self) -> BoxConfig:
@@ -231,6 +233,16 @@ class BoxConfig(Section):
             if one.usual_port in ports:
                 message = f"Port {one.usual_port} hears {ports[one.usual_port]} already."
                 raise refusal(message, f"Give {one.name} another one.", at=(*at, "port"))
+        return self
+
+    @model_validator(mode="after")
+    def _follows_one_way(self) -> BoxConfig:
+        if self.pair is not None and self.locked is not None:
+            raise refusal(
+                "A box of a pair is silent while it follows, and one in step with others is not.",
+                "Remove `pair` or `locked`.",
+                at="locked",
+            )
         return self
 
     @model_validator(mode="after")

@@ -75,7 +75,7 @@ def messages_of(state: ShowState) -> Iterator[Message]:
 
 
 def _key(message: Message) -> Message:
-    """What a message is about: hands have one address, and each its joint."""
+    """The lever that a message tells of: hands have one address, and each its joint."""
     return message[:2] if message[0] == "/hold" else message[:1]
 
 

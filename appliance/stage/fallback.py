@@ -148,6 +148,11 @@ PAIR_TAKEN = Fallback(
     "The other box was silent, and this one took over, as a rule within a frame. Look at the other box; "
     "it follows once it is back, and `bunraku pair back` gives it the lead again.",
 )
+OUT_OF_STEP = Fallback(
+    "out-of-step",
+    "A box that should dance in step with this one is not heard, or has another show: each dances by itself. "
+    "Switch it on; look at the cable, and at `locked:` in both box files.",
+)
 OF_THE_STAGE = (
     *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),
     *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED, FIGURE_REFUSED),
@@ -166,5 +171,6 @@ OF_THE_STAGE = (
         FOLDER_LOST,
         PAIR_ALONE,
         PAIR_TAKEN,
+        OUT_OF_STEP,
     ),
 )

@@ -209,18 +209,22 @@ class Stage:
 
     def _open_pair(self) -> PairedStage | None:
         """The other box, where the box file names one. Raises ConfigError without its secret."""
-        if self.box.pair is None:
+        pair, locked = self.box.pair, self.box.locked
+        if pair is None and locked is None:
             forget_part(self.sharing.folder)
             return None
-        from appliance.stage.paired import PairedStage
-
         if self.recorder is None:
-            return None  # what the other box would follow is what the recorder notes; it was said why not
-        pair, outputs, made = self.box.pair, self.box.outputs, self.made[0].loop if self.made else None
-        paired = PairedStage(
-            *(pair, outputs, self.show, self.parts, self.wearing, self.tick, self.reconciler),
-            *(self.sharing.folder, self._say_and_note, made),
-        )
+            return None  # what another box would follow is what the recorder notes; it was said why not
+        rest = self.box.outputs, self.show, self.parts, self.wearing, self.tick, self.reconciler
+        more = self.sharing.folder, self._say_and_note, self.made[0].loop if self.made else None
+        if pair is not None:
+            from appliance.stage.paired import PairedStage
+
+            paired = PairedStage(pair, *rest, *more)
+        elif locked is not None:
+            from appliance.stage.locked import LockedStage
+
+            paired = LockedStage(locked, *rest, *more)
         self.recorder.tap = paired.note
         return paired
 
@@ -324,7 +328,10 @@ class Stage:
         roster = roster_lines(states, wearing.neutral_of, wearing.corrected_of, self.batteries.left_s)
         age_s, locked = self._sensor_age_s(now), self._is_locked
         if self.paired is not None:
-            self.watch.note_pair(now, self.paired.complaint(now), self.paired.pair.roles.takeovers)
+            self.watch.note_pair(
+                *(now, self.paired.complaint(now), self.paired.pair.roles.takeovers),
+                is_locked=self.box.locked is not None,
+            )
         fallbacks = self.watch.fallbacks.happened(now)
         pair = None if self.paired is None else self.paired.told(now)
         self.sharing.publish_health(
@@ -379,7 +386,7 @@ class Stage:
 
 def _network_of_a_pair(box: BoxConfig) -> Iterator[Callable[[Path, Skeleton, int], PuppetNetwork]]:
     """One that can be told where the other box's failed."""
-    if box.pair is not None:
+    if box.pair is not None or box.locked is not None:
         from appliance.stage.rerun import RecordedNetwork
 
         yield RecordedNetwork

@@ -1,0 +1,108 @@
+"""A stage in step with others: it tells them its ticks, or dances the leader's for its own outputs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from appliance.box.clock import TickClock
+from appliance.dancer.loop import Loop
+from appliance.pair.locked import Followers, LockedPair
+from appliance.pair.roles import Role
+from appliance.recorder.record import facts_of_run
+from appliance.show.box import OutputsConfig
+from appliance.show.locked import LockedConfig
+from appliance.show.pair import PairConfig
+from appliance.show.show import Show
+from appliance.stage.paired import PairedStage, fingerprint_of, settings_of
+from appliance.stage.reconcile import Reconciler
+from appliance.stage.sensor_fit import SensorFit
+from appliance.stage.stage_parts import StageParts
+from appliance.stage.tick import Tick
+
+_SILENT_MS = 200.0  # then a box that follows dances by itself
+
+
+class LockedStage(PairedStage):
+    """As a pair's, but every box speaks to its own receivers, and the same one always leads."""
+
+    def __init__(
+        self,
+        config: LockedConfig,
+        outputs: OutputsConfig,
+        show: Show,
+        parts: StageParts,
+        wearing: SensorFit,
+        tick: Tick,
+        reconciler: Reconciler,
+        folder: Path,
+        say: Callable[[str], None],
+        made: Callable[[str], Loop] | None = None,
+    ) -> None:
+        links = _links(config)
+        super().__init__(links[0], outputs, show, parts, wearing, tick, reconciler, folder, say, made)
+        self.pair.close()  # its roles change, and there may be others
+        settings, now, leads = [settings_of(one) for one in links], time.monotonic(), config.leader is None
+        fingerprint = fingerprint_of(show, facts_of_run(show, list(parts.worn)))
+        self.pair = (
+            Followers(settings, fingerprint, now) if leads else LockedPair(settings[0], fingerprint, now)
+        )
+
+    def begin(self, now: float) -> None:
+        """The box is ready to hear the others."""
+        self.pair.roles.begin(now)
+
+    def complaint(self, now: float) -> str:
+        """Which other boxes are not in step, or ""."""
+        links = self.pair.links if isinstance(self.pair, Followers) else (self.pair,)
+        for one in links:
+            at = one.settings.peers[0]
+            if one.trouble:
+                return f"The port to {at} cannot be opened ({one.trouble}). Free it."
+            if not one.roles.peer_lives(now):
+                return (
+                    f"The box at {at} is not heard: each dances by itself. Switch it on; look at the cable, "
+                    "and at locked: in both box files."
+                )
+            if one.has_other_secret:
+                return f"The box at {at} has another secret: it dances by itself. Copy the file to it."
+            if not one.same_show:
+                return f"The box at {at} has another show or another release: it dances by itself."
+        return ""
+
+    def _sentence(self, role: Role) -> str:
+        at = self._settings.peers[0]
+        if self._settings.is_first:
+            return "This box leads those that dance in step with it."
+        return f"This box dances in step with {at}." if role is Role.FOLLOWS else "This box dances by itself."
+
+    def _hear_leader(self) -> None:
+        super()._hear_leader()
+        self._parts.outputs.may_speak = None
+
+    def _take_over(self, clock: TickClock) -> None:
+        super()._take_over(clock)
+        self._parts.outputs.may_speak = None
+
+    def _look_at_cable(self, now: float) -> None:
+        """The others have receivers of their own."""
+
+
+def _links(config: LockedConfig) -> list[PairConfig]:
+    ends = (
+        [(config.leader, config.port)]
+        if config.leader
+        else [(one.host, one.port) for one in config.followers]
+    )
+    return [
+        PairConfig.model_construct(
+            role="second" if config.leader else "first",
+            peer=[host],
+            host=config.host,
+            port=port,
+            secret=config.secret,
+            silent_ms=_SILENT_MS,
+        )
+        for host, port in ends
+    ]

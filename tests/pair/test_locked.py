@@ -1,0 +1,188 @@
+"""Three real boxes in step: each sends the same frames to its own receiver, at most one frame apart.
+
+The null: three boxes that know nothing of each other. `python -m tests.pair.test_locked 60` prints figures.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from appliance.show.box import load_box
+from appliance.show.config_error import ConfigError
+from hw_sim.osc_receiver import decode
+from hw_sim.peers import free_ports
+from tests.bundles import write_show
+from tests.pair.hall import KEY
+from tests.show_control.doubles import Asker
+from tests.system.box import Box, playing
+from tests.system.processes import run_bunraku, wait_until
+
+FRAME_MS = 20.0
+ADDRESSES = ("127.0.0.1", "127.0.0.2", "127.0.0.3")
+
+
+class InStep(NamedTuple):
+    """ticks: that all sent in time; same: of these, with the same joints bit for bit; apart_ms: of each, from
+    the first box's datagram to the last one's.
+    """
+
+    ticks: int
+    same: int
+    apart_ms: Sequence[float]
+
+    @property
+    def within_a_frame(self) -> float:
+        return sum(one <= FRAME_MS for one in self.apart_ms) / max(1, self.ticks)
+
+    def told(self) -> str:
+        if not self.ticks:
+            return "no tick came from all"
+        median, nearly, most = np.percentile(self.apart_ms, [50, 99, 100])
+        frames = Counter(int(np.ceil(one / FRAME_MS)) for one in self.apart_ms)
+        return (
+            f"{self.ticks} ticks of all, {self.same} the same bit for bit; apart {median:.1f} ms (median), "
+            f"{nearly:.1f} (99 %), {most:.1f} (most); frames apart: {dict(sorted(frames.items()))}"
+        )
+
+
+@contextlib.contextmanager
+def three_boxes(folder: Path, locked: bool = True) -> Iterator[list[Box]]:
+    """The first one leads; all are switched on one after the other."""
+    show = write_show(folder / "show", [{"osc": True, "joint": "lShldr"}])
+    ports = free_ports(2)
+    (folder / "fleet.key").write_text(KEY)
+    with ExitStack() as opened:
+        boxes = []
+        for number, address in enumerate(ADDRESSES):
+            own = folder / str(number)
+            own.mkdir()
+            common = {"host": address, "secret": str(folder / "fleet.key")}
+            others = [{"host": one, "port": port} for one, port in zip(ADDRESSES[1:], ports, strict=True)]
+            role = {"leader": ADDRESSES[0], "port": ports[number - 1]} if number else {"followers": others}
+            settings: dict[str, Any] = {"locked": common | role} if locked else {}
+            box = opened.enter_context(playing(show, own, settings=settings | {"resume": "never"}))
+            box.frames(10)
+            boxes.append(box)
+        yield boxes
+
+
+def measured(boxes: Sequence[Box], seconds: float) -> InStep:
+    """What comes at the boxes' receivers."""
+    came: list[list[tuple[float, bytes]]] = [[] for _ in boxes]
+    for box in boxes:
+        box.pause()
+    with _before_others():
+        ends_at = time.monotonic() + seconds
+        while time.monotonic() < ends_at:
+            for box, own in zip(boxes, came, strict=True):
+                own += box.receiver.poll_datagrams()
+            time.sleep(0.001)
+    by_tick = [dict(_frames(own)) for own in came]
+    ticks = set.intersection(*(set(one) for one in by_tick))
+    arrivals = [[one[tick][0] for one in by_tick] for tick in ticks]
+    return InStep(
+        len(ticks),
+        sum(len({one[tick][1] for one in by_tick}) == 1 for tick in ticks),
+        [1000.0 * (max(one) - min(one)) for one in arrivals],
+    )
+
+
+def _frames(came: Sequence[tuple[float, bytes]]) -> Iterator[tuple[int, tuple[float, bytes]]]:
+    """Tick, arrival and rotations of each frame that left in time."""
+    tick, arrival, is_late = -1, 0.0, 1
+    for at, data in came:
+        if data.startswith(b"/bunraku/frame"):
+            ((_, arguments),) = decode(data)
+            words: list[Any] = [*arguments]
+            tick, arrival, is_late = words[0], at, words[3]
+        elif data.startswith(b"/mocap/0/joint/rot_local") and tick >= 0 and not is_late:
+            yield tick, (arrival, data)
+
+
+@contextlib.contextmanager
+def _before_others() -> Iterator[None]:
+    """What comes is noted in time."""
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(85))
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def test_three_boxes_are_in_step_and_one_command_moves_them_all(tmp_path: Path) -> None:
+    with three_boxes(tmp_path) as boxes:
+        still = measured(boxes, 2.0)
+        assert still.ticks > 60 and still.same == still.ticks, still.told()
+        leader, follower = Asker(boxes[0].control), Asker(boxes[1].control)
+        leader.tell("/mocap/setjointrot", "lShldr", 0.0, 0.0, 1.0, 1.2)
+        assert leader.ask("/iterations", 2, 1)[2] == 1
+        assert follower.ask("/iterations", 3, 1)[2] == 0, "the one that leads is commanded"
+        moved = measured(boxes, 3.0)
+        assert moved.ticks > 90 and moved.same == moved.ticks, moved.told()
+        assert still.within_a_frame > 0.9 and moved.within_a_frame > 0.9, (still.told(), moved.told())
+        leader.tell("/look", "ink")
+        wait_until(lambda: follower.status().look == "ink", "what is declared is in force on all")
+        for one in (leader, follower):
+            one.close()
+
+
+def test_a_box_that_loses_the_leader_dances_by_itself_until_it_is_back(tmp_path: Path) -> None:
+    with three_boxes(tmp_path) as boxes:
+        boxes[0].kill()
+        for box in boxes[1:]:
+            box.pause()
+            ticks = [frame[0] for frame in box.frames(60)]
+            assert ticks == sorted(set(ticks)), "it goes on where it was"
+            box.await_output("dances by itself")
+        boxes[0].start()
+        boxes[0].frames(10)
+        wait_until(lambda: (again := measured(boxes, 1.0)).ticks > 20 and again.same == again.ticks)
+
+
+def test_three_boxes_that_know_nothing_of_each_other_are_far_apart(tmp_path: Path) -> None:
+    with three_boxes(tmp_path, locked=False) as boxes:
+        alone = measured(boxes, 2.0)
+    assert alone.within_a_frame == 0.0, alone.told()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{secret: k}", "either leads others or follows"),
+        ("{leader: 127.0.0.2, followers: [{host: 127.0.0.3}], secret: k}", "either leads others or follows"),
+        ("{followers: [{host: 127.0.0.2}, {host: 127.0.0.3}], secret: k}", "have the port 9761"),
+        ("{leader: 10.0.0.2, secret: k}", "inside itself"),
+        ("{leader: 127.0.0.2, secret: k}\npair: {role: first, peer: [127.0.0.1], secret: k}", "in step"),
+    ],
+)
+def test_a_box_file_that_cannot_be_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "box.yaml").write_text(f"locked: {text}\n")
+    with pytest.raises(ConfigError, match=message):
+        load_box(tmp_path / "box.yaml")
+
+
+def test_the_firewall_lets_in_each_box_in_step(tmp_path: Path) -> None:
+    followers = "[{host: 10.0.0.2, port: 9761}, {host: 10.0.0.3, port: 9762}]"
+    (tmp_path / "box.yaml").write_text(f"locked: {{followers: {followers}, host: 0.0.0.0, secret: k}}\n")
+    rules = run_bunraku("firewall", "--box", tmp_path / "box.yaml").stdout
+    assert "ip saddr 10.0.0.2 udp dport 9761 accept" in rules
+    assert "ip saddr 10.0.0.3 udp dport 9762 accept" in rules
+
+
+if __name__ == "__main__":
+    for is_locked in (True, False):
+        with tempfile.TemporaryDirectory() as made, three_boxes(Path(made), is_locked) as running:
+            print("in step:" if is_locked else "alone:  ", measured(running, float(sys.argv[1])).told())
