@@ -23,11 +23,10 @@ LONGEST_FIRST = ("tests/boot/", "tests/test_readme.py", "tests/system/", "tests/
 PAGES = "tests/test_readme.py::test_every_command_of_a_page_works"
 _folders = itertools.count()
 
-if "PYTEST_XDIST_WORKER" in os.environ:
-    # Files already run in parallel: threads of numerical libraries would only wait for each other. Set here:
-    # other conftest.py load the libraries, which read this once, before any hook is called.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
+# As the commands have it: threads of numerical libraries would only wait for each other. Set here: other
+# conftest.py load the libraries, which read this once, before any hook is called.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 
 from appliance.pose.quaternion import Array
@@ -61,13 +63,16 @@ def draw_map(
     axes.scatter(*known[:: max(1, len(known) // 8000), :2].T, s=2.0, color=DIM, linewidths=0)
     spread = float(known[:, :2].std(axis=0).max())
     size = 0.8 * _spacing(places)
+    segments, colours = [], []
     for place, joints, bones in figures:
         away = float(np.linalg.norm(known[:, :2] - place, axis=1).min())
-        colour, strength = (INK, 0.95) if away <= nobody * spread else (DIM, 0.8)
+        shade = to_rgba(INK, 0.95) if away <= nobody * spread else to_rgba(DIM, 0.8)
         scale = size / max(float(np.ptp(joints[:, 1])), 1.6)
-        for joint, parent in bones:
-            ends = place + scale * joints[[joint, parent]][:, :2]
-            axes.plot(*ends.T, color=colour, alpha=strength, linewidth=1.3, solid_capstyle="round", zorder=3)
+        segments += [place + scale * joints[[joint, parent]][:, :2] for joint, parent in bones]
+        colours += [shade] * len(bones)
+    axes.add_collection(
+        LineCollection(segments, colors=colours, linewidths=1.3, capstyle="round", zorder=3), autolim=False
+    )
     for number, points in enumerate(paths.values()):
         colour = COLOURS[number % len(COLOURS)]
         axes.plot(*points[:, :2].T, color=colour, linewidth=0.9, alpha=0.6, zorder=2)
