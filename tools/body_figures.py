@@ -1,9 +1,8 @@
-"""Measures a body: `python -m tools.body_figures JOURNAL [SHOW]` as an audience sees it dance, and
-`python -m tools.body_figures body.npz` its surface.
+"""Measures a dance: `python -m tools.body_figures JOURNAL [SHOW]`; a surface: the same with `body.npz`.
 
-Danced: how often and how deep upper arms are in the trunk, how fast standing feet slide; beside the show's
-phrase. Surface: triangles and their shape, and in bends of the default show's skeleton how much volume is
-kept and how much of the skin near the joint is inside the body; beside linear blending of the same weights.
+Dance: how often and how deep upper arms are in the trunk, how fast standing feet slide; beside the show's
+phrase. Surface: triangles and their shape; in bends of the default show's skeleton, how much volume the bend
+adds and how much of the skin near the joint is inside the body; beside linear blending of the same weights.
 """
 
 from __future__ import annotations
