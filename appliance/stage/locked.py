@@ -60,13 +60,13 @@ class LockedStage(PairedStage):
             at = one.settings.peers[0]
             if one.trouble:
                 return f"The port to {at} cannot be opened ({one.trouble}). Free it."
+            if one.has_other_secret:
+                return f"The box at {at} has another secret: it dances by itself. Copy the file to it."
             if not one.roles.peer_lives(now):
                 return (
                     f"The box at {at} is not heard: each dances by itself. Switch it on; look at the cable, "
                     "and at locked: in both box files."
                 )
-            if one.has_other_secret:
-                return f"The box at {at} has another secret: it dances by itself. Copy the file to it."
             if not one.same_show:
                 return f"The box at {at} has another show or another release: it dances by itself."
         return ""
@@ -86,15 +86,10 @@ class LockedStage(PairedStage):
         self._parts.outputs.may_speak = None
 
     def _look_at_cable(self, now: float) -> None:
-        """The others have receivers of their own."""
+        """A cable that is out stops no other box: each has its own receivers."""
 
 
 def _links(config: LockedConfig) -> list[PairConfig]:
-    ends = (
-        [(config.leader, config.port)]
-        if config.leader
-        else [(one.host, one.port) for one in config.followers]
-    )
     return [
         PairConfig.model_construct(
             role="second" if config.leader else "first",
@@ -104,5 +99,5 @@ def _links(config: LockedConfig) -> list[PairConfig]:
             secret=config.secret,
             silent_ms=_SILENT_MS,
         )
-        for host, port in ends
+        for host, port in config.ends
     ]
