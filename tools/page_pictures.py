@@ -1,8 +1,8 @@
 """docs/pictures/page-*.png, by `python -m tools.page_pictures`: the page on a phone, taken by Chromium.
 
-It starts a box with emulated sensors; `--address` takes the pictures from another one. Figures that depend on
-the load of the machine are replaced (`at_rest`), and its name and folders: the pictures are the same on every
-machine.
+It starts a box with emulated sensors and a projector; `--address` takes the pictures from another one. Figures
+that depend on the load of the machine are replaced (`at_rest`), and its name and folders: the pictures are the
+same on every machine.
 """
 
 from __future__ import annotations
@@ -175,9 +175,14 @@ def _dancing() -> Iterator[tuple[str, str]]:
     with tempfile.TemporaryDirectory() as scratch:
         box = Path(scratch) / "box.yaml"
         box.write_text("outputs: {osc: []}\nconsole: {port: 0}\ncontrol: {port: 0}\nruntime: run\n" + PHONE)
-        command = [sys.executable, "-m", "appliance.cli", "play", "--emulate", "--box", str(box)]
-        command += ["--journal", f"{scratch}/night"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        bunraku = [sys.executable, "-m", "appliance.cli"]
+        command = [*bunraku, "play", "--emulate", "--box", str(box), "--journal", f"{scratch}/night"]
+        with (
+            subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process,
+            subprocess.Popen(
+                [*bunraku, "project", "--box", str(box), "--offscreen", "128x72"], stdout=subprocess.DEVNULL
+            ) as projector,
+        ):
             try:
                 said = iter(process.stdout or ())
                 said_at = (re.search(r"page: (http\S+), PIN (\d+)", line) for line in said)
@@ -185,6 +190,7 @@ def _dancing() -> Iterator[tuple[str, str]]:
                 time.sleep(_LINKED_S)
                 yield address, pin
             finally:
+                projector.terminate()
                 process.terminate()
 
 

@@ -40,11 +40,12 @@ def test_a_fader_is_moved_and_bound_and_forgotten(
     tab: Tab, venue: tuple[Box, Page], bindings: MidiBindings
 ) -> None:
     expect(tab.locator("#figures")).to_contain_text("01:00:10:05 · freewheeling")
-    expect(tab.locator("#figures")).to_contain_text("open until tue 18:00")
+    expect(tab.locator("#figures")).to_contain_text("open until Tue 18:00")
     expect(tab.locator("#figures")).to_contain_text("warming up")
     unlock(tab, venue[1])
     press(tab, '[data-page="box"]')
     expect(tab.locator("#midi-moved")).to_have_text("nanoKONTROL: controller 7, channel 1")
+    expect(tab.locator("#midi-command option")).not_to_have_count(0)
     tab.select_option("#midi-command", "/master")
     tab.fill("#midi-high", "0.8")
     press(tab, "#midi-bind")

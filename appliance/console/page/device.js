@@ -56,10 +56,13 @@ export function withPin(then) {
   else askPin(then);
 }
 
+const LONG = 90; // letters: more are three lines of a phone
+
 export function say(sentence, refused = false) {
   const said = byId("said");
   said.textContent = sentence;
   said.classList.toggle("refused", refused);
+  said.classList.toggle("long", sentence?.length > LONG);
   clearTimeout(silence);
   silence = setTimeout(() => { said.textContent = ""; }, refused ? 8000 : 3000);
 }

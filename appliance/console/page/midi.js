@@ -39,7 +39,7 @@ function take(answer) {
   const chosen = byId("midi-command").value;
   byId("midi-command").replaceChildren(...targets.map(({ address }) => option(address, address)));
   if (targets.some(({ address }) => address === chosen)) byId("midi-command").value = chosen;
-  showNames();
+  if (byId("midi-command").value !== chosen) showNames(); // else what is typed there would be lost
   byId("midi-bindings").replaceChildren(...answer.value.bindings.map((one) => {
     const line = document.createElement("li"), text = document.createElement("span"), button = document.createElement("button");
     text.textContent = `${spoken(one)}: ${one.address} ${one.name}`;

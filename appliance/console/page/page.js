@@ -20,9 +20,10 @@ import { initSensorChanges, showSensorChanges } from "./sensor_changes.js";
 import { showSensors } from "./sensors.js";
 import { initUpdate, readUpdate } from "./update.js";
 import { initVenue } from "./venue.js";
-import { clock, hasWords, loadWords, number, translated, words } from "./words.js";
+import { clock, hasWords, loadWords, locale, number, translated, words } from "./words.js";
 
 const wide = matchMedia("(min-width: 900px)");
+const DAYS = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"]; // as the box says them
 const STILL_PX = 14; // a thumb that scrolls moves farther between touch and release
 
 function show(page) {
@@ -92,7 +93,9 @@ function setText(element, text) {
 
 // Opening hours, and the projectors that they switch.
 function house({ open, next, projectors }) {
-  const said = next ? words(open ? "hours_open" : "hours_closed", { next }) : words("hours_always");
+  const [day, at] = next?.split(" ") ?? [], date = new Date(Date.UTC(2024, 0, 1 + DAYS.indexOf(day))); // a Monday
+  const there = { next: `${date.toLocaleDateString(locale, { weekday: "short", timeZone: "UTC" })} ${at}` };
+  const said = next ? words(open ? "hours_open" : "hours_closed", there) : words("hours_always");
   return [["hours", said], ...projectors.map(({ host, state }) => [`${words("projector_power", { host })}`, words(`power_${state}`)])];
 }
 
