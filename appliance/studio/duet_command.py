@@ -28,7 +28,9 @@ def duet(
     steps: Annotated[int, typer.Option(min=0, help="Training steps, instead of --minutes.")] = 0,
     seconds: Annotated[float, typer.Option(min=10.0, help="Length of each duet.")] = 30.0,
     seed: Annotated[int, typer.Option(help="The same seed gives the same duets.")] = 1,
-    out: Annotated[Path | None, typer.Option(help="The figures as JSON.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The figures as JSON; beside it a PNG of the first couple.")
+    ] = None,
     *,
     reading: ReadingOptions,
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +13,18 @@ from typer.testing import CliRunner
 from appliance.dancer.material.improviser_network import ImproviserNetwork
 from appliance.dancer.material.partner_network import GAP, LED_STEPS, SEEN, PartnerNetwork
 from appliance.pose import quaternion
+from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
 from appliance.studio.commands import app
 from appliance.studio.evaluation.accord import Accord
 from appliance.studio.evaluation.dependence import dependence, likeness, share_led_by_second
-from appliance.studio.partner import training
+from appliance.studio.partner import measure, training
 from appliance.studio.partner.couples import Stretch, moments_of
 from appliance.studio.partner.export import FILE, export_partner
 from appliance.studio.partner.measure import Row, what_is_dead
 from appliance.studio.partner.training import Partner, train
-from tests.bundles import MOVING
+from tests.bundles import FIGURE, MOVING
 from tests.sources import LATENT, write_improviser_network, write_show_with_sources
 from tests.studio.tiny import write_recordings
 
@@ -161,3 +164,34 @@ def test_a_dead_partner_is_told(partner: Row, message: str) -> None:
     copy = Row("a copy 0.5 s later (null)", 0.4, 0.5, 0.0, 0.31)
     stranger = Row("the same beside dancers of other couples (null)", 0.006, 0.0, 0.5, 1.0)
     assert message in what_is_dead([recorded, copy, partner, stranger])
+
+
+def test_the_command_measures_beside_null_products_and_draws(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(measure, "_FOLLOWS", (1.0,))
+    monkeypatch.setattr(measure, "_LEADS", ())
+    takes = tmp_path / "takes"
+    takes.mkdir()
+    moved = [FIGURE.index(name) for name in MOVING]
+    for take, seed in (("a", 1), ("b", 2)):
+        angles = wandering(seed, 700)[:, : len(moved)]
+        for number, poses in enumerate((dance(angles), answering(angles, 10))):
+            whole = np.tile([1.0, 0, 0, 0], (len(angles), len(FIGURE), 1))
+            whole[:, moved] = poses
+            roots = np.tile([0.8 * number, 1.0, 0.0], (len(angles), 1))
+            write_bvh(takes / f"{take}{number}.bvh", Recording(FIGURE, whole, roots, 50.0))
+    (takes / "catalogue.yaml").write_text(
+        'takes: {a: [a0, a1], b: [b0, b1]}\nheld_out: [b0]\nkeep: {"*": all}\n'
+    )
+    show, out = write_show_with_sources(tmp_path / "show"), tmp_path / "duet.json"
+    options = ["--show", str(show), "--seconds", "10", "--out", str(out)]
+    result = CliRunner().invoke(app, ["duet", str(takes), *options])
+    assert result.exit_code == 0, result.output
+    rows = {row["name"]: row for row in json.loads(out.read_text())}
+    assert list(rows) == ["recorded couples", "a copy 0.5 s later (null)", "follow 1, lead 0"]
+    assert rows["recorded couples"]["accord"] > 0.2 > abs(rows["follow 1, lead 0"]["accord"])
+    likenesses = [row["likeness"] for row in rows.values()]
+    assert likenesses[1] < min(likenesses[0], likenesses[2]), "a copy is told from those that answer"
+    assert "The partner dances in accord" in result.output
+    assert out.with_suffix(".png").read_bytes()[:4] == b"\x89PNG"

@@ -53,11 +53,17 @@ class Moments(NamedTuple):
 
 
 def couples_of(takes: Sequence[Take]) -> dict[str, tuple[Take, Take]]:
-    """Both recordings of each take that has two."""
+    """Both recordings of each take that has two, from their beginnings on, as long as the shorter one."""
     found: dict[str, list[Take]] = {}
     for take in takes:
         found.setdefault(take.take, []).append(take)
-    return {name: (both[0], both[1]) for name, both in found.items() if len(both) == 2}
+    couples = {}
+    for name, both in found.items():
+        if len(both) == 2:
+            least = min(len(one.recording) for one in both)
+            first, second = (one if len(one.recording) == least else one.part(0, least) for one in both)
+            couples[name] = first, second
+    return couples
 
 
 def stretches_of(network: ImproviserNetwork, dataset: Dataset, takes: Sequence[Take]) -> list[Stretch]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +14,15 @@ from rich.table import Table
 from appliance.dancer.material.improviser_network import ImproviserNetwork
 from appliance.dancer.material.motion_network import MotionNetworkError
 from appliance.dancer.material.partner_network import PartnerNetwork
+from appliance.pictures.filmstrip import draw_rows
+from appliance.pictures.filmstrip_stage import SLATE
+from appliance.pictures.filmstrip_stage import Row as Strip
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.show.show import Show, load_show
-from appliance.studio.data.dataset import Dataset, Take, load_folder
+from appliance.studio.data.dataset import FPS, Dataset, Take, load_folder
 from appliance.studio.data.jumps import runs
 from appliance.studio.data.mirror import mirror_pairs
 from appliance.studio.evaluation.accord import Accord
@@ -38,6 +41,7 @@ FOLLOWS_NAME, STRANGERS_NAME = "follow 1, lead 0", "the same beside dancers of o
 COPY_NAME = f"a copy {COPY_LATE / 50:g} s later (null)"
 STANDS = 0.3  # fraction of a dancer's energy
 LISTENS, LEAST_DEPENDENCE = 2.0, 0.005  # times a stranger's dependence, and above it
+DRAWN, COLUMNS = (1.0, 0.5, 0.0), 8  # values of follow that have a strip; figures in it
 MANY = 8  # couples, two of which say which networks are best
 _FOLLOWS, _LEADS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.25, 0.5, 0.75, 1.0)
 Pairs = Sequence[tuple[Take, Take]]
@@ -92,10 +96,16 @@ def run(options: DuetOptions, device: str = "cpu") -> list[Row]:
         partner = PartnerNetwork(show.directory / FILE, show.skeleton.names)
     except (MotionNetworkError, OSError) as error:
         raise StudioError(f"{show.directory / FILE}: {error} Train one: --minutes 5.") from None
-    rows = list(_rows(network, partner, dataset, apart, options, console.print))
+    duets = {"recorded": (apart[0][0].recording, apart[0][1].recording)}
+    rows = list(_rows(network, partner, dataset, apart, options, console.print, duets))
     _print(rows)
     if options.out is not None:
         options.out.write_text(json.dumps([row.__dict__ for row in rows], indent=1))
+        console.print("draws the first couple")
+        draw_duets(options.out.with_suffix(".png"), duets, options.seconds)
+        console.print(
+            f"{options.out} has the figures, {options.out.with_suffix('.png').name} the first couple."
+        )
     return rows
 
 
@@ -145,7 +155,9 @@ def _rows(
     apart: Pairs,
     options: DuetOptions,
     told: Callable[[str], None],
+    danced: dict[str, tuple[Recording, Recording]],
 ) -> Iterator[Row]:
+    """danced: takes the first couple's duets by their names."""
     joints, moving = dataset.moving_names, list(dataset.moving)
     counterparts = mirror_pairs(dataset.skeleton)
     pairs = [moving.index(counterparts[joint]) for joint in moving]
@@ -207,13 +219,30 @@ def _rows(
             for led, own in couples
         ]
         seen = [(_seen(one, moving)[LEAD_IN:], _seen(two, moving)[LEAD_IN:]) for one, two in duets]
-        yield row(f"follow {follow:g}, lead {lead:g}", seen, [own for _, own in couples])
+        name = f"follow {follow:g}, lead {lead:g}"
+        if follow in DRAWN and not lead:
+            danced[name] = duets[0]
+        yield row(name, seen, [own for _, own in couples])
         if (follow, lead) == (1.0, 0.0) and len(apart) > 1:
             wrong = seen[2:] + seen[:2]
             yield row(
                 STRANGERS_NAME,
                 [(other[0], own[1]) for other, own in zip(wrong, seen, strict=True)],
             )
+
+
+def draw_duets(path: Path, duets: Mapping[str, tuple[Recording, Recording]], seconds: float) -> None:
+    """A strip of each duet, its first dancer behind, over the seconds in which the second one answers."""
+    chosen = np.linspace(LEAD_IN, LEAD_IN + seconds * FPS - 1, COLUMNS).round().astype(int)
+    rows = []
+    for name, (first, second) in duets.items():
+        at = np.minimum(chosen, min(len(first), len(second)) - 1)
+        rows.append(
+            Strip(
+                second.poses, second.roots, at, name, behind=Strip(first.poses, first.roots, at, colour=SLATE)
+            )
+        )
+    draw_rows(path, second.skeleton, rows, FPS, path.stem, "")
 
 
 def _unknown(first: Array, second: Array) -> float:
@@ -285,7 +314,7 @@ def what_is_dead(rows: Sequence[Row]) -> str:
     if partner.dependence < max(LISTENS * strangers[0], strangers[0] + LEAST_DEPENDENCE):
         return (
             "The partner does not listen: it depends on the other dancer hardly more than on a stranger. "
-            "Train it longer, or on more couples."
+            "Measure longer duets (--seconds) to be sure, or train it longer or on more couples."
         )
     return "The partner answers: it moves, it does not copy, and it depends on the other dancer."
 
