@@ -73,16 +73,13 @@ class FinalPass:
 
     def __init__(self, gl: moderngl.Context, config: ProjectorConfig) -> None:
         self._gl, self._config = gl, config
-        fixed = ["GAMMA"] * (config.gamma != 1.0) + ["BLEND"] * (config.edge_blend is not None)
-        self._is_graded = False  # whether the picture has its brightness and gamma already
-        self._unchanged, self._dimmed, self._marked = (
-            Drawing(gl, "final", "final", parts=parts)
-            for parts in ([], [*fixed, "DIM"], [*fixed, "DIM", "MARKS"])
+        self._levels = (
+            *("GAMMA",) * (config.gamma != 1.0),
+            *("BLEND",) * (config.edge_blend is not None),
+            "DIM",
         )
-        self._warped_parts = [*fixed, "DIM", "MARKS", "WARP"]
-        self._warped: Drawing | None = None  # few walls need it
-        edges = ["MARKS", "BLEND", "EDGES"]
-        self._edges = None if config.edge_blend is None else Drawing(gl, "final", "final", parts=edges)
+        self._drawings: dict[tuple[str, ...], Drawing] = {}
+        self._is_graded = False  # whether the picture has its brightness and gamma already
         self._is_unblended = False  # whether a look's picture on the display still needs its edges
         self._offsets = gl.texture((FINE, FINE), 4, dtype="f2")
         self._offsets.repeat_x = self._offsets.repeat_y = False
@@ -113,8 +110,8 @@ class FinalPass:
         has_marks = bool(lines) or controls.shows_grid or bool(controls.alignment.warp)
         whole = picture_size(self._config, display, controls.alignment.overlap)
         self._is_graded = not has_marks
-        self._is_unblended = self._edges is not None and not has_marks
-        if self._edges is not None and detail == DETAILS[0]:
+        self._is_unblended = self._config.edge_blend is not None and not has_marks
+        if self._config.edge_blend is not None and detail == DETAILS[0]:
             detail = _COARSE_WIDE
         if self._is_graded and size == whole and (self._config.picture or display) == display:
             self.resize(_NO_SIZE)
@@ -164,24 +161,23 @@ class FinalPass:
         if has_marks:
             inputs |= self._place(display, controls) | self._mark(lines, display, controls)
             if warp:
-                self._warped = self._warped or Drawing(self._gl, "final", "final", parts=self._warped_parts)
-                self._warped.draw(inputs | {"offsets": self._fine_offsets(warp)})
-            else:
-                self._marked.draw(inputs)
+                inputs["offsets"] = self._fine_offsets(warp)
+            self._drawing(*self._levels, "MARKS", *("WARP",) * bool(warp)).draw(inputs)
         else:
             inputs["clip_from_part"] = self._clip_from_part(controls)
-            drawing = self._unchanged if self._is_graded else self._dimmed
-            drawing.draw(inputs, moderngl.TRIANGLE_STRIP, 4)
+            levels = () if self._is_graded else self._levels
+            self._drawing(*levels).draw(inputs, moderngl.TRIANGLE_STRIP, 4)
 
     def darken(self, screen: moderngl.Framebuffer, display: Size, controls: Controls) -> None:
         """Blend the edges if a look laid its picture onto the display; darken what the box file's masks
         cover. The very last step of a picture."""
-        if self._is_unblended and self._edges is not None:
+        if self._is_unblended:
             self._gl.enable_only(moderngl.BLEND)
             self._gl.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
             screen.use()
             screen.viewport = (0, 0, *display)
-            self._edges.draw(self._place(display, controls) | self._blend(controls))
+            edges = self._drawing("MARKS", "BLEND", "EDGES")
+            edges.draw(self._place(display, controls) | self._blend(controls))
         self._masks.draw(screen, display, self._flips(controls), controls.shows_grid)
 
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
@@ -193,11 +189,14 @@ class FinalPass:
     def release(self) -> None:
         """Give the GPU's memory back."""
         self._release_picture()
-        for owned in (self._masks, self._text, self._offsets, self._unchanged, self._dimmed, self._marked):
+        for owned in (self._masks, self._text, self._offsets, *self._drawings.values()):
             owned.release()
-        for made in (self._warped, self._edges):
-            if made is not None:
-                made.release()
+
+    def _drawing(self, *parts: str) -> Drawing:
+        """Made when it is first needed: a wall without marks needs one of them, or none."""
+        if parts not in self._drawings:
+            self._drawings[parts] = Drawing(self._gl, "final", "final", parts=parts)
+        return self._drawings[parts]
 
     def _fine_offsets(self, warp: Warp) -> moderngl.Texture:
         """The warp between its points too, as a texture of shares of the display."""
