@@ -189,8 +189,9 @@ class FinalPass:
     def release(self) -> None:
         """Give the GPU's memory back."""
         self._release_picture()
-        for owned in (self._masks, self._text, self._offsets, *self._drawings.values()):
-            owned.release()
+        owned: tuple[Any, ...] = self._masks, self._text, self._offsets, *self._drawings.values()
+        for one in owned:
+            one.release()
 
     def _drawing(self, *parts: str) -> Drawing:
         """Made when it is first needed: a wall without marks needs one of them, or none."""
