@@ -96,8 +96,20 @@ def test_what_reaches_the_bar_is_offered(tmp_path: Path, monkeypatch: pytest.Mon
     assert told["state"] == "learned" and "reaches the bar" in told["message"]
     assert all(one["holds"] for one in told["figures"]) and box.learning.wanted() is None
     train, check = box.begun()
-    assert train[:1] == ["train"] and train[train.index("--minutes") + 1] == "45"
+    assert train[:1] == ["train"] and train[train.index("--minutes") + 1] == "52.5"
+    assert "--from" not in train
     assert check == ["check", str(box.learning.show)]
+
+
+def test_a_short_time_leaves_a_quarter_for_the_rest_and_the_show_that_it_begins_with_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = Box(tmp_path, monkeypatch, report_of("default", tmp_path))
+    begin(box.learning, Wanted("takes", 12.0, "martial"))
+    box.let_end()
+    assert box.run() == 0
+    train = box.begun()[0]
+    assert train[train.index("--minutes") + 1] == "9" and train[train.index("--from") + 1] == "martial"
 
 
 @pytest.mark.parametrize(
