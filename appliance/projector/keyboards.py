@@ -16,9 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 DEVICES = Path("/dev/input")
-_EVENT = struct.Struct(
-    "@llHHi"
-)  # linux/input.h, struct input_event: seconds, microseconds, type, code, value
+# linux/input.h, struct input_event: seconds, microseconds, type, code, value.
+_EVENT = struct.Struct("@llHHi")
 _EV_KEY = 0x01
 _EVIOCGBIT_KEY = 2 << 30 | 96 << 16 | ord("E") << 8 | 0x20 + _EV_KEY  # which keys it has, 96 bytes of bits
 _RELEASED = 0
@@ -27,7 +26,7 @@ _SHIFTS = (42, 54)
 _NAMES = (
     {1: "Escape", 15: "Tab", 103: "Up", 105: "Left", 106: "Right", 108: "Down"}
     | {2: "1", 3: "2", 4: "3", 5: "4", 12: "-", 13: "=", 74: "Keypad -", 78: "Keypad +"}
-    | {16: "Q", 19: "R", 23: "I", 33: "F", 34: "G", 35: "H", 46: "C", 50: "M"}
+    | {16: "Q", 19: "R", 20: "T", 23: "I", 33: "F", 34: "G", 35: "H", 46: "C", 50: "M"}
 )
 _REFUSED_S = 0.5  # udev grants access to a new device some time after the kernel has made it
 _SETTLED_S = 1.0  # after a change, look once more: a folder's time stamp is as coarse as the kernel's tick

@@ -12,6 +12,7 @@ import pytest
 
 from appliance.projector import keyboards as module
 from appliance.projector.keyboards import Key, Keyboards
+from appliance.projector.keys import HELP
 from tests.show_control.doubles import Clock
 
 Q, C, LEFT, SHIFT, A = 16, 46, 105, 42, 30
@@ -181,3 +182,10 @@ def test_a_pipe_is_no_keyboard(devices: Path, monkeypatch: pytest.MonkeyPatch) -
     plugged(devices)
     keyboards = Keyboards(devices)
     assert list(keyboards.pressed()) == [] and not keyboards.is_refused
+
+
+def test_each_key_of_the_list_is_known_without_a_desktop() -> None:
+    """The list that `h` prints; + is the key = with Shift, and there is one on the keypad."""
+    listed = {word for line in HELP.splitlines() for word in line[:12].split()} - {"arrows", "+", "Esc"}
+    names = {name.upper() if len(name) == 1 else name for name in listed}
+    assert names | {"Left", "Right", "Up", "Down", "=", "Keypad +", "Escape"} <= set(module._NAMES.values())
