@@ -157,6 +157,14 @@ def _back_and_chest(anatomy: Anatomy) -> list[Step]:
         Ball(owner(0.2), at(0.17, 0.0, 0.030), height * np.array([0.045, 0.060, 0.026]),
              np.array([across, _UP, ahead]), 0.03 * height)
     )  # fmt: skip
+    for trunk, first in anatomy.limbs():
+        chain = anatomy.chain(first)
+        if not _is_leg(anatomy, chain, _extremity(anatomy, chain)):  # from the nape to the shoulder
+            start = anatomy.positions[chain[anatomy.limb_start(chain)]]
+            aside = float((start - anatomy.positions[trunk]) @ across) * across
+            nape = start - aside + height * (0.046 * _UP - 0.004 * ahead)
+            ends, radii = (nape, start - 0.2 * aside), (0.012 * height, 0.016 * height)
+            steps.append(Slab(trunk, *ends, *radii, 0.03 * height, across))
     return steps
 
 
@@ -264,12 +272,12 @@ _UPPER_ARM = _Flesh(
         (0.18, 0.000, 0.001, 0.0260, 0.0270),
         (0.40, 0.001, 0.000, 0.0240, 0.0270),
         (0.62, 0.001, 0.000, 0.0220, 0.0265),
-        (0.84, 0.000, 0.000, 0.0210, 0.0220),
+        (0.84, -0.001, 0.000, 0.0210, 0.0208),
         (1.00, 0.000, 0.000, 0.0220, 0.0195),
     ),
     (
         ((0.05, 0.000, 0.006, 0.0250), (0.36, 0.000, 0.006, 0.0160), 0.014),  # shoulder muscle
-        ((0.38, 0.011, 0.000, 0.0160), (0.66, 0.010, 0.000, 0.0160), 0.020),  # biceps
+        ((0.36, 0.011, 0.000, 0.0160), (0.60, 0.010, 0.000, 0.0150), 0.020),  # biceps
         ((0.26, -0.012, 0.002, 0.0170), (0.56, -0.011, 0.001, 0.0150), 0.020),  # triceps
         ((0.97, -0.010, 0.000, 0.0120), (1.01, -0.010, 0.000, 0.0115), 0.012),  # elbow
     ),
@@ -277,7 +285,7 @@ _UPPER_ARM = _Flesh(
 _FOREARM = _Flesh(
     (
         (0.00, 0.000, 0.000, 0.0220, 0.0195),
-        (0.12, 0.002, 0.000, 0.0240, 0.0225),
+        (0.12, -0.001, 0.000, 0.0235, 0.0205),
         (0.26, 0.003, 0.000, 0.0240, 0.0240),
         (0.48, 0.002, 0.000, 0.0205, 0.0215),
         (0.70, 0.001, 0.000, 0.0160, 0.0180),
@@ -285,7 +293,7 @@ _FOREARM = _Flesh(
         (1.00, 0.000, 0.000, 0.0130, 0.0178),
     ),
     (
-        ((0.04, 0.009, 0.008, 0.0130), (0.38, 0.009, 0.004, 0.0120), 0.018),
+        ((0.10, 0.006, 0.009, 0.0130), (0.38, 0.008, 0.004, 0.0120), 0.018),
         ((0.10, 0.003, -0.010, 0.0130), (0.40, 0.003, -0.007, 0.0120), 0.018),
     ),
 )
@@ -372,7 +380,6 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
     inner = start - 0.85 * abs(away) * out
     notch = inner + height * (0.040 * ahead + 0.002 * _UP)
     top = start + height * (0.020 * _UP + 0.012 * ahead - 0.012 * out)
-    nape = start - abs(away) * out + height * (0.046 * _UP - 0.004 * ahead)
     flank = start - height * (0.150 * _UP - 0.014 * ahead) - 0.30 * abs(away) * out
     breast = start - 0.55 * abs(away) * out + height * (0.034 * ahead - 0.036 * _UP)
     blade = start - 0.45 * abs(away) * out - height * (0.022 * ahead + 0.012 * _UP)
@@ -380,9 +387,6 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
     across = anatomy.across
     return [
         Slab(owner, inner, start, 0.026 * height, thick, 0.012 * height, across),
-        Slab(
-            trunk, nape, start - 0.2 * abs(away) * out, 0.012 * height, 0.016 * height, 0.03 * height, across
-        ),
         Slab(owner, notch, top, 0.0090 * height, 0.0100 * height, 0.007 * height, across),  # collarbone
         Slab(trunk, breast, start, 0.024 * height, 0.022 * height, 0.020 * height, across),  # chest muscle
         Slab(

@@ -28,7 +28,7 @@ void main() {
 #ifdef BRUSH
     pressed = 0.0;
     for (int i = 0; i < 4; i++) pressed += in_weights[i] * texelFetch(led, ivec2(int(in_joints[i]), 0), 0).r;
-    place += normal * swell * (pressed - 0.4);
+    place += normal * swell * (max(pressed, 0.25) - 0.4);  // fingers and toes stay whole
 #endif
     mark = held_at(in_joints, in_weights);
     open = 2.0 * in_normal.w - 1.0;

@@ -21,7 +21,7 @@ void main() {
     float full = mix(1.0, 0.66 + 0.45 * outline + 0.35 * (wash - 0.5) + 0.25 * (1.0 - open), hollow);
 #ifdef BRUSH
     vec2 hairs = abs(skin.x) > 0.12 ? vec2(0.5 * skin.x, 5.0 * skin.y + 3.0 * skin.z) : vec2(0.5 * skin.y, 5.0 * skin.x + 3.0 * skin.z);
-    full *= mix(0.30 + 1.1 * smoothstep(0.35, 0.65, texture(noise, hairs).b), 1.0, pressed);
+    full *= mix(0.62 + 0.78 * smoothstep(0.35, 0.65, texture(noise, hairs).b), 1.0, pressed);
 #endif
     colour = vec4(vec3(level * full), mark * level * full);
 }
