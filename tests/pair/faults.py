@@ -162,7 +162,7 @@ def _jump(poses: list[Any], lost: int) -> float:
         for place, ((before, _), (after, _)) in enumerate(itertools.pairwise(track)):
             if before != after:
                 near = max([0.0, *turns[max(0, place - 1) : place], *turns[place + 1 : place + 2]])
-                worst = max(worst, turns[place] - (1 + lost) * near)
+                worst = max(worst, turns[place] - (1 + min(lost, 2)) * near)
     return worst
 
 
