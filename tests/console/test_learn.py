@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,14 @@ def kept(venue: tuple[Box, Page]) -> Path:
     (folder / RECORDINGS / "mine").mkdir(parents=True, exist_ok=True)
     write_bvh(folder / RECORDINGS / "mine" / "sway.bvh", swaying_phrase())
     return folder
+
+
+@pytest.fixture(autouse=True)
+def nothing_stays(venue: tuple[Box, Page]) -> Iterator[None]:
+    """What was uploaded is gone before the next test."""
+    yield
+    for folder in (kept_of(venue[0]) / RECORDINGS).glob("uploaded-*"):
+        shutil.rmtree(folder)
 
 
 @ON_BOTH
@@ -81,7 +90,6 @@ def test_recordings_from_the_browser_are_learned_from_another_show(
     wait_until(lambda: learning.wanted() is not None)
     assert learning.wanted() == Wanted(str(folder), 60.0, "martial")
     press(tab, "#learn-end")
-    shutil.rmtree(folder)
 
 
 def test_what_is_uploaded_is_bounded_and_a_recording(venue: tuple[Box, Page], kept: Path) -> None:

@@ -8,7 +8,7 @@ import { sent } from "./update.js";
 import { number, translated, words } from "./words.js";
 
 const LOOK_MS = 2000, LISTED_WITHIN_MS = 20_000, ADOPTED_WITHIN_MS = 120_000;
-let timer = 0, chosen = "", isRead = false;
+let timer = 0, chosen = "", isRead = false, reads = 0;
 
 export function initLearn() {
   byId("learn-open").addEventListener("click", () => withPin(read));
@@ -37,7 +37,9 @@ export function leaveLearn() {
 async function read() {
   clearTimeout(timer);
   isRead = true;
+  const own = ++reads;
   const answer = await request("/api/learn", undefined, LISTED_WITHIN_MS);
+  if (own !== reads) return undefined;  // an older list would undo a choice among the newer one
   if (answer.status !== 200) return say(translated(answer.message) || words("no_page"));
   const { studio, recordings, shows, journal, runs, progress, can_dance: canDance, show } = answer.value;
   byId("learn-part").hidden = false;
