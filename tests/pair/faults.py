@@ -151,7 +151,8 @@ def _overlap(arrivals: list[tuple[float, str]]) -> float:
 
 def _jump(poses: list[Any], lost: int) -> float:
     """Largest turn of a joint from the last frame of the one box to the first of the other, degrees, beyond
-    its turn in the frame before or after, whichever is larger, for each frame that has passed.
+    its largest turn in the three frames before and after (one of them may be late, so a repeat), for each
+    frame that has passed.
     """
     tracks: dict[str, list[tuple[str, Any]]] = defaultdict(list)
     for _, box, address, quaternion in poses:
@@ -161,8 +162,8 @@ def _jump(poses: list[Any], lost: int) -> float:
         turns = [_turn(a, b) for (_, a), (_, b) in itertools.pairwise(track)]
         for place, ((before, _), (after, _)) in enumerate(itertools.pairwise(track)):
             if before != after:
-                near = max([0.0, *turns[max(0, place - 1) : place], *turns[place + 1 : place + 2]])
-                worst = max(worst, turns[place] - (1 + min(lost, 2)) * near)
+                near = max([0.0, *turns[max(0, place - 3) : place], *turns[place + 1 : place + 4]])
+                worst = max(worst, turns[place] - (1 + min(lost, 5)) * near)
     return worst
 
 
