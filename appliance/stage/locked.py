@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from pathlib import Path
+from typing import Any
 
 from appliance.box.clock import TickClock
-from appliance.dancer.loop import Loop
 from appliance.pair.locked import Followers, LockedPair
+from appliance.pair.pair import Pair
 from appliance.pair.roles import Role
-from appliance.recorder.record import facts_of_run
-from appliance.show.box import OutputsConfig
 from appliance.show.locked import LockedConfig
 from appliance.show.pair import PairConfig
-from appliance.show.show import Show
-from appliance.stage.paired import PairedStage, fingerprint_of, settings_of
-from appliance.stage.reconcile import Reconciler
-from appliance.stage.sensor_fit import SensorFit
-from appliance.stage.stage_parts import StageParts
-from appliance.stage.tick import Tick
+from appliance.stage.paired import PairedStage, settings_of
 
 _SILENT_MS = 200.0  # then a box that follows dances by itself
 
@@ -27,27 +18,16 @@ _SILENT_MS = 200.0  # then a box that follows dances by itself
 class LockedStage(PairedStage):
     """As a pair's, but every box speaks to its own receivers, and the same one always leads."""
 
-    def __init__(
-        self,
-        config: LockedConfig,
-        outputs: OutputsConfig,
-        show: Show,
-        parts: StageParts,
-        wearing: SensorFit,
-        tick: Tick,
-        reconciler: Reconciler,
-        folder: Path,
-        say: Callable[[str], None],
-        made: Callable[[str], Loop] | None = None,
-    ) -> None:
-        links = _links(config)
-        super().__init__(links[0], outputs, show, parts, wearing, tick, reconciler, folder, say, made)
-        self.pair.close()  # its roles change, and there may be others
-        settings, now, leads = [settings_of(one) for one in links], time.monotonic(), config.leader is None
-        fingerprint = fingerprint_of(show, facts_of_run(show, list(parts.worn)))
-        self.pair = (
-            Followers(settings, fingerprint, now) if leads else LockedPair(settings[0], fingerprint, now)
-        )
+    def __init__(self, config: LockedConfig, *rest: Any) -> None:
+        """rest: as a pair's."""
+        self._links = _links(config)
+        super().__init__(self._links[0], *rest)
+
+    def _open(self, fingerprint: bytes, now: float) -> Pair:
+        settings = [settings_of(one) for one in self._links]
+        if settings[0].is_first:
+            return Followers(settings, fingerprint, now)
+        return LockedPair(settings[0], fingerprint, now)
 
     def begin(self, now: float) -> None:
         """The box is ready to hear the others."""

@@ -100,7 +100,7 @@ class PairedStage:
         facts = facts_of_run(show, list(parts.worn))
         self._layout = layout_of(facts)
         self._settings = settings_of(config)
-        self.pair = Pair(self._settings, fingerprint_of(show, facts), time.monotonic())
+        self.pair = self._open(fingerprint_of(show, facts), time.monotonic())
         self._parts, self._tick, self._wearing, self._reconciler = parts, tick, wearing, reconciler
         self._say = say
         self._rerun = Rerun(tick, wearing, facts["sensors"])
@@ -125,6 +125,9 @@ class PairedStage:
         self._looked_at = self._beat_at = 0.0
         self.resyncs = 0
         self._hear_leader()
+
+    def _open(self, fingerprint: bytes, now: float) -> Pair:
+        return Pair(self._settings, fingerprint, now)
 
     @property
     def leads(self) -> bool:

@@ -248,7 +248,7 @@ class PairedBox(Process):
     def signal(self, number: int) -> None:
         """To all its processes: power, or a machine that hangs."""
         everyone = [self.process.pid, *_descendants(self.process.pid)]
-        with _at_once():
+        with before_others():
             for pid in everyone:
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, number)
@@ -260,7 +260,7 @@ class PairedBox(Process):
 
 
 @contextlib.contextmanager
-def _at_once() -> Iterator[None]:
+def before_others() -> Iterator[None]:
     """No other program runs between two steps of this thread."""
     with contextlib.suppress(PermissionError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(85))

@@ -5,13 +5,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -23,7 +20,7 @@ import pytest
 
 from appliance.outputs.frame_reader import FrameReader
 from tests.bundles import write_show
-from tests.pair.hall import AHEAD_S, FIRST, SECOND, Hall
+from tests.pair.hall import AHEAD_S, FIRST, SECOND, Hall, before_others
 from tests.system.namespace import why_not
 
 pytestmark = pytest.mark.skipif(bool(missing := why_not()), reason=str(missing))
@@ -69,7 +66,7 @@ def measured(folder: Path, seconds: float, paired: bool) -> Apart:
 def _watched(hall: Hall, seconds: float) -> Apart:
     came: dict[str, dict[int, tuple[float, bytes]]] = {FIRST: {}, SECOND: {}}
     newest, frames = dict.fromkeys((FIRST, SECOND), -1), Counter[int]()
-    with ExitStack() as opened, _before_others():
+    with ExitStack() as opened, before_others():
         readers = {
             one: FrameReader(hall.boxes[one].runtime, partial(_clock_of, one)) for one in (FIRST, SECOND)
         }
@@ -93,17 +90,6 @@ def _watched(hall: Hall, seconds: float) -> Apart:
 
 def _clock_of(box: str) -> float:
     return time.monotonic() + AHEAD_S[box]
-
-
-@contextlib.contextmanager
-def _before_others() -> Iterator[None]:
-    """What comes is noted in time."""
-    with contextlib.suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(85))
-    try:
-        yield
-    finally:
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def test_a_pair_shows_one_dance_at_most_a_frame_apart(tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ The null: three boxes that know nothing of each other. `python -m tests.pair.tes
 from __future__ import annotations
 
 import contextlib
-import os
 import sys
 import tempfile
 import time
@@ -24,7 +23,7 @@ from appliance.show.config_error import ConfigError
 from hw_sim.osc_receiver import decode
 from hw_sim.peers import free_ports
 from tests.bundles import write_show
-from tests.pair.hall import KEY
+from tests.pair.hall import KEY, before_others
 from tests.show_control.doubles import Asker
 from tests.system.box import Box, playing
 from tests.system.processes import run_bunraku, wait_until
@@ -83,7 +82,7 @@ def measured(boxes: Sequence[Box], seconds: float) -> InStep:
     came: list[list[tuple[float, bytes]]] = [[] for _ in boxes]
     for box in boxes:
         box.pause()
-    with _before_others():
+    with before_others():
         ends_at = time.monotonic() + seconds
         while time.monotonic() < ends_at:
             for box, own in zip(boxes, came, strict=True):
@@ -109,17 +108,6 @@ def _frames(came: Sequence[tuple[float, bytes]]) -> Iterator[tuple[int, tuple[fl
             tick, arrival, is_late = words[0], at, words[3]
         elif data.startswith(b"/mocap/0/joint/rot_local") and tick >= 0 and not is_late:
             yield tick, (arrival, data)
-
-
-@contextlib.contextmanager
-def _before_others() -> Iterator[None]:
-    """What comes is noted in time."""
-    with contextlib.suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(85))
-    try:
-        yield
-    finally:
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def test_three_boxes_are_in_step_and_one_command_moves_them_all(tmp_path: Path) -> None:
