@@ -78,6 +78,9 @@ def test_nothing_moves_when_fallbacks_come_and_go(tab: Tab, language: str) -> No
     say(tab, several)
     for about in ("left-wrist", "10.0.0.9:9004"):
         expect(tab.locator("#fallbacks-now")).to_contain_text(about)
+    say(tab, [{**fell("pair-taken"), "message": "Look; `bunraku pair back` gives the lead."}])
+    expect(tab.locator("#fallbacks-now")).to_contain_text("bunraku pair back")
+    expect(tab.locator("#fallbacks-now")).not_to_contain_text("`")
 
 
 @ON_BOTH

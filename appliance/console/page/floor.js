@@ -61,6 +61,7 @@ function draw() {
     ink.fillRect(across(metres), 0, ratio, size);
     ink.fillRect(0, across(metres), size, ratio);
   }
+  /** @param {number[]} at @param {number} radius @param {string} colour */
   const dot = ([x, z], radius, colour) => {
     ink.fillStyle = colour;
     ink.beginPath();

@@ -20,7 +20,7 @@ import { initSensorChanges, showSensorChanges } from "./sensor_changes.js";
 import { showSensors } from "./sensors.js";
 import { initUpdate, readUpdate } from "./update.js";
 import { initVenue } from "./venue.js";
-import { clock, hasWords, loadWords, locale, number, translated, words } from "./words.js";
+import { clock, hasWords, loadWords, locale, number, quoted, translated, words } from "./words.js";
 
 const wide = matchMedia("(min-width: 900px)");
 const DAYS = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"]; // as the box says them
@@ -79,8 +79,8 @@ function verdict() {
 // In the reader's language, and always by the name of the sensor, receiver, wire or disk that it is about. The box
 // says it in English; other languages have a sentence for each fallback.
 function spoken({ name, about, message: said }) {
-  if (about && hasWords(`named_${name}`)) return words(`named_${name}`, { about });
-  const sentence = hasWords(`fallback_${name}`) ? words(`fallback_${name}`) : translated(said ?? "");
+  if (about && hasWords(`named_${name}`)) return quoted(words(`named_${name}`, { about }));
+  const sentence = hasWords(`fallback_${name}`) ? quoted(words(`fallback_${name}`)) : translated(said ?? "");
   return about && !sentence.includes(about) ? `${about}: ${sentence}` : sentence;
 }
 

@@ -27,6 +27,7 @@ const POINT = {
   remember: (place) => note({ place, pull: pulls[place] ?? [0, 0] }),
 };
 // With edge blend: a step of each value, and how it is said.
+/** @type {Record<string, [number, (value: number) => string]>} */
 const BLEND = {
   overlap: [0.002, (value) => `${(100 * value).toFixed(1)} %`],
   blend_gamma: [0.05, (value) => value.toFixed(2)],
@@ -114,6 +115,7 @@ async function undo() {
   tellUndo();
 }
 
+/** @param {number[]} at @param {number[]} from */
 function away([x, y], [fromX, fromY] = [0, 0]) { return [x - fromX, y - fromY]; }
 
 // The whole pad is what the projector can light; the handles stay inside of it.
@@ -154,6 +156,7 @@ function lay(warp) {
   for (const place of INNER) layPoint(place, meshPoint(place));
 }
 
+/** @param {number} place @param {number[]} at */
 function layPoint(place, [x, y]) {
   const button = byId("corners").querySelector(`[data-point="${place}"]`);
   if (!button) return;
@@ -163,7 +166,7 @@ function layPoint(place, [x, y]) {
 
 // A value between two buttons, each press one fine step.
 function stepper(id) {
-  const [step, say] = BLEND[id], row = document.createElement("div"), what = document.createElement("span");
+  const [step, format] = BLEND[id], row = document.createElement("div"), what = document.createElement("span");
   const value = document.createElement("b"), to = (sign) => {
     const button = document.createElement("button");
     button.type = "button";
@@ -174,7 +177,7 @@ function stepper(id) {
       if (!await command(`/projector/${id}`, wanted)) return;
       ownUntil = performance.now() + OWN_MS;
       wall[id] = wanted;
-      value.textContent = say(wanted);
+      value.textContent = format(wanted);
     });
     return button;
   };

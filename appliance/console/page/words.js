@@ -24,7 +24,12 @@ export const hasWords = (key) => key in own;
 
 // A sentence of the box in the reader's language. The box speaks English; /words/sentences/LANGUAGE.json has its
 // sentences with the parts that change in braces, as in the source. Without a translation it stays English.
-export function translated(said) {
+export const translated = (said) => quoted(inOwnLanguage(said));
+
+// Commands and names, which the box writes between backquotes.
+export const quoted = (said) => said && said.replace(/`([^`]+)`/g, (_, text) => words("quoted", { text }));
+
+function inOwnLanguage(said) {
   if (!said || patterns.length === 0) return said;
   const whole = matched(said);
   if (whole !== null) return whole;
@@ -42,7 +47,7 @@ function matched(said) {
     const found = pattern.exec(said);
     if (found) return sentence.replace(/\{(\w+)\}/g, (_, name) => {
       const part = found[names.indexOf(name) + 1] ?? "";
-      return part === said ? part : translated(part);
+      return part === said ? part : inOwnLanguage(part);
     });
   }
   return null;
