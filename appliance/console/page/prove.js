@@ -111,11 +111,11 @@ function drawLive() {
 }
 
 async function over() {
-  const { kept, trouble } = measured;
+  const { saved, trouble } = measured;
   running(null);
   await showProve();
-  if (trouble || !kept) tell(translated(trouble) || words("prove_broken"));
-  else await open(kept);
+  if (trouble || !saved) tell(translated(trouble) || words("prove_broken"));
+  else await open(saved);
 }
 
 function running(wanted) {
