@@ -48,7 +48,7 @@ class Change(NamedTuple):
         return text
 
 
-def told(box: Path | None, chosen: Path | None) -> dict[str, Any]:
+def reported(box: Path | None, chosen: Path | None) -> dict[str, Any]:
     """For JSON: the file's text, its venue's keys, whether it can be changed and when that counts."""
     place = _place(box, chosen)
     if place is None:
@@ -70,8 +70,8 @@ def _receivers(config: BoxConfig) -> dict[str, Any]:
     written = _at(config.file.values, "outputs", "osc")
     if isinstance(written, list):
         return {"receivers": [one for one in written if isinstance(one, dict)], "receivers_written": True}
-    told = [{"host": one.host, "port": one.port} for one in config.outputs.osc]
-    return {"receivers": told, "receivers_written": False}
+    reported = [{"host": one.host, "port": one.port} for one in config.outputs.osc]
+    return {"receivers": reported, "receivers_written": False}
 
 
 def _at(values: Any, *steps: str) -> Any:
@@ -93,7 +93,7 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
         text = wanted.applied()
         config = _checked(place, text)
     except ConfigError as error:
-        return {"problems": [_told(one) for one in error.problems]}
+        return {"problems": [_reported(one) for one in error.problems]}
     except ValueError as error:
         return {"problems": [{"line": 0, "message": str(error)}]}
     if not wanted.sure and (asks := list(_questions(_before(place), config))):
@@ -176,7 +176,7 @@ def _checked(place: Path, text: str) -> BoxConfig:
             beside.unlink()
 
 
-def _told(one: Problem) -> dict[str, Any]:
+def _reported(one: Problem) -> dict[str, Any]:
     return {"line": one.line, "message": f"{one.message} {one.cure}".strip()}
 
 

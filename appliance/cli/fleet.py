@@ -31,11 +31,11 @@ fleet = command_group("List the boxes in this network, and send a show to severa
 def list_boxes() -> None:
     """List the boxes that announce themselves here, each with its verdict, show and release."""
 
-    async def told() -> list[dict[str, Any]]:
+    async def reported() -> list[dict[str, Any]]:
         return await asked(await browsed())
 
     try:
-        boxes = asyncio.run(told())
+        boxes = asyncio.run(reported())
     except OSError as error:
         raise StageError(str(error)) from None
     for one in boxes:

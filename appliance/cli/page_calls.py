@@ -47,7 +47,7 @@ def box_file(box: str | None = None, chosen: str | None = None) -> Any:
     """The box file with its venue's keys."""
     from appliance.cli import box_file
 
-    return box_file.told(_path(box), _path(chosen))
+    return box_file.reported(_path(box), _path(chosen))
 
 
 def change_box_file(change: dict[str, Any], box: str | None = None, chosen: str | None = None) -> Any:

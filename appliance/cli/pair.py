@@ -30,12 +30,12 @@ _ROLES = {"waits": "waits for the other one", "follows": "follows", "leads": "le
 def status(box: ThisBoxFile = None) -> None:
     """Tell which box leads, and whether the other one could take over; status 1 when it could not."""
     config = _paired(box)
-    told = pair_told(config)
-    if told is None:
+    reported = pair_told(config)
+    if reported is None:
         print("No stage dances on this box, so nothing is known of its pair. Start it: bunraku play.")
         raise typer.Exit(1)
-    print(sentence(told))
-    raise typer.Exit(0 if told["peer"] and told["ready"] else 1)
+    print(sentence(reported))
+    raise typer.Exit(0 if reported["peer"] and reported["ready"] else 1)
 
 
 @pair.command()
@@ -71,26 +71,28 @@ def pair_told(config: BoxConfig) -> dict[str, Any] | None:
     try:
         if not reader.is_alive(time.monotonic()):
             return None
-        told: dict[str, Any] | None = (reader.health() or {}).get("pair")
+        reported: dict[str, Any] | None = (reader.health() or {}).get("pair")
     finally:
         reader.close()
-    return told
+    return reported
 
 
-def sentence(told: dict[str, Any]) -> str:
+def sentence(reported: dict[str, Any]) -> str:
     """For people."""
-    role = _ROLES.get(str(told["role"]), str(told["role"]))
-    other = "second" if told["box"] == "first" else "first"
-    if not told["peer"]:
+    role = _ROLES.get(str(reported["role"]), str(reported["role"]))
+    other = "second" if reported["box"] == "first" else "first"
+    if not reported["peer"]:
         state = f"The {other} one is not heard: nobody would take over."
-    elif not told["same_show"]:
+    elif not reported["same_show"]:
         state = f"The {other} one has another show or release: it cannot follow."
-    elif not told["ready"]:
+    elif not reported["ready"]:
         state = "The one that follows is not ready yet."
     else:
         state = "The one that follows could take over at any moment."
-    changes = f"Takeovers by this box: {told['takeovers']}; lead changed {max(0, told['epoch'] - 1)} times."
-    return f"This is the {told['box']} box of the pair, and it {role}. {state} {changes}"
+    changes = (
+        f"Takeovers by this box: {reported['takeovers']}; lead changed {max(0, reported['epoch'] - 1)} times."
+    )
+    return f"This is the {reported['box']} box of the pair, and it {role}. {state} {changes}"
 
 
 def _paired(box: Path | None) -> BoxConfig:

@@ -34,10 +34,10 @@ def neighbours(printed: str) -> list[Neighbour]:
         parts = line.split(";", 9)
         if len(parts) < 10 or parts[0] != "=" or parts[2] != "IPv4" or not parts[8].isdecimal():
             continue
-        told = dict(one.strip('"').partition("=")[::2] for one in parts[9].split('" "'))
-        scheme = "https" if told.get("scheme") == "https" else "http"
+        reported = dict(one.strip('"').partition("=")[::2] for one in parts[9].split('" "'))
+        scheme = "https" if reported.get("scheme") == "https" else "http"
         name = _unescaped(parts[3])
-        one = Neighbour(name, parts[6], parts[7], int(parts[8]), told.get("version", ""), scheme)
+        one = Neighbour(name, parts[6], parts[7], int(parts[8]), reported.get("version", ""), scheme)
         found.setdefault(parts[6], one)
     return sorted(found.values(), key=lambda one: one.host)[:MOST_BOXES]
 
@@ -58,12 +58,12 @@ def _unescaped(name: str) -> str:
 async def browsed() -> list[Neighbour]:
     """The boxes that announce themselves now. Raises OSError where avahi is not there."""
     try:
-        status, told, _ = await output_of(*_BROWSE, patience_s=_PATIENCE_S)
+        status, reported, _ = await output_of(*_BROWSE, patience_s=_PATIENCE_S)
     except (OSError, TimeoutError):
-        status, told = 1, b""
+        status, reported = 1, b""
     if status:
         raise OSError(_NO_AVAHI)
-    return neighbours(told.decode("utf-8", "replace"))
+    return neighbours(reported.decode("utf-8", "replace"))
 
 
 async def asked(found: Iterable[Neighbour]) -> list[dict[str, Any]]:
@@ -131,13 +131,22 @@ class Fleet:
 
 async def _asked(session: aiohttp.ClientSession, one: Neighbour) -> dict[str, Any]:
     """How it is, as its own page has it; without `verdict` where it does not answer."""
-    told: dict[str, Any] = {"name": one.name, "host": one.host, "origin": one.origin, "version": one.version}
+    reported: dict[str, Any] = {
+        "name": one.name,
+        "host": one.host,
+        "origin": one.origin,
+        "version": one.version,
+    }
     try:
         async with session.get(f"{one.origin}/status") as answer:
             value = await answer.json() if (answer.content_length or 0) < _LARGEST else {}
     except (aiohttp.ClientError, TimeoutError, ValueError):
-        return told
+        return reported
     if not (isinstance(value, dict) and isinstance(value.get("verdict"), dict)):
-        return told
+        return reported
     status = value.get("status") or {}
-    return told | {"verdict": value["verdict"], "show": status.get("show", ""), "cue": status.get("cue", "")}
+    return reported | {
+        "verdict": value["verdict"],
+        "show": status.get("show", ""),
+        "cue": status.get("cue", ""),
+    }

@@ -87,7 +87,7 @@ class Learn:
                 "shows": [DANCES] * (self._stage.show_directory is not None) + list(bundled_shows()),
                 "journal": self._journal is not None,
                 "runs": self._learning.wanted() is not None,
-                "progress": self._learning.told(),
+                "progress": self._learning.reported(),
                 "can_dance": self._is_installed,
                 "show": str(self._learning.show),
             }

@@ -72,7 +72,7 @@ class Learning:
         else:
             os.utime(self._progress)
 
-    def told(self) -> dict[str, Any]:
+    def reported(self) -> dict[str, Any]:
         """The progress; {} before the first."""
         try:
             return dict(stored_json(self._progress))

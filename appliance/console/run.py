@@ -107,8 +107,8 @@ async def _serve(settings: Settings) -> int:
         others += Rehearsed(guard, stage, box, Path(settings.devices).parent).routes()
         others += [*hands.routes(), *PoseMap(stage).routes(), *learn.routes()]
     parts = (guard, devices, desk, stage, box, watchers, happened, about, fallbacks)
-    told = {"rehearsal": settings.rehearsal, "installed": settings.is_installed}
-    app = Server(*parts, lambda: {**told, "cue_kept": (rehearsed / ZIP).is_file()}, others).app()
+    reported = {"rehearsal": settings.rehearsal, "installed": settings.is_installed}
+    app = Server(*parts, lambda: {**reported, "cue_kept": (rehearsed / ZIP).is_file()}, others).app()
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=_LAST_REQUESTS_S, keepalive_timeout=30.0)
     await runner.setup()
     listening = socket.socket(fileno=settings.descriptor)

@@ -88,7 +88,7 @@ class Venue:
         self._guard.require_device(request)
         await said(request)
         self._require_shelf()
-        if folder == LEARNING and Learning(self._state / folder).told().get("state") != "learned":
+        if folder == LEARNING and Learning(self._state / folder).reported().get("state") != "learned":
             raise web.HTTPConflict(text="No show was learned that reaches the bar.")
         return await self._done("adopt_show", folder=str(self._state / folder), source=source)
 

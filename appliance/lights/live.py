@@ -35,7 +35,7 @@ class LiveRig:
         self._due = now + EVERY_S
         if not self._writer.is_wanted(now):
             return
-        self._writer.write([_told(beam) for beam in beams_of(patch, values)], walk)
+        self._writer.write([_reported(beam) for beam in beams_of(patch, values)], walk)
 
     def close(self) -> None:
         """Nothing shines any more."""
@@ -97,7 +97,7 @@ class OrderedWalk:
         return True, f"{len(to_see)} steps, first {first}."
 
 
-def _told(beam: Beam) -> list[object]:
+def _reported(beam: Beam) -> list[object]:
     """As box/live_rig.py says."""
     place, way, colour = (
         [round(float(part), 3) for part in one] for one in (beam.place, beam.direction, beam.colour)

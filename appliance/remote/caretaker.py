@@ -50,7 +50,7 @@ class Caretaker:
         self.projectors = [ProjectorPower(one.host, one.port, one.password) for one in config.projectors]
         self._look_at = 0.0
         self._somebody_at: float | None = None
-        self._told: dict[str, Any] = {}
+        self._reported: dict[str, Any] = {}
 
     def turn(self, state: ShowState, health: Mapping[str, Any], live: str, now: float) -> None:
         """Once a second: give what is due. live: how much of a live dancer comes, "" for none."""
@@ -64,7 +64,7 @@ class Caretaker:
             self._attract(state, _anybody(health) or bool(live), now)
         for projector in self.projectors:
             projector.want(self._hours.is_warm(wall))
-        self._told = {"open": self._hours.is_open(wall), "next": self._hours.next_change(wall)}
+        self._reported = {"open": self._hours.is_open(wall), "next": self._hours.next_change(wall)}
         if self._memory != self._noted:
             self._noted = self._memory
             _write(self._file, self._memory)
@@ -72,7 +72,7 @@ class Caretaker:
     def report(self) -> dict[str, Any]:
         """For the page; from the first turn on."""
         projectors = [{"host": one.host, **one.seen._asdict()} for one in self.projectors]
-        return {**self._told, "projectors": projectors}
+        return {**self._reported, "projectors": projectors}
 
     def troubles(self) -> list[str]:
         """A clause about each projector that is not as it should be."""

@@ -25,7 +25,7 @@ class Feedback:
         self._hosts = list(listeners)
         self._due = [now] * len(listeners)
         self._state: ShowState | None = None
-        self._told: dict[Message, Message] = {}
+        self._reported: dict[Message, Message] = {}
 
     def look(self, state: ShowState, now: float, mover: Listener | None = None) -> None:
         """Call it after each command, with its sender, and often besides."""
@@ -34,15 +34,15 @@ class Feedback:
         changed: list[Message] = []
         if state is not self._state:
             self._state = state
-            told = {_key(one): one for one in messages_of(state)}
-            changed = [one for key, one in told.items() if self._told.get(key) != one]
-            self._told = told
+            reported = {_key(one): one for one in messages_of(state)}
+            changed = [one for key, one in reported.items() if self._reported.get(key) != one]
+            self._reported = reported
         for place, (listener, host) in enumerate(zip(self._listeners, self._hosts, strict=True)):
             if changed and mover is not None and _is_same(host, mover):
                 self._due[place] = now + AGAIN_S  # a fader under a finger is left alone
             elif now >= self._due[place]:
                 self._due[place] = now + AGAIN_S
-                self._send(listener, [*self._told.values()])
+                self._send(listener, [*self._reported.values()])
             else:
                 self._send(listener, changed)
 

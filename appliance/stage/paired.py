@@ -228,7 +228,7 @@ class PairedStage:
         """Why a box that follows does not carry it out."""
         return f"This box follows {self._settings.name}: send it there ({order.name})."
 
-    def told(self, now: float) -> dict[str, Any]:
+    def reported(self, now: float) -> dict[str, Any]:
         """For status and page."""
         roles, worst = self.pair.roles, self._comparison.worst
         return {

@@ -333,7 +333,7 @@ class Stage:
                 is_locked=self.box.locked is not None,
             )
         fallbacks = self.watch.fallbacks.happened(now)
-        pair = None if self.paired is None else self.paired.told(now)
+        pair = None if self.paired is None else self.paired.reported(now)
         self.sharing.publish_health(
             *(now, self.health, self.reconciler, age_s, locked, roster, fallbacks, pair)
         )

@@ -66,9 +66,9 @@ class Device:
             lambda: self.ask("/api/prove")[1]["runs"] is None, "the proof has no end", MEASURED_WITHIN_S
         )
         status, newest = self.ask("/api/prove")
-        told = machine.run("cat", "/run/bunraku/prove/progress")
+        reported = machine.run("cat", "/run/bunraku/prove/progress")
         assert status == 200 and newest["proofs"] and newest["proofs"][0]["kind"] == kind, (
-            f"{told}\n{machine.log(PROVE)}"
+            f"{reported}\n{machine.log(PROVE)}"
         )
         document: dict[str, Any] = self.ask(f"/api/prove/{newest['proofs'][0]['id']}")[1]
         return document

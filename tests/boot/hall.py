@@ -62,13 +62,13 @@ class Audience:
     def _read(self) -> None:
         while True:
             try:
-                datagram, told, _, _ = self._socket.recvmsg(65536, 64)
+                datagram, reported, _, _ = self._socket.recvmsg(65536, 64)
             except BlockingIOError:
                 return
             for address, received in decode(datagram):
                 arguments: list[Any] = list(received)
                 if address == "/bunraku/frame":
-                    seconds, nanoseconds = struct.unpack("qq", told[0][2])
+                    seconds, nanoseconds = struct.unpack("qq", reported[0][2])
                     self._frame = seconds + 1e-9 * nanoseconds, arguments
                 elif address.endswith("/joint/pos_world") and self._frame is not None:
                     at, (tick, _, sequence, late, _) = self._frame

@@ -19,17 +19,17 @@ def test_a_changed_box_file_counts_at_once_and_the_one_before_comes_back(
 ) -> None:
     box, machine = dancing, dancing.machine
     machine.await_that(box.is_proven, "the venue's box file does not dance")
-    status, told = device.ask("/api/box/file")
-    assert status == 200 and "[" not in told["file"] and told["keys"], told
+    status, reported = device.ask("/api/box/file")
+    assert status == 200 and "[" not in reported["file"] and reported["keys"], reported
     location = ["console", "rehearsal"]
     status, answer = device.ask(
-        "/api/box/file", {"text": told["text"], "values": [[["control", "port"], "x"]], "now": True}
+        "/api/box/file", {"text": reported["text"], "values": [[["control", "port"], "x"]], "now": True}
     )
     assert (
         status == 200 and "control.port" in answer["problems"][0]["message"] and answer["problems"][0]["line"]
     )
     before = device.ask("/api/box")[1]["shows"][0]["id"]
-    change = {"text": told["text"], "values": [[location, False]], "now": True}
+    change = {"text": reported["text"], "values": [[location, False]], "now": True}
     changed = time.time()
     status, answer = device.ask("/api/box/file", change)
     assert (status, answer.get("problems")) == (200, []), answer

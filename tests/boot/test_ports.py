@@ -66,8 +66,12 @@ def test_it_is_found_by_its_name_and_in_a_list_of_boxes(dancing: Box) -> None:
     of_hall = dancing.hall.network
     find = dancing.machine.await_that
     assert find(lambda: socket.inet_aton(BOX) in _answer(of_hall, "bunraku.local", _A), "no address came")
-    told = find(lambda: _answer(of_hall, "_bunraku._tcp.local", _PTR), "no box is listed")
-    assert b"Bunraku on bunraku" in told and b"scheme=http" in told and struct.pack(">H", PAGE) in told
+    reported = find(lambda: _answer(of_hall, "_bunraku._tcp.local", _PTR), "no box is listed")
+    assert (
+        b"Bunraku on bunraku" in reported
+        and b"scheme=http" in reported
+        and struct.pack(">H", PAGE) in reported
+    )
     assert not _answer(of_hall, "another.local", _A), "this test cannot tell who is asked"
     assert "or http://bunraku.local:8080" in dancing.machine.run(
         *("setpriv", "--reuid=bunraku", "--regid=bunraku", "--clear-groups"), _PYTHON, "-c", _CARD

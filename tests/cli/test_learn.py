@@ -25,7 +25,7 @@ from tests.command import Command
 PROGRAM = """
 import json, pathlib, shutil, signal, sys, time
 words = sys.argv[1:]
-told = pathlib.Path({told!r})
+told = pathlib.Path({reported!r})
 with told.open("a") as log:
     log.write(json.dumps(words) + "\\n")
 if words[0] == "check":
@@ -50,8 +50,8 @@ class Box:
     def __init__(
         self, folder: Path, monkeypatch: pytest.MonkeyPatch, report: Path, train: int = 0, check: int = 0
     ) -> None:
-        self.learning, self.told, self.dances = Learning(folder / "learning"), folder / "told", False
-        program = PROGRAM.format(told=str(self.told), report=str(report), train=train, check=check)
+        self.learning, self.reported, self.dances = Learning(folder / "learning"), folder / "told", False
+        program = PROGRAM.format(reported=str(self.reported), report=str(report), train=train, check=check)
         monkeypatch.setattr(learn, "BUNRAKU", (sys.executable, "-c", program))
         monkeypatch.setattr(learn, "require_studio", lambda: None)
         monkeypatch.setattr(learn, "_LOOK_S", 0.02)
@@ -65,7 +65,11 @@ class Box:
         return Learner(self.learning, lambda: self.dances, None, (), self.said.append).run()
 
     def begun(self) -> list[list[str]]:
-        return [json.loads(line) for line in self.told.read_text().splitlines()] if self.told.exists() else []
+        return (
+            [json.loads(line) for line in self.reported.read_text().splitlines()]
+            if self.reported.exists()
+            else []
+        )
 
     def await_(self, is_so: Callable[[], Any]) -> None:
         while not is_so():
@@ -92,9 +96,9 @@ def test_what_reaches_the_bar_is_offered(tmp_path: Path, monkeypatch: pytest.Mon
     begin(box.learning, Wanted("takes", 60.0))
     box.let_end()
     assert box.run() == 0
-    told = box.learning.told()
-    assert told["state"] == "learned" and "reaches the bar" in told["message"]
-    assert all(one["holds"] for one in told["figures"]) and box.learning.wanted() is None
+    reported = box.learning.reported()
+    assert reported["state"] == "learned" and "reaches the bar" in reported["message"]
+    assert all(one["holds"] for one in reported["figures"]) and box.learning.wanted() is None
     train, check = box.begun()
     assert train[:1] == ["train"] and train[train.index("--minutes") + 1] == "52.5"
     assert "--from" not in train
@@ -130,9 +134,9 @@ def test_null_products_do_not_reach_it_and_the_show_stays(
     begin(box.learning, Wanted("takes"))
     box.let_end()
     assert box.run() == 1
-    told = box.learning.told()
-    assert told["state"] == "worse" and named in told["message"]
-    assert "The show that danced before stays." in told["message"] and told["advice"]
+    reported = box.learning.reported()
+    assert reported["state"] == "worse" and named in reported["message"]
+    assert "The show that danced before stays." in reported["message"] and reported["advice"]
 
 
 def test_the_shows_that_come_with_the_box_stand_on_both_sides_of_the_bar() -> None:
@@ -163,12 +167,12 @@ def test_it_pauses_while_a_show_dances_and_goes_on_from_the_checkpoint(
     states = []
 
     def script() -> None:
-        box.await_(lambda: box.learning.told().get("share") == 0.1)
+        box.await_(lambda: box.learning.reported().get("share") == 0.1)
         box.dances = True
-        box.await_(lambda: box.learning.told()["state"] == "waits")
+        box.await_(lambda: box.learning.reported()["state"] == "waits")
         states.append(len(box.begun()))
         box.dances = False
-        box.await_(lambda: box.learning.told().get("share") == 0.5)
+        box.await_(lambda: box.learning.reported().get("share") == 0.5)
         box.let_end()
 
     thread = box.beside(script)
@@ -187,7 +191,7 @@ def test_a_stopped_learner_continues_with_the_same_command(
     begin(box.learning, Wanted("takes"))
 
     def script() -> None:
-        box.await_(lambda: box.learning.told().get("share") == 0.1)
+        box.await_(lambda: box.learning.reported().get("share") == 0.1)
         signal.raise_signal(signal.SIGTERM)
 
     box.beside(script)
@@ -201,12 +205,12 @@ def test_what_the_page_ends_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     begin(box.learning, Wanted("takes"))
 
     def script() -> None:
-        box.await_(lambda: box.learning.told().get("share") == 0.1)
+        box.await_(lambda: box.learning.reported().get("share") == 0.1)
         box.learning.end()
 
     box.beside(script)
     assert box.run() == 2 and len(box.begun()) == 1
-    assert box.learning.told() == {"state": "ended"}
+    assert box.learning.reported() == {"state": "ended"}
 
 
 @pytest.mark.parametrize(
@@ -219,7 +223,7 @@ def test_a_failure_is_told_and_nothing_is_offered(
     begin(box.learning, Wanted("takes"))
     box.let_end()
     assert box.run() == 1
-    assert box.learning.told()["state"] == "failed" and named in box.learning.told()["message"]
+    assert box.learning.reported()["state"] == "failed" and named in box.learning.reported()["message"]
     assert "The show that danced before stays." in box.said[-1] and box.learning.wanted() is None
 
 
@@ -228,7 +232,7 @@ def test_without_the_studio_it_says_what_to_install(tmp_path: Path, monkeypatch:
     begin(learning, Wanted("takes"))
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert Learner(learning, lambda: False).run() == 1
-    assert learning.told() == {"state": "failed", "message": STUDIO_MISSING}
+    assert learning.reported() == {"state": "failed", "message": STUDIO_MISSING}
 
 
 def test_other_recordings_are_refused_while_some_are_learned(tmp_path: Path, bunraku: Command) -> None:
@@ -254,6 +258,6 @@ def test_from_recordings_to_a_verdict_by_the_real_commands(tmp_path: Path, long_
     done = subprocess.run([*map(str, command), *sizes], capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
     assert "It does not reach the bar" in done.stdout and "The show that danced before stays." in done.stdout
-    told = Learning(out).told()
-    assert told["state"] == "worse" and (out / "show" / "puppet.onnx").exists()
-    assert next(one for one in told["figures"] if one["name"] == "answer (degrees)")["value"] < 1.0
+    reported = Learning(out).reported()
+    assert reported["state"] == "worse" and (out / "show" / "puppet.onnx").exists()
+    assert next(one for one in reported["figures"] if one["name"] == "answer (degrees)")["value"] < 1.0

@@ -28,8 +28,8 @@ HOURS = {"open": True, "next": "tue 18:00", "projectors": [{"host": "10.0.0.4", 
 @pytest.fixture
 def bindings(venue: tuple[Box, Page], tmp_path: Path) -> Iterator[MidiBindings]:
     health = ProcessHealthWriter(venue[0].runtime, "remote", Fallbacks(OF_THE_REMOTE))
-    told: dict[str, Any] = {"timecode": "01:00:10:05", "state": "freewheeling", "hours": HOURS}
-    health.reported = told | {"midi": ["nanoKONTROL"], "bindings": str(tmp_path / "kept"), "moved": FADER}
+    reported: dict[str, Any] = {"timecode": "01:00:10:05", "state": "freewheeling", "hours": HOURS}
+    health.reported = reported | {"midi": ["nanoKONTROL"], "bindings": str(tmp_path / "kept"), "moved": FADER}
     health.publish_health(time.monotonic())
     yield MidiBindings(tmp_path / "kept")
     health.end(time.monotonic())

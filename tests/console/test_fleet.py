@@ -62,10 +62,10 @@ def test_the_examples_for_monitoring_name_metrics_that_there_are() -> None:
     sensor = {"name": "left-wrist", "heard": True, "rate_hz": 50.0, "loss": 0.0, "battery": 80}
     fallback = {"name": "tick-late", "process": "stage", "times": 1}
     status = Status(tick_p50_ms=1.0, tick_p99_ms=2.0, temperature_c=50.0, uptime_s=1.0)
-    told = metrics(
+    reported = metrics(
         {"status": status._asdict(), "frames": "fresh", "sensors": [sensor], "fallbacks": [fallback]}
     )
-    known = set(re.findall(r"(?m)^(bunraku_\w+)", told))
+    known = set(re.findall(r"(?m)^(bunraku_\w+)", reported))
     dashboard = json.loads((DEPLOY / "grafana-dashboard.json").read_text())
     asked = {
         name

@@ -58,7 +58,7 @@ def test_two_touches_begin_and_it_waits_for_the_show(tab: Tab, venue: tuple[Box,
     press(tab, "#learn-begin")
     expect(tab.locator("#learn-said")).to_contain_text("Waiting until the show stops")
     learning = Learning(kept / FOLDER)
-    wait_until(lambda: learning.told().get("share") == 0.0)
+    wait_until(lambda: learning.reported().get("share") == 0.0)
     assert learning.wanted() is not None and not learning.show.exists(), "nothing is trained"
     assert tab.evaluate("touches") == 2
     press(tab, "#learn-end")
@@ -135,6 +135,6 @@ def test_a_rehearsal_without_a_live_dancer_is_nothing_to_learn_from(
 def test_what_was_begun_goes_on_with_the_next_page(tmp_path: Path) -> None:
     learning = Learning(tmp_path / "state" / FOLDER)
     learning.want(Wanted(str(tmp_path / "gone"), 1.0))
-    assert learning.told() == {"state": "waits"}
+    assert learning.reported() == {"state": "waits"}
     with page_alone(tmp_path):
-        wait_until(lambda: learning.told()["state"] in ("training", "failed"))
+        wait_until(lambda: learning.reported()["state"] in ("training", "failed"))

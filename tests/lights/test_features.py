@@ -108,11 +108,11 @@ def test_hand_and_live_dancer_have_the_numbers_that_receivers_get() -> None:
         seen = with_movers(tick, [2.0, 0.0, 0.0], [1.5 * PERIOD_S * tick, 1.0, 0.0])
         made.render(seen, 1, ShowState(), seen.frame_time)
         packets = features.encode(seen, seen.puppets[0])
-    told = dict(message for packet in packets for message in decode(bytes(packet)))
+    reported = dict(message for packet in packets for message in decode(bytes(packet)))
     where = {"hand": "/bunraku/hand/hip", "live": "/bunraku/live"}
     found = [made.dances.read(rule) for rule in rules]
     assert found == pytest.approx(
-        [told[f"{where[str(rule.of)]}/{rule.reads}"][0] for rule in rules], rel=0.01
+        [reported[f"{where[str(rule.of)]}/{rule.reads}"][0] for rule in rules], rel=0.01
     )
     assert found[0] == pytest.approx(2.0, rel=0.01) and found[3] == pytest.approx(0.75, rel=0.01)
     assert made.dances.of("left").body_speed < 0.01

@@ -59,11 +59,11 @@ def test_a_reader_sees_where_each_lamp_points_and_how_bright_it_is(patch: Patch,
     values = patch.dimmed(patch.defaults, 1.0)
     values[patch.select(["par"], "dimmer")] = 0.5
     live.tell(patch, values, "", 10.0)
-    told = json.loads(reader.newest())
-    name, place, way, _, level, degrees = told["beams"][0]
-    assert (name, place, level, told["walk"]) == ("par", [-1.0, 3.0, 0.0], 0.5, "")
+    reported = json.loads(reader.newest())
+    name, place, way, _, level, degrees = reported["beams"][0]
+    assert (name, place, level, reported["walk"]) == ("par", [-1.0, 3.0, 0.0], 0.5, "")
     assert np.linalg.norm(way) == pytest.approx(1.0, abs=0.01) and 0 < degrees < 90
-    assert [one[0] for one in told["beams"]] == ["par", "head"]
+    assert [one[0] for one in reported["beams"]] == ["par", "head"]
     live.tell(patch, values, "soon", 10.0 + EVERY_S / 2)
     assert json.loads(reader.newest())["walk"] == "", "five times a second"
     for second in (20.0, 30.0):

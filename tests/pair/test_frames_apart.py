@@ -44,12 +44,12 @@ class Apart(NamedTuple):
         """Share of the time in which both show the same frame or neighbours."""
         return sum(count for apart, count in self.frames.items() if abs(apart) <= 1) / self.frames.total()
 
-    def told(self) -> str:
-        told = f"{self.ticks} ticks on both, {self.same} the same bit for bit; "
+    def reported(self) -> str:
+        reported = f"{self.ticks} ticks on both, {self.same} the same bit for bit; "
         if self.ticks:
             median, nearly_all, most = np.percentile(np.abs(self.ms), [50, 99, 100])
-            told += f"apart by {median:.1f} ms (median), {nearly_all:.1f} (99 %), {most:.1f} (most); "
-        return f"{told}frames apart, looks: {dict(sorted(self.frames.items()))}"
+            reported += f"apart by {median:.1f} ms (median), {nearly_all:.1f} (99 %), {most:.1f} (most); "
+        return f"{reported}frames apart, looks: {dict(sorted(self.frames.items()))}"
 
 
 def measured(folder: Path, seconds: float, paired: bool) -> Apart:
@@ -97,14 +97,14 @@ def test_a_pair_shows_one_dance_at_most_a_frame_apart(tmp_path: Path) -> None:
     (tmp_path / "paired").mkdir()
     (tmp_path / "alone").mkdir()
     together = measured(tmp_path / "paired", 6.0, paired=True)
-    assert together.ticks > 200 and together.same == together.ticks, together.told()
-    assert together.within_one > 0.98, together.told()
+    assert together.ticks > 200 and together.same == together.ticks, together.reported()
+    assert together.within_one > 0.98, together.reported()
     alone = measured(tmp_path / "alone", 1.0, paired=False)
-    assert alone.within_one == 0.0, alone.told()
+    assert alone.within_one == 0.0, alone.reported()
 
 
 if __name__ == "__main__":
     for is_paired in (True, False):
         with tempfile.TemporaryDirectory() as made:
             print("a pair: " if is_paired else "alone:  ", end="", flush=True)
-            print(measured(Path(made), float(sys.argv[1]), is_paired).told())
+            print(measured(Path(made), float(sys.argv[1]), is_paired).reported())

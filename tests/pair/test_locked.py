@@ -45,7 +45,7 @@ class InStep(NamedTuple):
     def within_a_frame(self) -> float:
         return sum(one <= FRAME_MS for one in self.apart_ms) / max(1, self.ticks)
 
-    def told(self) -> str:
+    def reported(self) -> str:
         if not self.ticks:
             return "no tick came from all"
         median, nearly, most = np.percentile(self.apart_ms, [50, 99, 100])
@@ -113,14 +113,14 @@ def _frames(came: Sequence[tuple[float, bytes]]) -> Iterator[tuple[int, tuple[fl
 def test_three_boxes_are_in_step_and_one_command_moves_them_all(tmp_path: Path) -> None:
     with three_boxes(tmp_path) as boxes:
         still = measured(boxes, 2.0)
-        assert still.ticks > 60 and still.same == still.ticks, still.told()
+        assert still.ticks > 60 and still.same == still.ticks, still.reported()
         leader, follower = Asker(boxes[0].control), Asker(boxes[1].control)
         leader.tell("/mocap/setjointrot", "lShldr", 0.0, 0.0, 1.0, 1.2)
         assert leader.ask("/iterations", 2, 1)[2] == 1
         assert follower.ask("/iterations", 3, 1)[2] == 0, "the one that leads is commanded"
         moved = measured(boxes, 3.0)
-        assert moved.ticks > 90 and moved.same == moved.ticks, moved.told()
-        assert still.within_a_frame > 0.9 and moved.within_a_frame > 0.9, (still.told(), moved.told())
+        assert moved.ticks > 90 and moved.same == moved.ticks, moved.reported()
+        assert still.within_a_frame > 0.9 and moved.within_a_frame > 0.9, (still.reported(), moved.reported())
         leader.tell("/look", "ink")
         wait_until(lambda: follower.status().look == "ink", "what is declared is in force on all")
         for one in (leader, follower):
@@ -143,7 +143,7 @@ def test_a_box_that_loses_the_leader_dances_by_itself_until_it_is_back(tmp_path:
 def test_three_boxes_that_know_nothing_of_each_other_are_far_apart(tmp_path: Path) -> None:
     with three_boxes(tmp_path, locked=False) as boxes:
         alone = measured(boxes, 2.0)
-    assert alone.within_a_frame == 0.0, alone.told()
+    assert alone.within_a_frame == 0.0, alone.reported()
 
 
 @pytest.mark.parametrize(
@@ -173,4 +173,4 @@ def test_the_firewall_lets_in_each_box_in_step(tmp_path: Path) -> None:
 if __name__ == "__main__":
     for is_locked in (True, False):
         with tempfile.TemporaryDirectory() as made, three_boxes(Path(made), is_locked) as running:
-            print("in step:" if is_locked else "alone:  ", measured(running, float(sys.argv[1])).told())
+            print("in step:" if is_locked else "alone:  ", measured(running, float(sys.argv[1])).reported())

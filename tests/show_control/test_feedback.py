@@ -114,13 +114,13 @@ def test_each_lever_is_told_as_a_command_that_sets_the_same() -> None:
     """So a controller may send back what it was told; part of a camera, as cues give it, has no such form."""
     changes = [Change(one, value) for one in LEVERS if one.address and (value := _other(one)) is not None]
     state = ShowState().changed(NOW, [*changes, Change(hand("lShldr"), False)])
-    told = {message[0]: message[1:] for message in messages_of(state)}
-    assert {one.lever.address for one in changes} <= told.keys()
+    reported = {message[0]: message[1:] for message in messages_of(state)}
+    assert {one.lever.address for one in changes} <= reported.keys()
     for change in changes:
-        address, arguments = change.lever.address, told[change.lever.address]
+        address, arguments = change.lever.address, reported[change.lever.address]
         asked = command(address, arguments)
         assert change.lever.given(str(asked.text), asked.values)[0] == change.value, address
-    assert told["/hold"] == ("lShldr", 0.0)
+    assert reported["/hold"] == ("lShldr", 0.0)
     partly = ShowState().to(CAMERA, {"angle_deg": 20.0})
     assert "/camera" not in {message[0] for message in messages_of(partly)}
 

@@ -107,10 +107,10 @@ def test_each_lit_button_waits_for_what_the_box_tells() -> None:
             assert one["instance_id"] == box
             path, value = one["options"]["path"], kinds[one["type"]](one["options"]["arguments"])
             states = [ShowState(blackout=True), ShowState(panic=True), _with(path, value)]
-            told = [message for state in states for message in messages_of(state)]
+            reported = [message for state in states for message in messages_of(state)]
             assert any(
                 message[0] == path and message[1] == value and type(message[1]) is kinds[one["type"]]
-                for message in told
+                for message in reported
             ), (path, value)
     assert lit >= 20
 
