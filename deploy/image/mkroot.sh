@@ -193,12 +193,12 @@ first_start_done() {
         chroot "$root" systemd-sysusers
         chroot "$root" journalctl --quiet --update-catalog
         chroot "$root" ldconfig
-        chroot "$root" /usr/lib/systemd/systemd-update-done
-        return
+    else
+        journalctl --quiet --root="$root" --update-catalog
+        emulated systemd-hwdb --root="$root" --usr update
+        emulated ldconfig -r "$root"
     fi
-    journalctl --quiet --root="$root" --update-catalog
-    emulated systemd-hwdb --root="$root" --usr update
-    emulated ldconfig -r "$root"
+    # What systemd-update-done writes, with a time that does not change: the same commit gives the same image.
     echo 'TIMESTAMP_NSEC=4102444800000000000' | tee "$root/etc/.updated" >"$root/var/.updated" # until the year 2100
 }
 
