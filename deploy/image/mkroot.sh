@@ -198,7 +198,7 @@ first_start_done() {
         emulated systemd-hwdb --root="$root" --usr update
         emulated ldconfig -r "$root"
     fi
-    # What systemd-update-done writes, with a time that does not change: the same commit gives the same image.
+    # The mark of systemd-update-done, with a fixed time: the same commit gives the same image.
     echo 'TIMESTAMP_NSEC=4102444800000000000' | tee "$root/etc/.updated" >"$root/var/.updated" # until the year 2100
 }
 
