@@ -100,16 +100,10 @@ def test_the_test_card_takes_the_place_of_the_dance_and_goes_again(
 ) -> None:
     _, page, _ = hall
     tab = unlocked_tab(context, page, "picture")
-    button = tab.locator("#test_card")
-    expect(button).to_have_text(re.compile("Test card|Testbild|Mire"))
+    expect(tab.locator("#test_card")).to_have_text(re.compile("Test card|Testbild|Mire"))
     expect(tab.locator("#info")).to_have_text(re.compile("Figures|Zahlen|Chiffres"))
-    shown = []
     for on in (True, False):
-        press(tab, "#test_card")
-        expect(button).to_have_attribute("aria-pressed", str(on).lower())
-        wall.await_picture(lambda picture, on=on: bool((picture > 240).all(axis=2).any()) == on)
-        shown.append(on)
-    assert shown == [True, False]
+        switch(tab, wall, "#test_card", lambda picture: (picture > 240).all(axis=2).any(), on)
 
 
 @ON_BOTH
@@ -118,9 +112,7 @@ def test_a_corner_follows_the_finger_on_the_wall(
 ) -> None:
     box, page, _ = hall
     tab = unlocked_tab(context, page, "picture")
-    grid = tab.locator("#grid")  # the projector tells once a second: the page may have its state of before
-    repeat(tab, lambda: press(tab, "#grid"), lambda: grid.get_attribute("aria-pressed") == "true")
-    wall.await_picture(lambda picture: bool(picture[:3, :3].any()))
+    switch(tab, wall, "#grid", lambda picture: picture[:3, :3].any(), True)
     pull(tab, "#corners button >> nth=0", lambda: _corner(box), (0.25, 0.25))
     wall.await_picture(lambda picture: not np.any(picture[:12, :20]))
     before = _corner(box)
@@ -134,8 +126,7 @@ def test_a_corner_follows_the_finger_on_the_wall(
     repeat(tab, lambda: press(tab, "#corners-undo"), lambda: _corner(box) == pytest.approx(corner, abs=0.001))
     expect(tab.locator("#corners-shape")).to_have_attribute("points", re.compile(r"^0\.2\d+,0\.2\d+ 1,0 "))
     repeat(tab, lambda: hold(tab, "#corners-reset"), lambda: _corner(box) == (0.0, 0.0))
-    wall.await_picture(lambda picture: bool(picture[:3, :3].any()))
-    press(tab, "#grid")
+    switch(tab, wall, "#grid", lambda picture: picture[:3, :3].any(), False)
     expect(tab.locator("#rig")).to_be_visible()
     assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
@@ -159,6 +150,21 @@ def test_a_point_of_the_mesh_follows_the_finger_on_the_wall(
     repeat(tab, lambda: press(tab, "#corners-undo"), lambda: pulled() == pytest.approx((0, 0), abs=0.001))
     pull(tab, '[data-point="12"]', pulled, (-0.05, 0.1))
     repeat(tab, lambda: hold(tab, "#mesh-reset"), lambda: pulled() == (0.0, 0.0))
+
+
+def switch(
+    tab: Tab, wall: Projection, button: str, is_on: Callable[[np.ndarray], object], wanted: bool
+) -> None:
+    """Press until wall and page agree. The projector reports once a second: a page that has just opened may
+    show what was pressed on another one, and its press then switches the other way."""
+    pressed = tab.locator(button)
+
+    def is_done() -> bool:
+        picture = wall.newest()
+        agrees = pressed.get_attribute("aria-pressed") == str(wanted).lower()
+        return agrees and picture is not None and bool(is_on(picture)) == wanted
+
+    repeat(tab, lambda: press(tab, button), is_done)
 
 
 def repeat(tab: Tab, act: Callable[[], None], is_done: Callable[[], bool]) -> None:
