@@ -32,6 +32,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("bunraku")
     group.addoption("--long", action="store_true", help="every count at its full length: make test-long")
+    group.addoption("--cuts", type=int, help="power cuts of tests/boot/test_power_cuts.py: 5, with --long 20")
     group.addoption("--seed", type=int, help="repeat a random test with the seed that it printed")
 
 

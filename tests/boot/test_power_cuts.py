@@ -20,9 +20,9 @@ pytestmark = pytest.mark.boot
 
 
 def test_it_dances_again_after_power_cuts(
-    box: Box, figures: Figures, rng: random.Random, long_run: bool
+    box: Box, figures: Figures, rng: random.Random, long_run: bool, pytestconfig: pytest.Config
 ) -> None:
-    cuts = MOST_CUTS if long_run else CUTS
+    cuts = pytestconfig.getoption("--cuts") or (MOST_CUTS if long_run else CUTS)
     box.power_on()
     box.await_frames()
     for cut in range(cuts):
