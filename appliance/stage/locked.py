@@ -5,14 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from appliance.box.clock import TickClock
+from appliance.box.fallback import Fallbacks
 from appliance.pair.locked import Followers, LockedPair
 from appliance.pair.pair import Pair
 from appliance.pair.roles import Role
 from appliance.show.locked import LockedConfig
 from appliance.show.pair import PairConfig
+from appliance.stage.fallback import OUT_OF_STEP
 from appliance.stage.paired import PairedStage, settings_of
+from appliance.stage.rejoining import Rejoining
 
 _SILENT_MS = 200.0  # then a box that follows dances by itself
+_REJOINS_S = 1.5  # in which its figures are led back to the leader's: as slowly as a puppet goes on by itself
 
 
 class LockedStage(PairedStage):
@@ -22,6 +26,9 @@ class LockedStage(PairedStage):
         """rest: as a pair's."""
         self._links = _links(config)
         super().__init__(self._links[0], *rest)
+        self._rejoining = Rejoining(self._parts.skeleton, self._tick.frame.puppets, _REJOINS_S)
+        if not self._settings.is_first:
+            self._parts.outputs.altered_by = self._rejoining.lead
 
     def _open(self, fingerprint: bytes, now: float) -> Pair:
         settings = [settings_of(one) for one in self._links]
@@ -32,6 +39,10 @@ class LockedStage(PairedStage):
     def begin(self, now: float) -> None:
         """The box is ready to hear the others."""
         self.pair.roles.begin(now)
+
+    def set_fallbacks(self, fallbacks: Fallbacks, now: float) -> None:
+        """Once a second: which other boxes are not in step."""
+        fallbacks.set(OUT_OF_STEP.name, self.complaint(now))
 
     def complaint(self, now: float) -> str:
         """Which other boxes are not in step, or ""."""
@@ -61,9 +72,16 @@ class LockedStage(PairedStage):
         super()._hear_leader()
         self._parts.outputs.may_speak = None
 
+    def _restore(self, keyframe: bytes) -> None:
+        self._rejoining.begin(self._tick.frame)
+        super()._restore(keyframe)
+
     def _take_over(self, clock: TickClock) -> None:
         super()._take_over(clock)
         self._parts.outputs.may_speak = None
+
+    def _begin_tick(self, now: float) -> None:
+        """A frame that comes late makes nobody here lose step: they wait for ten of them."""
 
     def _look_at_cable(self, now: float) -> None:
         """A cable that is out stops no other box: each has its own receivers."""

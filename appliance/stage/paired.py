@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from appliance.box.clock import TICK_S, TickClock
+from appliance.box.fallback import Fallbacks
 from appliance.box.orders import Order
 from appliance.box.snapshot import packed, restore, shift_times
 from appliance.dancer.loop import Loop
@@ -30,6 +31,7 @@ from appliance.show.config_error import ConfigError, Problem
 from appliance.show.pair import PairConfig
 from appliance.show.show import Show
 from appliance.stage.comparison import Comparison
+from appliance.stage.fallback import PAIR_ALONE, PAIR_TAKEN
 from appliance.stage.made_again import maker_of
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.rerun import RecordedNetwork, Rerun
@@ -110,7 +112,7 @@ class PairedStage:
         if made is not None:
             parts.make_by(_made_here_or_again(show, parts, made))
         self._part = PartWriter(folder)
-        self._carrier = Carrier(receivers_of(outputs))
+        self._carrier = Carrier(receivers_of(outputs), peers=self._settings.peers)
         self._give_at = float("-inf")
         self._items: list[bytes] = []
         self._sent_state: ShowState | None = None
@@ -179,6 +181,8 @@ class PairedStage:
     def may_dance(self, now: float) -> bool:
         """The leader, before a tick: whether it still leads."""
         self._look(now)
+        if self.pair.leads:
+            self._begin_tick(now)
         return self.pair.leads
 
     def follow(self, clock: TickClock, pulse: Callable[[float, float], None]) -> None:
@@ -243,6 +247,11 @@ class PairedStage:
             "differs_degrees": 0.0 if worst is None else worst.degrees,
             "resyncs": self.resyncs,
         }
+
+    def set_fallbacks(self, fallbacks: Fallbacks, now: float) -> None:
+        """Once a second: whether nobody could take over, and how often this box did."""
+        fallbacks.set(PAIR_ALONE.name, self.complaint(now))
+        fallbacks.follow(PAIR_TAKEN.name, self.pair.roles.takeovers, now)
 
     def complaint(self, now: float) -> str:
         """Why nobody could take over, or ""."""
@@ -310,9 +319,16 @@ class PairedStage:
             self.pair.reaches = carrier.knows_silence(now, roles.heard)
         else:
             self.pair.reaches = not carrier.is_out if roles.leads else carrier.is_up
-        if roles.leads and carrier.is_heard_nonetheless(roles.heard) and now >= self._give_at:
+        if (
+            roles.leads
+            and now >= self._give_at
+            and carrier.is_heard_nonetheless(now, roles.heard, self.pair.heard_from)
+        ):
             self._give_at = now + _GIVE_EACH_S
             self.give_back(now)
+
+    def _begin_tick(self, now: float) -> None:
+        self.pair.begin_tick(now)
 
     def _write_part(self, now: float) -> None:
         roles = self.pair.roles

@@ -328,10 +328,7 @@ class Stage:
         roster = roster_lines(states, wearing.neutral_of, wearing.corrected_of, self.batteries.left_s)
         age_s, locked = self._sensor_age_s(now), self._is_locked
         if self.paired is not None:
-            self.watch.note_pair(
-                *(now, self.paired.complaint(now), self.paired.pair.roles.takeovers),
-                is_locked=self.box.locked is not None,
-            )
+            self.paired.set_fallbacks(self.watch.fallbacks, now)
         fallbacks = self.watch.fallbacks.happened(now)
         pair = None if self.paired is None else self.paired.reported(now)
         self.sharing.publish_health(

@@ -85,17 +85,6 @@ class Watch:
             f"Up to {most} coding iterations fit by now. The dancer dances the show's own iterations again."
         )
 
-    def note_pair(self, now: float, alone: str, takeovers: int, is_locked: bool = False) -> None:
-        """Once a second on a box of a pair: why nobody could take over, or "", and how often this one did.
-
-        is_locked: on a box in step with others: which one is not.
-        """
-        if is_locked:
-            self.fallbacks.set(rows.OUT_OF_STEP.name, alone)
-            return
-        self.fallbacks.set(rows.PAIR_ALONE.name, alone)
-        self.fallbacks.follow(rows.PAIR_TAKEN.name, takeovers, now)
-
     def note_folder(self, now: float, lost: str | None) -> str:
         """Once a second, as renew_lost told it; a sentence where that is news."""
         if lost is None:

@@ -6,11 +6,12 @@ import moderngl
 import numpy as np
 import pytest
 
+from appliance.outputs.coupling import ROW_S, ROWS
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
 from appliance.projector.picture.accents import Accent, accents, pressure
 from appliance.projector.picture.kept_strokes import STAIN, STAIN_STEPS, STEP_S, WET, WET_LOSS, KeptStrokes
-from appliance.projector.picture.poses import ROW_S, ROWS, Poses
+from appliance.projector.picture.poses import Poses
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.picture.scene import Easel
 from appliance.projector.still import draw_still, moment_of

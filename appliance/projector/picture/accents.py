@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from appliance.outputs.coupling import ROW_S, ROWS
+from appliance.outputs.joint_frame import Floats
 from appliance.pose.ease import ease
-from appliance.projector.picture.poses import ROW_S, ROWS, Floats, Poses
+from appliance.projector.picture.poses import Poses
 
 OVER = 4  # rows over which a speed changes: 0.1 s; an accent is told from what came before and after
 SOFT, HARD = 1.2, 3.2  # figure heights a second by which a speed changes: no accent, and the strongest

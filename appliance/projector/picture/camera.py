@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from appliance.outputs.coupling import ROWS
 from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
-from appliance.projector.picture.poses import ROWS, Poses
+from appliance.projector.picture.poses import Poses
 from appliance.show.look import CameraConfig
 
 UPRIGHT = 1.35  # a figure may stand taller than an upright picture is wide: it is slender

@@ -9,10 +9,8 @@ import moderngl
 import numpy as np
 
 from appliance.body.skinning import BodyMesh, dual_quaternions
-from appliance.outputs.coupling import ROW_S as ROW_S
-from appliance.outputs.coupling import ROWS as ROWS
-from appliance.outputs.coupling import rows_between
-from appliance.outputs.joint_frame import Floats as Floats
+from appliance.outputs.coupling import ROWS, rows_between
+from appliance.outputs.joint_frame import Floats
 from appliance.projector.moment import Moment, PuppetMoment
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from appliance.body.mesh_file import mesh_of_show
 from appliance.body.skinning import BodyMesh
 from appliance.outputs.coupling import coupled, led_by
+from appliance.outputs.joint_frame import Floats
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.picture.body_buffers import BodyBuffers
@@ -24,7 +25,7 @@ from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import read_image, texture_of
 from appliance.projector.picture.noise import SIDE, noise_pixels
-from appliance.projector.picture.poses import Floats, HoldTexture, Poses, PoseTexture
+from appliance.projector.picture.poses import HoldTexture, Poses, PoseTexture
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.vertices import layout, packed
 from appliance.projector.picture.video import Video

@@ -8,13 +8,13 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from appliance.outputs.coupling import ROW_S, ROWS
 from appliance.pose.anatomy import Anatomy
 from appliance.projector.picture.accents import accents, pressure
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.kept_strokes import KeptStrokes
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.particles import traced
-from appliance.projector.picture.poses import ROW_S, ROWS
 from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.wall import Wall

@@ -6,10 +6,10 @@ from typing import Any
 
 import moderngl
 
+from appliance.outputs.coupling import ROW_S, ROWS
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import Palette, palette, stored
 from appliance.projector.picture.particles import traced
-from appliance.projector.picture.poses import ROW_S, ROWS
 from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.strands import POINTS, ribbons_of
 from appliance.projector.picture.targets import Target

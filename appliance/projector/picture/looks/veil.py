@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import moderngl
 
+from appliance.outputs.coupling import ROW_S, ROWS
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import palette, stored
-from appliance.projector.picture.poses import ROW_S, ROWS
 from appliance.projector.picture.scene import Easel, Scene, direction
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
