@@ -78,24 +78,26 @@ def measure(
             setting, page = _setting(show, box, scratch, firmware), Progress(progress)
             parts = 5 if setting.sounds else 4
             print(f"Measuring {seconds:g} s in phase with the sensor ...", flush=True)
-            page.tell(phase="locked", parts=parts, seconds=seconds, settling_s=min(SETTLING_S, seconds / 2.0))
+            page.report(
+                phase="locked", parts=parts, seconds=seconds, settling_s=min(SETTLING_S, seconds / 2.0)
+            )
             locked = run(setting, locked_course(seconds), page)
             free_s = max(6.0, seconds / 3.0)
             print(f"Measuring {free_s:g} s running free ...", flush=True)
-            page.tell(phase="free", parts=parts, seconds=free_s, settling_s=FREE_SETTLING_S)
+            page.report(phase="free", parts=parts, seconds=free_s, settling_s=FREE_SETTLING_S)
             free = run(setting, free_course(free_s), page)
             course = power_on_course(seconds, POWERED_FIRMWARE_S if firmware else POWERED_S)
             print(f"Switching the sensor on and off for {course.seconds:g} s ...", flush=True)
-            page.tell(phase="power-ons", parts=parts, seconds=course.seconds)
+            page.report(phase="power-ons", parts=parts, seconds=course.seconds)
             power_ons = run(setting, course)
             times = min(max(2, round(seconds / 6)), MOST_RESTARTS)
             print(f"Killing and starting the box {times} times ...", flush=True)
-            page.tell(phase="restarts", parts=parts, times=times)
+            page.report(phase="restarts", parts=parts, times=times)
             restarts = run_restarts(setting, times)
             heard = None
             if setting.sounds:
                 print(f"Listening to the strings for {free_s:g} s ...", flush=True)
-                page.tell(phase="sound", seconds=free_s)
+                page.report(phase="sound", seconds=free_s)
                 heard = run(setting, sound_course(free_s))
             light_steps: Run | None = None
             light_dance: Run | None = None
@@ -110,7 +112,7 @@ def measure(
         raise typer.Exit(REFUSED) from None
     figures = figures_of(evidence)
     limits = verdict(figures)
-    page.tell(figures=figures, limits=[limit._asdict() | {"holds": limit.holds} for limit in limits])
+    page.report(figures=figures, limits=[limit._asdict() | {"holds": limit.holds} for limit in limits])
     for line in table(figures, limits):
         print(line)
     written = [json_file] if json_file is not None else []

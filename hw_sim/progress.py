@@ -10,7 +10,7 @@ from pathlib import Path
 from hw_sim.osc_receiver import decode
 from hw_sim.peers import FRAME
 
-_TOLD_EVERY_S = 0.5
+_REPORTED_EVERY_S = 0.5
 _LOGGED_WITHIN_S = 0.1  # the emulator logs a reading at most this long after the frame that carries it
 _SENSOR, _SEQUENCE, _SENT_AT = 0, 2, 3  # columns of the emulator's log
 
@@ -23,7 +23,7 @@ class Progress:
         if path is not None:
             path.write_bytes(b"")
 
-    def tell(self, **values: object) -> None:
+    def report(self, **values: object) -> None:
         """One object: `phase` begins a run; `at_s`, `transport_ms` are readings of it; `figures` ends all."""
         if self._path is not None:
             with self._path.open("a") as stream:
@@ -43,7 +43,7 @@ class LiveTransport:
         self._waiting: dict[int, float] = {}  # readings that no frame has carried yet: sequence -> sent at
         self._frames: list[tuple[float, int]] = []  # arrival, the newest reading that it carries
         self._began: float | None = None
-        self._told_at = time.monotonic()
+        self._reported_at = time.monotonic()
         self._at_s: list[float] = []
         self._transport_ms: list[float] = []
 
@@ -54,19 +54,19 @@ class LiveTransport:
                 self._frames.append((arrival, int(decode(datagram)[0][1][2])))  # type: ignore[arg-type]
         now = time.monotonic()
         self._follow(now - _LOGGED_WITHIN_S)
-        if now - self._told_at >= _TOLD_EVERY_S:
-            self._tell(now)
+        if now - self._reported_at >= _REPORTED_EVERY_S:
+            self._report(now)
 
     def close(self) -> None:
         """Tell the rest, and release the log."""
         self._follow(time.monotonic())
-        self._tell(time.monotonic())
+        self._report(time.monotonic())
         self._log.close()
 
-    def _tell(self, now: float) -> None:
+    def _report(self, now: float) -> None:
         if self._at_s:
-            self._progress.tell(at_s=self._at_s, transport_ms=self._transport_ms)
-        self._at_s, self._transport_ms, self._told_at = [], [], now
+            self._progress.report(at_s=self._at_s, transport_ms=self._transport_ms)
+        self._at_s, self._transport_ms, self._reported_at = [], [], now
 
     def _follow(self, until: float) -> None:
         """The frames that arrived until then carry readings of the log."""

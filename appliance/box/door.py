@@ -51,12 +51,14 @@ class Door:
     """Accepts on a listening socket. Each connection is a stranger's until a request of it says otherwise.
 
     A new connection is always let in, as long as a stranger's can be closed for it: the one that has been
-    quiet for the longest time, of the address that has most of them. tell: hears the address of the crowd
+    quiet for the longest time, of the address that has most of them. report: hears the address of the crowd
     when one had to give way, and "" when the crowd is over.
     """
 
-    def __init__(self, tell: Callable[[str], None], monotonic: Callable[[], float] = time.monotonic) -> None:
-        self._tell, self._monotonic, self._crowd = tell, monotonic, ""
+    def __init__(
+        self, report: Callable[[str], None], monotonic: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._report, self._monotonic, self._crowd = report, monotonic, ""
         self._connections: dict[Peer, _Connection] = {}
         self._crowded_until = 0.0
 
@@ -116,25 +118,25 @@ class Door:
             if not (one.is_known or one.watches) and now - one.newest > IDLE_S:
                 one.close()
         if now > self._crowded_until:
-            self._tell_of("")
+            self._report_crowd("")
 
     def _strangers(self) -> list[_Connection]:
         return [one for one in self._connections.values() if not one.is_known]
 
     def _give_way(self, candidates: list[_Connection], now: float) -> None:
-        """One of them is closed, and that is told."""
+        """Closes one of them, and reports its address."""
         if not candidates:
             return
         leaving = gives_way((one, one.address, one.newest) for one in candidates)
         leaving.close()
         self._connections = {peer: one for peer, one in self._connections.items() if one is not leaving}
         self._crowded_until = now + _QUIET_S
-        self._tell_of(leaving.address)
+        self._report_crowd(leaving.address)
 
-    def _tell_of(self, crowd: str) -> None:
+    def _report_crowd(self, crowd: str) -> None:
         if crowd != self._crowd:
             self._crowd = crowd
-            self._tell(crowd)
+            self._report(crowd)
 
     def _forget_closed(self) -> None:
         self._connections = {peer: one for peer, one in self._connections.items() if not one.is_over}

@@ -8,7 +8,7 @@ import signal
 import sys
 
 PARENT = "BUNRAKU_PARENT"  # in the environment: the process to end with
-TOLD = "BUNRAKU_TOLD"  # in the environment: the exit status of the try before, which has said why
+REPORTED = "BUNRAKU_REPORTED"  # in the environment: the exit status of the try before, which has said why
 _PR_SET_PDEATHSIG = 1
 
 
@@ -27,6 +27,6 @@ def end_with(parent: int, by: signal.Signals) -> None:
         sys.exit(0)
 
 
-def was_told(status: int) -> bool:
+def was_reported(status: int) -> bool:
     """Whether the try before this one ended with the same status, and said why."""
-    return os.environ.get(TOLD) == str(status)
+    return os.environ.get(REPORTED) == str(status)

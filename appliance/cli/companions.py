@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from appliance.box.child import await_end, environment, start_child
 from appliance.box.notify import ALIVE, ENDING, READY, NotifyListener
-from appliance.box.parent_death import TOLD
+from appliance.box.parent_death import REPORTED
 
 SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0
 UNAVAILABLE = 69  # sysexits.h: what it needs is not here, or not yet: a projector is switched on late
@@ -178,7 +178,7 @@ class _Running:
             self._start_later(f"cannot be started ({error.strerror})", now)
 
     def _environment(self) -> dict[str, str]:
-        reported = {} if self._reported is None else {TOLD: str(self._reported)}
+        reported = {} if self._reported is None else {REPORTED: str(self._reported)}
         watched: dict[str, str] = {}
         if self._listener is not None and self._companion.watchdog_s < math.inf:
             watched = self._listener.environ(self._companion.watchdog_s) | {"PYTHONFAULTHANDLER": "1"}

@@ -76,17 +76,11 @@ def learn(
     if learning.wanted() not in (None, wanted):
         raise StageError(f"{out}: other recordings are being learned there. Give another --out.")
     if learning.wanted() is None:
-        begin(learning, wanted)
+        learning.begin(wanted)
     with contextlib.suppress(StageError):
         proving = Proving(runtime_of(load_box(box)))
         return Learner(learning, proving.show_goes, box, train or (), _print).run()
     return Learner(learning, lambda: False, box, train or (), _print).run()
-
-
-def begin(learning: Learning, wanted: Wanted) -> None:
-    """Delete what was learned before, and write the request. Raises OSError."""
-    shutil.rmtree(learning.show, ignore_errors=True)
-    learning.want(wanted)
 
 
 def main(given: Sequence[str]) -> int:
@@ -107,7 +101,7 @@ def main(given: Sequence[str]) -> int:
         from appliance.cli.app import refuse
 
         learning.end()  # else systemd would begin it again and again
-        learning.tell(state="failed", message=str(error))
+        learning.report(state="failed", message=str(error))
         refuse(error)
 
 
@@ -140,16 +134,16 @@ class Learner:
                 result = self._checked()
             except _StoppedError:
                 if self._learning.wanted() is None:
-                    self._tell(state="ended")
+                    self._report(state="ended")
                 self._say(_STOPPED)
                 return 2
             except (NotLearnedError, OSError) as error:
                 self._learning.end()
-                self._tell(state="failed", message=str(error))
+                self._report(state="failed", message=str(error))
                 self._say(f"{error} The show that danced before stays.")
                 return 1
             self._learning.end()
-            self._tell(state="learned" if result["passed"] else "worse", **result)
+            self._report(state="learned" if result["passed"] else "worse", **result)
         self._say_result(result)
         return 0 if result["passed"] else 1
 
@@ -211,7 +205,7 @@ class Learner:
                     if self._is_over() or (pauses and self._show_goes()):
                         end_child(child, _ENDS_WITHIN_S)
                         break
-                    self._tell(state=state, **self._share())
+                    self._report(state=state, **self._share())
                     with contextlib.suppress(subprocess.TimeoutExpired):
                         child.wait(_LOOK_S)
             finally:
@@ -226,7 +220,7 @@ class Learner:
         while self._show_goes():
             if self._is_over():
                 raise _StoppedError
-            self._tell(state="waits", **self._share())
+            self._report(state="waits", **self._share())
             time.sleep(_LOOK_S)
 
     def _is_over(self) -> bool:
@@ -240,13 +234,13 @@ class Learner:
         except (OSError, ValueError, KeyError, TypeError, IndexError):
             return {"share": 0.0, "degrees": None}
 
-    def _tell(self, **state: Any) -> None:
+    def _report(self, **state: Any) -> None:
         """Write what changed; else only a sign of life."""
         with contextlib.suppress(OSError):
             if state == self._state:
-                self._learning.tell()
+                self._learning.report()
             else:
-                self._learning.tell(**state)
+                self._learning.report(**state)
                 if state["state"] != self._state.get("state") and "share" in state:
                     self._say(f"{_STATES[state['state']]} ({100 * state['share']:.0f} % trained)")
                 self._state = state

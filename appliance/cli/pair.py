@@ -30,7 +30,7 @@ _ROLES = {"waits": "waits for the other one", "follows": "follows", "leads": "le
 def status(box: ThisBoxFile = None) -> None:
     """Tell which box leads, and whether the other one could take over; status 1 when it could not."""
     config = _paired(box)
-    reported = pair_told(config)
+    reported = reported_pair(config)
     if reported is None:
         print("No stage dances on this box, so nothing is known of its pair. Start it: bunraku play.")
         raise typer.Exit(1)
@@ -65,7 +65,7 @@ def secret(
     print(f"{file}: name it as `secret:` under `pair:` in the box file, and copy it to the other box.")
 
 
-def pair_told(config: BoxConfig) -> dict[str, Any] | None:
+def reported_pair(config: BoxConfig) -> dict[str, Any] | None:
     """The stage's report about its pair; None where no stage dances."""
     reader = FrameReader(runtime_folder(config))
     try:

@@ -14,7 +14,7 @@ import typer
 
 from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
-from appliance.box.parent_death import was_told
+from appliance.box.parent_death import was_reported
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.options.idle_options import refuse_idle
@@ -101,7 +101,7 @@ def project_show(box_file: Path | None, options: Options, waits: bool = False) -
                 break
             except ProjectorError as error:
                 if not (waits and error.status == NO_DISPLAY):
-                    if not was_told(error.status):
+                    if not was_reported(error.status):
                         print(f"bunraku: {error}", file=sys.stderr)
                     return error.status
                 if str(error) != said:

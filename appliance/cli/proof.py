@@ -66,9 +66,9 @@ def prove(runtime: Path, proofs: Proofs, box: Path | None, chosen: Path | None) 
         about = {"kind": wanted.kind, "made": time.time(), "host": socket.gethostname()}
         about |= {"machine": machine(), "software": software()}
         about |= {"show": {"name": name, "checksum": checksum(show)}, "box_file": about_file(box)}
-        proving.tell(saved=proofs.add(about | document))
+        proving.report(saved=proofs.add(about | document))
     except (_NotProvenError, OSError) as error:
-        proving.tell(trouble=str(error))
+        proving.report(trouble=str(error))
         return 1
     finally:
         proving.end()
@@ -116,7 +116,7 @@ def _doctor(proving: Proving, box: Path | None) -> dict[str, Any]:
 def _run(
     proving: Proving,
     arguments: tuple[str, ...],
-    tell: Callable[[], None] = lambda: None,
+    on_output: Callable[[], None] = lambda: None,
     at_rest: bool = False,
 ) -> str:
     """The output of one of our commands; ended when it is no longer wanted. at_rest: or when the show goes
@@ -130,11 +130,11 @@ def _run(
                     raise _NotProvenError(_ENDED)
                 if at_rest and proving.show_goes():
                     raise _NotProvenError(f"{SHOW_GOES} {_ENDED}")
-                tell()
-                proving.tell()
+                on_output()
+                proving.report()
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     child.wait(_LOOK_S)
-            tell()
+            on_output()
         finally:
             end_child(child, _ENDS_WITHIN_S, signal.SIGINT)  # measure then ends its box and its sensor
         out.seek(0)

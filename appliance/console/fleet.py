@@ -80,7 +80,8 @@ class Fleet:
     def __init__(self, guard: Guard, state: Path, stage: StageView) -> None:
         self._guard, self._stage = guard, stage
         self._passes, self._packed = Passes(state / PASSES), state / "fleet.zip"
-        self._packing, self._is_packed = asyncio.Lock(), ""
+        self._packing = asyncio.Lock()
+        self._packed_of: tuple[Path, int] | None = None  # the show in `_packed`, and the stage's generation
         self._sending = asyncio.Semaphore(_SENT_AT_ONCE)
         self._looking = asyncio.Lock()
         self._found: dict[str, Neighbour] = {}
@@ -122,11 +123,11 @@ class Fleet:
     async def _pack(self, show: Path) -> None:
         """Once for each start of a stage: a show does not change while it is danced."""
         async with self._packing:
-            if (
-                danced := f"{show} {self._stage.generation}"
-            ) != self._is_packed or not self._packed.is_file():
-                await answer_of("pack_show", _PACKED_WITHIN_S, show=str(show), into=str(self._packed))
-                self._is_packed = danced
+            danced = show, self._stage.generation
+            if danced == self._packed_of and self._packed.is_file():
+                return
+            await answer_of("pack_show", _PACKED_WITHIN_S, show=str(show), into=str(self._packed))
+            self._packed_of = danced
 
 
 async def _asked(session: aiohttp.ClientSession, one: Neighbour) -> dict[str, Any]:

@@ -85,7 +85,7 @@ class Hands:
         self._browsers.add(browser)
         try:
             async with self._desk.streaming() as stream:
-                answering = asyncio.create_task(_tell_refusals(stream, browser))
+                answering = asyncio.create_task(_send_refusals(stream, browser))
                 try:
                     async for message in browser:
                         said = _said(message.data) if message.type == WSMsgType.TEXT else None
@@ -162,7 +162,7 @@ class Hands:
             self._note.write(json.dumps(sorted(self._held)).encode())
 
 
-async def _tell_refusals(stream: Stream, browser: web.WebSocketResponse) -> None:
+async def _send_refusals(stream: Stream, browser: web.WebSocketResponse) -> None:
     with contextlib.suppress(ConnectionError):
         while True:
             await browser.send_str(json.dumps({"refused": await stream.refusal()}))

@@ -21,13 +21,11 @@ from appliance.console.guard import Guard
 from appliance.console.learning import FOLDER, RECORDINGS, STUDIO_MISSING, USUAL_MIN, Learning, Wanted
 from appliance.console.stage_view import StageView
 from appliance.pose.recorded_minutes import recorded_minutes
-from appliance.show.bundle import bundled_shows
 
 STICK = Path("/media/bunraku/bunraku") / RECORDINGS
-_EXPORTED_S, _ENDS_WITHIN_S, _CHECKED_S = 120.0, 10.0, 60.0
+_EXPORTED_S, _ENDS_WITHIN_S, _CHECKED_S, _LISTED_S = 120.0, 10.0, 60.0, 20.0
 LARGEST_RECORDING, LEFT_FREE = 64 << 20, 1 << 30  # bytes; ten minutes of a figure with fingers have 60 MB
 MOST_UPLOADED = 500
-DANCES = "this show"  # the one on the stage
 _FILE = re.compile(r"(?!\.)[^/\\\x00-\x1f]{1,96}\.bvh", re.IGNORECASE)
 _RUNS = "Something is being learned already. Wait for its end, or end it."
 
@@ -79,14 +77,15 @@ class Learn:
 
     async def _state(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
+        runs = self._learning.wanted() is not None
         listed = await asyncio.to_thread(self._listed)
         return web.json_response(
             {
                 "studio": "" if has_studio() else STUDIO_MISSING,
                 "recordings": listed,
-                "shows": [DANCES] * (self._stage.show_directory is not None) + list(bundled_shows()),
+                "shows": [] if runs else await self._shows(),
                 "journal": self._journal is not None,
-                "runs": self._learning.wanted() is not None,
+                "runs": runs,
                 "progress": self._learning.reported(),
                 "can_dance": self._is_installed,
                 "show": str(self._learning.show),
@@ -97,8 +96,8 @@ class Learn:
         self._guard.require_device(request)
         values = await said(request)
         name, minutes = values.get("recordings"), values.get("minutes", USUAL_MIN)
-        folder, begins_with = self._folder(name), self._show(values.get("begins_with", ""))
-        if begins_with is None:
+        folder, begins_with = self._folder(name), values.get("begins_with", "")
+        if begins_with != "" and begins_with not in [one["id"] for one in await self._shows()]:
             raise web.HTTPBadRequest(text="There is no such show to begin with.")
         if folder is None or not isinstance(minutes, int | float) or not 1 <= minutes <= 720:
             raise web.HTTPBadRequest(text="Choose a folder of recordings, and 1 to 720 minutes.")
@@ -107,8 +106,7 @@ class Learn:
         if self._learning.wanted() is not None:
             raise web.HTTPConflict(text=_RUNS)
         try:
-            await asyncio.to_thread(shutil.rmtree, self._learning.show, True)
-            self._learning.want(Wanted(str(folder), float(minutes), begins_with))
+            await asyncio.to_thread(self._learning.begin, Wanted(str(folder), float(minutes), begins_with))
             if not self._is_installed:
                 await self._start()
         except OSError as error:
@@ -119,7 +117,7 @@ class Learn:
     async def _end(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
         self._learning.end()
-        self._learning.tell(state="ended")
+        self._learning.report(state="ended")
         return web.json_response({"done": True})
 
     async def _use_rehearsal(self, request: web.Request) -> web.Response:
@@ -162,11 +160,14 @@ class Learn:
                     folder.rmdir()  # where nothing is in it
         return web.json_response({"name": f"box/{folder.name}"} | json.loads(read))
 
-    def _show(self, name: Any) -> str | None:
-        """The show to begin with, for `bunraku train --from`; None: it was not offered."""
-        if name == DANCES and self._stage.show_directory is not None:
-            return str(self._stage.show_directory)
-        return name if name == "" or name in bundled_shows() else None
+    async def _shows(self) -> list[dict[str, Any]]:
+        """release/shows_here.py: a learning begins with the dancer of one of them, or with a new dancer."""
+        danced, learned = self._stage.show_directory, self._learning.playable()
+        folders = {"danced": danced and str(danced), "learned": learned and str(learned)}
+        found: list[dict[str, Any]] = json.loads(
+            await answer_of("shows_here", _LISTED_S, **folders, **self._box)
+        )
+        return found
 
     def _listed(self) -> list[dict[str, Any]]:
         """The folders with recordings on the box and on the stick."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -35,17 +36,35 @@ class Wanted(NamedTuple):
 
 
 class Learning:
-    """`wanted.json` is there while something is learned: its removal ends that. `show`: what is learned."""
+    """`wanted.json` is there while something is learned: its removal ends that. `show`: what is learned;
+    `before`: what was learned before, while another learning begins with it.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.show = folder / "show"
+        self.show, self.before = folder / "show", folder / "before"
         self._wanted, self._progress = folder / "wanted.json", folder / "progress.json"
 
+    def begin(self, wanted: Wanted) -> None:
+        """Write the request. What was learned before is deleted, or moved aside if this begins with it.
+
+        Raises OSError.
+        """
+        shutil.rmtree(self.before, ignore_errors=True)
+        if wanted.begins_with == str(self.show):
+            self.show.rename(self.before)
+            wanted = wanted._replace(begins_with=str(self.before))
+        shutil.rmtree(self.show, ignore_errors=True)
+        self.want(wanted)
+
+    def playable(self) -> Path | None:
+        """The show that was learned last, once it has passed its check."""
+        return self.show if self.reported().get("state") in ("learned", "worse") else None
+
     def want(self, wanted: Wanted) -> None:
-        """Begin. Raises OSError."""
+        """Write the request. Raises OSError."""
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        self.tell(state="waits")
+        self.report(state="waits")
         write_whole(self._wanted, json.dumps(wanted._asdict()).encode())
 
     def wanted(self) -> Wanted | None:
@@ -65,7 +84,7 @@ class Learning:
         with suppress(OSError):
             self._wanted.unlink(missing_ok=True)
 
-    def tell(self, **values: object) -> None:
+    def report(self, **values: object) -> None:
         """The progress from now on; without values only a sign of life. Raises OSError."""
         if values:
             write_whole(self._progress, json.dumps(values).encode())

@@ -57,7 +57,7 @@ class Proving:
         """Nothing is wanted any more."""
         self._wanted.unlink(missing_ok=True)
 
-    def tell(self, **values: object) -> None:
+    def report(self, **values: object) -> None:
         """One more object of the progress; without any, a sign of life."""
         if values:
             with self.progress.open("a") as stream:

@@ -28,7 +28,7 @@ class LiveRig:
             self._writer = LiveRigWriter(folder)
         self._due = 0.0
 
-    def tell(self, patch: Patch, values: Values, walk: str, now: float) -> None:
+    def publish(self, patch: Patch, values: Values, walk: str, now: float) -> None:
         """values (S,): what the rig shows now; walk: what is walked through."""
         if self._writer is None or now < self._due:
             return

@@ -116,7 +116,9 @@ class Lights:
             levels = self.rig.render(self._frame(now), self._stage.generation, show_state, now)
         if self._live is not None:
             walked = self._walk.values
-            self._live.tell(patch, self.rig.values if walked is None else walked, self._walk.description, now)
+            self._live.publish(
+                patch, self.rig.values if walked is None else walked, self._walk.description, now
+            )
         if self._speaking.may_speak(now):
             for universe in self.universes:
                 universe.offer(levels[universe.number], now)

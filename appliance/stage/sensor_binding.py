@@ -90,9 +90,9 @@ class SensorBinding:
 
 def upright(name: str, hand: WornHand, axis: tuple[float, float, float]) -> str:
     """The sentence if the axis that should face the front was upright instead."""
-    told_by = "arrow" if axis[0] else "lid"
+    substitute = "arrow" if axis[0] else "lid"
     return (
         f"Sensor {name}: the axis that should face the front stood upright, so the front was told by its "
-        f"{told_by}. {hand.joint.joint} may move to a wrong side. Wear it as `facing` of its hand says "
+        f"{substitute}. {hand.joint.joint} may move to a wrong side. Wear it as `facing` of its hand says "
         "(the arrow to the front, unless the show says otherwise), and take the neutral pose again."
     )

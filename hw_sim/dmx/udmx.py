@@ -100,7 +100,7 @@ class UdmxBackend(usb.backend.IBackend):  # type: ignore[misc]
         """Strings (standard request) and levels (vendor requests); octets that were transferred."""
         self._require(handle)
         if (request_type, request) == (0x80, _GET_DESCRIPTOR) and value >> 8 == _STRING:
-            return self._tell(handle, value & 0xFF, data)
+            return self._descriptor(handle, value & 0xFF, data)
         if (request_type, request) != (0x40, _SET_CHANNEL_RANGE):
             raise usb.core.USBError("Pipe error", -9, errno.EPIPE)
         if timeout < self.takes_ms:
@@ -111,7 +111,7 @@ class UdmxBackend(usb.backend.IBackend):  # type: ignore[misc]
         if not self._is_in or device is not self._plug:
             raise usb.core.USBError("No such device (it may have been disconnected)", -4, errno.ENODEV)
 
-    def _tell(self, device: Plug, number: int, data: array.array[int]) -> int:
+    def _descriptor(self, device: Plug, number: int, data: array.array[int]) -> int:
         words = {2: device.product, 3: device.serial_number or ""}
         content = words[number].encode("utf-16-le") if number in words else _STRINGS[number]
         descriptor = bytes((len(content) + 2, _STRING)) + content

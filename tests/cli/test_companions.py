@@ -114,8 +114,8 @@ def test_a_companion_waits_for_its_needs(
     monkeypatch.setattr(companions, "RETRY_S", 0.1)
     said: list[str] = []
     display, reported, shows = tmp_path / "display", tmp_path / "told", tmp_path / "shows"
-    waits = "from appliance.box.parent_death import was_told; "
-    waits += f"open({str(reported)!r}, 'a').write(f'{{was_told({UNAVAILABLE}):d}}'); "
+    waits = "from appliance.box.parent_death import was_reported; "
+    waits += f"open({str(reported)!r}, 'a').write(f'{{was_reported({UNAVAILABLE}):d}}'); "
     waits += f"os.path.exists({str(display)!r}) or sys.exit({UNAVAILABLE}); "
     waits += f"open({str(shows)!r}, 'w').close(); time.sleep(60)"
     with Companions([diary.child(waits)], said.append, lambda: True):

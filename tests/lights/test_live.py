@@ -58,16 +58,16 @@ def test_a_reader_sees_where_each_lamp_points_and_how_bright_it_is(patch: Patch,
     assert reader.newest() == NOTHING
     values = patch.dimmed(patch.defaults, 1.0)
     values[patch.select(["par"], "dimmer")] = 0.5
-    live.tell(patch, values, "", 10.0)
+    live.publish(patch, values, "", 10.0)
     reported = json.loads(reader.newest())
     name, place, way, _, level, degrees = reported["beams"][0]
     assert (name, place, level, reported["walk"]) == ("par", [-1.0, 3.0, 0.0], 0.5, "")
     assert np.linalg.norm(way) == pytest.approx(1.0, abs=0.01) and 0 < degrees < 90
     assert [one[0] for one in reported["beams"]] == ["par", "head"]
-    live.tell(patch, values, "soon", 10.0 + EVERY_S / 2)
+    live.publish(patch, values, "soon", 10.0 + EVERY_S / 2)
     assert json.loads(reader.newest())["walk"] == "", "five times a second"
     for second in (20.0, 30.0):
-        live.tell(patch, values, f"{second}", second)
+        live.publish(patch, values, f"{second}", second)
     assert json.loads(reader.newest())["walk"] == "20.0", "and nothing while nobody does"
     live.close()
     assert reader.newest() == NOTHING
@@ -87,7 +87,7 @@ def test_a_rig_of_any_size_fits(tmp_path: Path) -> None:
     patch = Patch(lights(fixtures).fixtures, None)
     reader, live = LiveRigReader(tmp_path), LiveRig(tmp_path)
     assert reader.newest() == NOTHING
-    live.tell(patch, patch.defaults, "x" * 200, 1.0)
+    live.publish(patch, patch.defaults, "x" * 200, 1.0)
     assert len(json.loads(reader.newest())["beams"]) == MOST_BEAMS and len(reader.newest()) < LARGEST
     live.close()
 

@@ -97,10 +97,10 @@ def plain_values(line: RosterLine) -> dict[str, object]:
         "neutral": line.neutral or None,
         "heading_corrected_degrees": round(line.corrected, 2),
         "complaint": line.complaint or None,
-    } | _told_by_newer(line)
+    } | _newer_fields(line)
 
 
-def _told_by_newer(line: RosterLine) -> dict[str, object]:
+def _newer_fields(line: RosterLine) -> dict[str, object]:
     """Fields that older wearables do not report."""
     dbm = signal_dbm(line.flags)
     return {} if dbm is None else {"signal_dbm": dbm, "has_crystal": bool(line.flags & HAS_CRYSTAL)}

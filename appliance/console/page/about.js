@@ -12,10 +12,10 @@ export async function readAbout() {
   } catch { /* said below */ }
   byId("box-all").hidden = !answer?.ok;
   byId("box-said").textContent = answer?.ok ? "" : answer ? translated(await answer.text()) : words("no_page");
-  if (answer?.ok) tell(await answer.json());
+  if (answer?.ok) render(await answer.json());
 }
 
-function tell(box) {
+function render(box) {
   byId("box-shows-part").hidden = box.shows.length === 0;
   byId("box-shows").replaceChildren(...box.shows.map(shown));
   const refused = [...box.refused, ...box.aside];

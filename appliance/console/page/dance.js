@@ -118,7 +118,7 @@ export class Dance {
     const ink = canvas.getContext("2d");
     ink.clearRect(0, 0, wide, high);
     if (!frame || !show || frame.positions.length !== 3 * show.joints.length) {
-      this.tell(this.words(this.box.framesWanted ? "no_dance" : "dance_off"));
+      this.showSentence(this.words(this.box.framesWanted ? "no_dance" : "dance_off"));
       return;
     }
     const roots = frame.figures.map((figure) => pointOf(figure, 0));
@@ -149,7 +149,7 @@ export class Dance {
     }
     const isOld = performance.now() - this.takenAt > 1500;
     const names = this.heldJoints().map((joint) => show.joints[joint]);
-    this.tell(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.join(", ") }) : this.words("free"));
+    this.showSentence(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.join(", ") }) : this.words("free"));
   }
 
   // The phrase that the puppet starts from, as a figure next to it, to its right as the eye sees it.
@@ -174,7 +174,7 @@ export class Dance {
     return this.show.joints.map((_, joint) => joint).filter((joint) => figure.holds[joint] > HELD);
   }
 
-  tell(sentence) {
+  showSentence(sentence) {
     if (this.caption.textContent !== sentence) this.caption.textContent = sentence;
   }
 

@@ -8,7 +8,7 @@ let known = false, waiting = null, words = (key) => key, silence = 0;
 
 export function initDevice(me, table) {
   words = table;
-  tell(me.known);
+  render(me.known);
   byId("give-pin").addEventListener("click", () => askPin(null));
   byId("pin-cancel").addEventListener("click", closePin);
   byId("pin").addEventListener("keydown", (event) => { if (event.key === "Escape") closePin(); });
@@ -34,7 +34,7 @@ export function initDevice(me, table) {
 export async function ask(path, said, patience) {
   const answer = await request(path, said, patience);
   if (answer.status !== 401) return answer;
-  tell(false);
+  render(false);
   return new Promise((answered) => askPin(() => answered(ask(path, said, patience))));
 }
 
@@ -93,7 +93,7 @@ async function givePin() {
     return;
   }
   byId("pin").close();
-  tell(true);
+  render(true);
   document.dispatchEvent(new Event("known"));
   const then = waiting;
   waiting = null;
@@ -108,7 +108,7 @@ function deviceName() {
   return [machine, browser].filter(Boolean).join(", ");
 }
 
-async function tell(isKnown) {
+async function render(isKnown) {
   known = isKnown;
   document.body.dataset.known = known ? "yes" : "no";
   byId("known").textContent = words(known ? "known" : "unknown");
@@ -128,7 +128,7 @@ function listed(device) {
   button.textContent = words("revoke");
   twice(button, async () => {
     await request("/api/revoke", { id: device.id });
-    tell(!device.own);
+    render(!device.own);
   }, "sure_revoke");
   row.className = "row";
   row.append(button);

@@ -14,17 +14,17 @@ export function initGestures() {
 }
 
 export function showGestures(value) {
-  const told = value.gestures ?? {}, list = told.list ?? [], cues = value.cues.map((one) => one.name);
+  const gestures = value.gestures ?? {}, list = gestures.list ?? [], cues = value.cues.map((one) => one.name);
   byId("gestures-part").hidden = !value.hands.length || !cues.length;
   const choice = byId("gesture-cue");
   if (choice.dataset.names !== JSON.stringify(cues)) {
     choice.dataset.names = JSON.stringify(cues);
     choice.replaceChildren(...cues.map((name) => new Option(name, name)));
   }
-  const recording = told.recording;
+  const recording = gestures.recording;
   byId("gesture-record").disabled = Boolean(recording);
   byId("gesture-stop").hidden = !recording;
-  byId("gesture-said").textContent = recording ? words("gesture_come", { name: recording.name, come: recording.come, most: told.most }) : told.message ?? "";
+  byId("gesture-said").textContent = recording ? words("gesture_come", { name: recording.name, come: recording.come, most: gestures.most }) : gestures.message ?? "";
   const rows = byId("gestures");
   if (rows.dataset.names === JSON.stringify(list)) return;
   rows.dataset.names = JSON.stringify(list);

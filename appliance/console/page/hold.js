@@ -4,7 +4,7 @@ import { words } from "./words.js";
 const HOLD_MS = 900, SURE_MS = 6000;
 
 // Acts once the button was held, by a finger, the mouse or a key. A tap shows how.
-export function held(button, act, tell) {
+export function held(button, act, explain) {
   let timer = 0, isDone = false;
   const begin = () => {
     if (timer || button.disabled) return;
@@ -28,7 +28,7 @@ export function held(button, act, tell) {
     if (event.key === "Enter" || event.key === " ") begin();
   });
   button.addEventListener("contextmenu", (event) => event.preventDefault());
-  button.addEventListener("click", () => { if (!isDone) tell(words("hold_it")); });
+  button.addEventListener("click", () => { if (!isDone) explain(words("hold_it")); });
 }
 
 // isNeeded: false where nothing is lost now; then it acts at once.

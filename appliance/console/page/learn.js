@@ -5,21 +5,21 @@ import { ask, withPin } from "./device.js";
 import { byId } from "./elements.js";
 import { twice } from "./hold.js";
 import { sent } from "./update.js";
-import { number, translated, words } from "./words.js";
+import { locale, number, translated, words } from "./words.js";
 
 const LOOK_MS = 2000, LISTED_WITHIN_MS = 20_000, ADOPTED_WITHIN_MS = 120_000;
 let timer = 0, chosen = "", isRead = false, reads = 0;
 
 export function initLearn() {
   byId("learn-open").addEventListener("click", () => withPin(read));
-  byId("learn-begin").addEventListener("click", async () => tell(await ask("/api/learn", { recordings: chosen, begins_with: byId("learn-show").value })));
+  byId("learn-begin").addEventListener("click", async () => showAnswer(await ask("/api/learn", { recordings: chosen, begins_with: byId("learn-show").value })));
   byId("learn-files").addEventListener("change", upload);
-  byId("learn-end").addEventListener("click", async () => tell(await ask("/api/learn/end", {})));
+  byId("learn-end").addEventListener("click", async () => showAnswer(await ask("/api/learn/end", {})));
   twice(byId("learn-dance"), dance, "sure_now");
   byId("learn-rehearsal").addEventListener("click", async () => {
     const answer = await ask("/api/learn/rehearsal", {}, ADOPTED_WITHIN_MS);
     if (answer.status === 200) chosen = answer.value.name;
-    tell(answer);
+    showAnswer(answer);
   });
 }
 
@@ -54,8 +54,9 @@ async function read() {
     chosen = name;
     read();
   });
-  const offered = ["", ...shows].map((name) => new Option(name || words("learn_new"), name, false, name === byId("learn-show").value));
-  byId("learn-show").replaceChildren(...offered);
+  const before = byId("learn-show").value;
+  const offered = shows.map((one) => new Option(labelOf(one), one.id, false, one.id === before));
+  byId("learn-show").replaceChildren(new Option(words("learn_new"), ""), ...offered);
   byId("learn-from").hidden = byId("learn-files").closest(".row").hidden = runs;
   byId("learn-begin").hidden = runs || !recordings.length;
   byId("learn-begin").disabled = !chosen || studio !== "";
@@ -66,6 +67,12 @@ async function read() {
   figures(progress.figures ?? []);
   if (runs) timer = setTimeout(read, LOOK_MS);
   return undefined;
+}
+
+// A show by its name, and when it came: two of them may have one name.
+function labelOf({ name, since, danced }) {
+  const time = since ? new Date(1000 * since).toLocaleString(locale, { dateStyle: "short", timeStyle: "short" }) : "";
+  return words(danced ? "learn_show_danced" : since ? "learn_show" : "learn_show_bundled", { name, time });
 }
 
 function stateOf(progress, runs, folders, show) {
@@ -105,7 +112,7 @@ async function upload() {
   if (answer?.status !== 200) say(translated(answer?.message ?? "") || words("no_page"));
 }
 
-function tell(answer) {
+function showAnswer(answer) {
   if (answer.status === 200) read();
   else say(translated(answer.message) || words("no_page"));
 }

@@ -44,7 +44,7 @@ export function showMotion(value, show) {
     byId(id).parentElement.hidden = BETWEEN.includes(name) && !section.from;
     if (name === "sigma" && declared(name) > USUAL_SIGMA) unlock();
     if (document.activeElement !== byId(id)) byId(id).value = declared(name);
-    tell(id, digits);
+    showValue(id, digits);
   }
   if (document.activeElement !== byId(`${now}-seed`)) byId(`${now}-seed`).value = declared("seed");
   if (now === "path") showMap(value.motion["path points"] ?? [], show.generation);
@@ -53,7 +53,7 @@ export function showMotion(value, show) {
 function dial(source, name, least, most, step, digits) {
   const id = `${source}-${name}`;
   return slider({
-    id, label: words(`motion_${name}`), least, most, step, tell: () => tell(id, digits),
+    id, label: words(`motion_${name}`), least, most, step, onInput: () => showValue(id, digits),
     act: (value) => command(`/motion/${source}/${name}`, value, FADE_S),
   });
 }
@@ -71,7 +71,7 @@ function seed(source) {
   return label;
 }
 
-function tell(id, digits) { byId(`${id}-said`).textContent = number(Number(byId(id).value), digits); }
+function showValue(id, digits) { byId(`${id}-said`).textContent = number(Number(byId(id).value), digits); }
 
 function lock() { byId("vary-sigma").max = byId("sigma-unlocked").checked ? MOST_SIGMA : USUAL_SIGMA; }
 

@@ -135,13 +135,13 @@ function tonight(value) {
   byId("resume").classList.toggle("wanted", ["stopped", "panic"].includes(status?.state ?? ""));
   const over = value.fallbacks.filter((one) => !one.active);
   byId("fallbacks-part").hidden = over.length === 0;
-  byId("fallbacks").replaceChildren(...over.map(told));
+  byId("fallbacks").replaceChildren(...over.map(fallbackItem));
   const active = value.fallbacks.filter((one) => one.active);
   byId("slot-none").hidden = active.length > 0;
-  byId("fallbacks-now").replaceChildren(...active.map(told));
+  byId("fallbacks-now").replaceChildren(...active.map(fallbackItem));
 }
 
-function told(fallback) {
+function fallbackItem(fallback) {
   const item = document.createElement("li"), small = document.createElement("small");
   const sentence = spoken(fallback), at = fallback.about ? sentence.indexOf(fallback.about) : -1;
   const about = document.createElement("b");

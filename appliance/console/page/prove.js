@@ -22,12 +22,12 @@ export function initProve() {
 export async function showProve() {
   isShown = true;
   const answer = await request("/api/prove");
-  if (answer.status !== 200) return tell(answer.message || words("no_page"));
+  if (answer.status !== 200) return showSentence(answer.message || words("no_page"));
   list(answer.value.proofs);
   goes = answer.value.show_goes;
   byId("prove-begin").textContent = words(goes ? "prove_stop_begin" : "prove_begin");
   running(answer.value.runs);
-  tell(answer.value.runs === null && answer.value.show_goes ? words("prove_show_goes") : "");
+  showSentence(answer.value.runs === null && answer.value.show_goes ? words("prove_show_goes") : "");
   if (answer.value.runs !== null) follow(answer.value.runs);
   return undefined;
 }
@@ -52,7 +52,7 @@ async function begin(kind) {
   const seconds = Number(byId("prove-seconds").value);
   const answer = await ask("/api/prove", kind === "latency" ? { kind, seconds } : { kind });
   if (answer.status !== 200) {
-    tell(translated(answer.message) || words("no_page"));
+    showSentence(translated(answer.message) || words("no_page"));
     return;
   }
   byId("prove-document").hidden = true;
@@ -66,7 +66,7 @@ function follow(wanted) {
   measured = { at: [], ms: [], settling: 0, seconds: wanted.seconds };
   byId("prove-live").hidden = wanted.kind !== "latency";
   byId("prove-live").scrollIntoView({ block: "center" });
-  tell(words(`prove_runs_${wanted.kind}`));
+  showSentence(words(`prove_runs_${wanted.kind}`));
   look();
 }
 
@@ -85,18 +85,18 @@ async function look() {
   else timer = setTimeout(look, LOOK_MS);
 }
 
-function take(told) {
-  if (told.phase) {
-    measured.inPhase = told.phase === "locked";
-    if (measured.inPhase) Object.assign(measured, { settling: told.settling_s, seconds: told.seconds });
-    tell(words(`prove_phase_${told.phase}`, told));
+function take(progress) {
+  if (progress.phase) {
+    measured.inPhase = progress.phase === "locked";
+    if (measured.inPhase) Object.assign(measured, { settling: progress.settling_s, seconds: progress.seconds });
+    showSentence(words(`prove_phase_${progress.phase}`, progress));
   }
-  if (told.at_s && measured.inPhase) {
-    measured.at.push(...told.at_s);
-    measured.ms.push(...told.transport_ms);
+  if (progress.at_s && measured.inPhase) {
+    measured.at.push(...progress.at_s);
+    measured.ms.push(...progress.transport_ms);
   }
-  if (told.saved) measured.saved = told.saved;
-  if (told.trouble) measured.trouble = told.trouble;
+  if (progress.saved) measured.saved = progress.saved;
+  if (progress.trouble) measured.trouble = progress.trouble;
 }
 
 function drawLive() {
@@ -114,7 +114,7 @@ async function over() {
   const { saved, trouble } = measured;
   running(null);
   await showProve();
-  if (trouble || !saved) tell(translated(trouble) || words("prove_broken"));
+  if (trouble || !saved) showSentence(translated(trouble) || words("prove_broken"));
   else await open(saved);
 }
 
@@ -181,6 +181,6 @@ function savePicture() {
   }, "image/png");
 }
 
-function tell(sentence) {
+function showSentence(sentence) {
   byId("prove-said").textContent = sentence;
 }

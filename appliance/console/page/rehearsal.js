@@ -19,14 +19,14 @@ let figure = null;
 export function initRehearsal(me, box) {
   first('[data-page="rehearsal"]').hidden = !me.rehearsal;
   for (const id of ["coding", "interaction"]) {
-    byId(id).addEventListener("input", () => tell());
+    byId(id).addEventListener("input", () => render());
     byId(id).addEventListener("change", () => {
       const coding = Number(byId("coding").value);
       command("/iterations", coding, Math.min(coding, Number(byId("interaction").value)));
       byId(id).blur();
     });
   }
-  byId("liveliness").addEventListener("input", () => tell());
+  byId("liveliness").addEventListener("input", () => render());
   byId("liveliness").addEventListener("change", () => {
     command("/liveliness", Number(byId("liveliness").value), LIVELINESS_FADE_S);
     byId("liveliness").blur();
@@ -64,7 +64,7 @@ export function showRehearsal(value, show) {
   }
   if (value.status && document.activeElement !== byId("liveliness")) byId("liveliness").value = value.status.liveliness;
   byId("seed-said").textContent = value.status?.seed >= 0 ? words("seed_now", { seed: value.status.seed }) : "";
-  tell();
+  render();
   showMotion(value, show);
   showSprings(value, show);
   showFloor(value.goal, show);
@@ -96,7 +96,7 @@ export function leaveRehearsal() {
   leaveLearn();
 }
 
-function tell() {
+function render() {
   for (const id of ["coding", "interaction"]) byId(`${id}-said`).textContent = byId(id).value;
   byId("liveliness-said").textContent = number(Number(byId("liveliness").value), 2);
 }

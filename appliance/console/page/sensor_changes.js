@@ -92,11 +92,11 @@ async function send() {
   button.disabled = isDone;
 }
 
-async function run(said, tell) {
+async function run(said, report) {
   try {
     const answer = await fetch("/api/sensors", { method: "POST", body: JSON.stringify(said) });
     if (!answer.ok) {
-      tell(translated(await answer.text()));
+      report(translated(await answer.text()));
       return false;
     }
     const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -105,7 +105,7 @@ async function run(said, tell) {
       const lines = (rest + part.value).split("\n");
       rest = lines.pop();
       for (const line of lines.map((one) => JSON.parse(one))) {
-        if ("message" in line) tell(translated(line.message));
+        if ("message" in line) report(translated(line.message));
         else isDone = line.done;
       }
     }

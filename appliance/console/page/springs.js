@@ -19,7 +19,7 @@ const same = (value) => value;
 export function initSprings() {
   byId("springs-dials").append(...Object.entries(DIALS).map(([name, dial]) => slider({
     id: `springs-${name}`, label: words(`springs_${name}`), least: dial.least, most: dial.most, step: 0.05,
-    tell: () => tell(name, dial), act: () => command(dial.address, given(name, dial), FADE_S),
+    onInput: () => showValue(name, dial), act: () => command(dial.address, given(name, dial), FADE_S),
   })));
   byId("springs-kick").addEventListener("click", () => command("/springs/kick", ...KICK_M_S));
 }
@@ -35,10 +35,10 @@ export function showSprings(value, show) {
     const input = byId(`springs-${name}`);
     input.parentElement.hidden = !show.has_strings && ["strings", "feedback"].includes(name);
     if (document.activeElement !== input) input.value = (dial.at ?? same)(inForce[name]);
-    tell(name, dial);
+    showValue(name, dial);
   }
 }
 
 function given(name, dial) { return (dial.given ?? same)(Number(byId(`springs-${name}`).value)); }
 
-function tell(name, dial) { byId(`springs-${name}-said`).textContent = number(given(name, dial), dial.digits); }
+function showValue(name, dial) { byId(`springs-${name}-said`).textContent = number(given(name, dial), dial.digits); }

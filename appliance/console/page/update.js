@@ -59,11 +59,11 @@ async function sendFiles() {
 }
 
 // XMLHttpRequest, because fetch does not report the progress of an upload.
-export function sent(file, where, tell) {
+export function sent(file, where, report) {
   return new Promise((answered) => {
     const asked = new XMLHttpRequest();
     asked.upload.onprogress = (event) => {
-      tell(words("update_sends", { name: file.name, percent: Math.floor((100 * event.loaded) / event.total) }));
+      report(words("update_sends", { name: file.name, percent: Math.floor((100 * event.loaded) / event.total) }));
     };
     asked.onload = () => answered({ status: asked.status, message: asked.responseText });
     asked.onerror = () => answered({ status: 0, message: "" });

@@ -23,10 +23,10 @@ export async function danceAgain(id) {
 }
 
 async function readFile() {
-  tell(words("box_reading"), []);
+  showSentence(words("box_reading"), []);
   const answer = await ask("/api/box/file", undefined, CHECKED_WITHIN_MS);
   byId("file-part").hidden = answer.status !== 200;
-  if (answer.status !== 200) return tell(translated(answer.message) || words("no_page"), []);
+  if (answer.status !== 200) return showSentence(translated(answer.message) || words("no_page"), []);
   file = answer.value;
   receivers = file.receivers.map((written) => ({ written, removed: false, added: false }));
   byId("file-name").textContent = file.file;
@@ -36,7 +36,7 @@ async function readFile() {
   const isReceiver = ({ location }) => location[0] === RECEIVERS[0] && location[1] === RECEIVERS[1];
   byId("file-keys").replaceChildren(...file.keys.filter((key) => !isReceiver(key)).map(field));
   showReceivers();
-  return tell("", []);
+  return showSentence("", []);
 }
 
 // A label in the reader's language; below it the key, for those who edit the file.
@@ -140,7 +140,7 @@ function typed(key, input) {
 }
 
 async function save(now) {
-  tell(words("file_checking"), []);
+  showSentence(words("file_checking"), []);
   const buttons = [byId("file-check"), byId("file-now")];
   for (const button of buttons) button.disabled = true;
   const wanted = { text: byId("file-text").value, values: changed(), now };
@@ -148,19 +148,19 @@ async function save(now) {
   asked = "";
   const answer = await ask("/api/box/file", { ...wanted, sure }, CHECKED_WITHIN_MS);
   for (const button of buttons) button.disabled = false;
-  if (answer.status !== 200) return tell(translated(answer.message) || words("no_page"), []);
+  if (answer.status !== 200) return showSentence(translated(answer.message) || words("no_page"), []);
   const { problems, asks, message: said } = answer.value;
-  if (problems.length) return tell(words("file_refused"), problems, wanted.values);
+  if (problems.length) return showSentence(words("file_refused"), problems, wanted.values);
   if (asks) {
     asked = JSON.stringify(wanted);
-    return tell(words("file_sure"), asks.map((one) => ({ message: one })));
+    return showSentence(words("file_sure"), asks.map((one) => ({ message: one })));
   }
   if (!now) await readFile();
-  return tell(translated(said), []);
+  return showSentence(translated(said), []);
 }
 
 // A problem names its key, or repeats the value that was typed: that field is marked, and says what is wrong.
-function tell(sentence, problems, values = []) {
+function showSentence(sentence, problems, values = []) {
   byId("file-said").textContent = sentence;
   for (const input of document.querySelectorAll("#file-part input")) input.removeAttribute("aria-invalid");
   for (const note of document.querySelectorAll("#file-part .wrong")) note.remove();
