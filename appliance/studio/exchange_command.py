@@ -65,10 +65,10 @@ def convert(
     """
     from appliance.exchange.formats import known_ending
     from appliance.studio.exchange.glb_reading import Choice
-    from appliance.studio.exchange.reading import read_as_told
+    from appliance.studio.exchange.reading import read_as_given
 
     known_ending(out)
-    recording = _reported(source, *read_as_told(source, reading, Choice(skin, animation)))
+    recording = _reported(source, *read_as_given(source, reading, Choice(skin, animation)))
     if fps is not None:
         recording = recording.resampled(fps)
     _write(out, recording)
@@ -98,11 +98,11 @@ def retarget(
     from appliance.exchange.exchange_error import ExchangeError
     from appliance.exchange.formats import known_ending
     from appliance.studio.exchange.glb_reading import Choice
-    from appliance.studio.exchange.reading import read_as_told
+    from appliance.studio.exchange.reading import read_as_given
     from appliance.studio.exchange.retargeting import retarget as put_on
 
     known_ending(out)
-    dance = _reported(phrase, *read_as_told(phrase, reading, Choice(skin, animation)))
+    dance = _reported(phrase, *read_as_given(phrase, reading, Choice(skin, animation)))
     other = _skeleton_of(to, reading)
     try:
         found = put_on(dance, other)
@@ -121,12 +121,12 @@ def _skeleton_of(like: Path | None, reading: ReadingOptions = AS_THE_FILES_SAY) 
     from appliance.pose.body_facts import with_stance
     from appliance.pose.bvh import read_bvh
     from appliance.show.bundle import default_show_path
-    from appliance.studio.exchange.reading import read_as_told
+    from appliance.studio.exchange.reading import read_as_given
 
     folder = like or default_show_path()
     if folder.is_dir():  # a show's skeleton is in the stage's frame already
         return with_stance(read_bvh(folder / "skeleton.bvh"))
-    return _reported(folder, *read_as_told(folder, reading)).skeleton
+    return _reported(folder, *read_as_given(folder, reading)).skeleton
 
 
 def _write(out: Path, recording: Recording) -> None:

@@ -14,7 +14,7 @@ from appliance.cli import journal, pictures
 from appliance.pose import quaternion
 from appliance.recorder.reading import read_journal
 from appliance.release import choice
-from appliance.studio.exchange.reading import read_as_told
+from appliance.studio.exchange.reading import read_as_given
 from tests.bundles import write_show
 from tests.command import Command
 from tests.recorder.night import Night
@@ -67,7 +67,7 @@ def test_the_dance_of_the_night_is_a_recording(recorded: Path, tmp_path: Path, b
     said = bunraku("journal", "export", "--journal", recorded, "--bvh", bvh, "--glb", glb).out
     assert said.count("1.0 s of dance") == 2
     danced = read_journal(recorded)
-    for found in (read_as_told(bvh)[0], read_as_told(glb)[0]):
+    for found in (read_as_given(bvh)[0], read_as_given(glb)[0]):
         assert found.skeleton.same_joints(danced.skeleton)
         np.testing.assert_allclose(found.roots, danced.ticks["root"][:, 0], atol=1e-5)
         assert np.degrees(quaternion.angle_between(found.poses, danced.ticks["pose"][:, 0])).max() < 0.1
@@ -83,7 +83,7 @@ def test_of_several_puppets_the_one_that_is_written_is_named_and_may_be_chosen(
     assert "by left of left, right, late, slow (--puppet)" in bunraku(*export).out
     assert "by slow of left" in bunraku(*export, "--puppet", "slow").out
     danced = read_journal(journal).ticks["root"][:, 3]
-    np.testing.assert_allclose(read_as_told(tmp_path / "one.bvh")[0].roots, danced, atol=1e-5)
+    np.testing.assert_allclose(read_as_given(tmp_path / "one.bvh")[0].roots, danced, atol=1e-5)
     assert "no puppet 'nobody' danced" in bunraku(*export, "--puppet", "nobody", status=2).err
     alone = ("journal", "export", tmp_path / "out", "--journal", journal, "--puppet", "slow")
     assert "--puppet does nothing without --bvh or --glb" in bunraku(*alone, status=2).err

@@ -24,7 +24,7 @@ from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.stage_frame import in_stage_frame
-from appliance.studio.exchange.reading import read_as_told
+from appliance.studio.exchange.reading import read_as_given
 from tests.bundles import swaying_phrase
 from tests.command import Command
 from tests.pose.conventions import dance_of
@@ -66,7 +66,7 @@ def assert_same_dance(found: Recording, meant: Recording, ending: str) -> None:
 def test_a_dance_comes_back(figure: str, ending: str, tmp_path: Path) -> None:
     meant = with_ends(moved(FIGURES[figure], seconds=2.0, fps=59.94))
     write_recording(tmp_path / f"dance{ending}", meant)
-    assert_same_dance(read_as_told(tmp_path / f"dance{ending}")[0], meant, ending)
+    assert_same_dance(read_as_given(tmp_path / f"dance{ending}")[0], meant, ending)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -77,7 +77,7 @@ def test_bones_that_stretch_come_back(ending: str, tmp_path: Path) -> None:
     stretched[:, 3] *= 1.0 + 0.2 * np.sin(np.arange(count) / 9)[:, None]
     stretched[:, 0] = 0.0
     write_recording(tmp_path / f"dance{ending}", replace(rigid, translations=stretched))
-    found = read_as_told(tmp_path / f"dance{ending}")[0].translations
+    found = read_as_given(tmp_path / f"dance{ending}")[0].translations
     assert found is not None
     np.testing.assert_allclose(found[:, 1:], stretched[:, 1:], atol=1e-5)
 
@@ -98,7 +98,7 @@ def test_any_rotations_come_back(
     meant = Recording(figure, poses, rng.normal(size=(frames, 3)), fps)
     path = tmp_path_factory.mktemp("any") / f"dance{ending}"
     write_recording(path, meant)
-    found = read_as_told(path, AS_IT_IS)[0]
+    found = read_as_given(path, AS_IT_IS)[0]
     # Euler angles with six digits: at gimbal lock they say less
     assert np.degrees(quaternion.angle_between(found.poses, meant.poses)).max() < 0.01
     assert found.fps == pytest.approx(fps, rel=1e-6)
@@ -119,7 +119,7 @@ def test_real_dances_come_back(recordings_dir: Path, tmp_path: Path) -> None:
     meant = read_bvh(path, true_fps=60, drop_tpose=True).excerpt(0.0, 5.0)
     for ending in ENDINGS:
         write_recording(tmp_path / f"dance{ending}", meant)
-        assert_same_dance(read_as_told(tmp_path / f"dance{ending}", AS_IT_IS)[0], meant, ending)
+        assert_same_dance(read_as_given(tmp_path / f"dance{ending}", AS_IT_IS)[0], meant, ending)
 
 
 def test_the_command_as_it_is_installed(tmp_path: Path) -> None:
@@ -200,7 +200,7 @@ def test_a_file_of_blender_s_kind(tmp_path: Path) -> None:
             ],
         },
     )
-    found = read_as_told(tmp_path / "foreign.glb")[0]
+    found = read_as_given(tmp_path / "foreign.glb")[0]
     assert found.skeleton.names == ("Hips", "Spine")
     np.testing.assert_allclose(found.roots, np.tile([0.0, 0.95, 0.0], (3, 1)), atol=1e-6)
     places, _ = found.skeleton.forward_kinematics(found.poses, found.roots)
@@ -236,7 +236,7 @@ def test_damaged_files_are_refused_in_words(ending: str, tmp_path: Path, bunraku
     for data in spoilt[3:5]:
         path.write_bytes(data)
         with pytest.raises(ExchangeError):
-            read_as_told(path)[0]
+            read_as_given(path)[0]
     assert not (tmp_path / "out.bvh").exists() or ending == ".csv"
 
 
@@ -258,7 +258,7 @@ def test_a_row_that_is_none_costs_that_row_and_is_named(text: str, message: str,
     lines = path.read_text().splitlines()
     lines[6] = text.format(row=lines[6])
     path.write_text("\n".join(lines))
-    found, guesses = read_as_told(path)
+    found, guesses = read_as_given(path)
     assert len(found) == len(swaying_phrase())
     assert message in guesses[0].sentence() and "line 7" in guesses[0].sentence()
 
@@ -277,7 +277,7 @@ def test_frames_that_are_no_rotations_are_lost_and_named(ending: str, tmp_path: 
     poses = meant.poses.copy()
     poses[10:12, 3], poses[-1, 0] = np.nan, 0.0
     write_recording(tmp_path / f"dance{ending}", replace(meant, poses=poses))
-    found, guesses = read_as_told(tmp_path / f"dance{ending}")
+    found, guesses = read_as_given(tmp_path / f"dance{ending}")
     assert len(found) == len(meant) - 1
     place = "lines 13 to 14" if ending == ".csv" else "frames 10 to 11"
     assert f"{place}: 2 " in guesses[0].message and "is no unit quaternion" in guesses[0].message
@@ -307,7 +307,7 @@ def test_what_spreadsheets_make_of_a_table_is_read(kind: str, tmp_path: Path) ->
     meant, path = moved(body(), seconds=1.0), tmp_path / "dance.csv"
     write_recording(path, meant)
     path.write_text(in_a_spreadsheet(path.read_text(), kind))
-    found, guesses = read_as_told(path)
+    found, guesses = read_as_given(path)
     assert_same_dance(found, meant, ".csv")
     assert [guess.message for guess in guesses] == (
         ["columns that are none of the skeleton left out: one without a title"] if kind == "index" else []
@@ -318,7 +318,7 @@ def test_what_spreadsheets_make_of_a_table_is_read(kind: str, tmp_path: Path) ->
 def test_the_true_rate_overrules_the_one_of_every_format(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"dance{ending}"
     write_recording(path, swaying_phrase())
-    found, _ = read_as_told(path, ReadingOptions(true_fps={"*": 25.0}))
+    found, _ = read_as_given(path, ReadingOptions(true_fps={"*": 25.0}))
     assert found.fps == 25.0 and len(found) == len(swaying_phrase())
 
 
@@ -327,8 +327,8 @@ def test_the_true_rate_applies_before_a_table_s_own_is_judged(tmp_path: Path) ->
     write_recording(path, swaying_phrase())
     path.write_text(path.read_text().replace('"fps": 50.0', '"fps": 0', 1))
     with pytest.raises(ExchangeError):
-        read_as_told(path)
-    assert read_as_told(path, ReadingOptions(true_fps={"*": 25.0}))[0].fps == 25.0
+        read_as_given(path)
+    assert read_as_given(path, ReadingOptions(true_fps={"*": 25.0}))[0].fps == 25.0
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -338,10 +338,10 @@ def test_every_format_is_turned_to_the_audience_unless_asked(ending: str, tmp_pa
     away = replace(meant, poses=meant.poses.copy(), roots=meant.roots * [-1.0, 1.0, -1.0])
     away.poses[:, 0] = quaternion.multiply(half, meant.poses[:, 0])
     write_recording(tmp_path / f"dance{ending}", away)
-    found, guesses = read_as_told(tmp_path / f"dance{ending}")
+    found, guesses = read_as_given(tmp_path / f"dance{ending}")
     assert_same_dance(found, meant, ending)
     assert "mostly faces -z, turned to the audience (otherwise: --facing z)" in guesses[-1].sentence()
-    assert_same_dance(read_as_told(tmp_path / f"dance{ending}", AS_IT_IS)[0], away, ending)
+    assert_same_dance(read_as_given(tmp_path / f"dance{ending}", AS_IT_IS)[0], away, ending)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -350,7 +350,7 @@ def test_whatever_joints_are_called_what_is_written_is_read_back(ending: str, tm
     skeleton = Skeleton(HOSTILE, (-1, *range(count - 1)), np.tile([0.0, 0.1, 0.0], (count, 1)))
     poses = np.tile(quaternion.IDENTITY.astype(float), (3, count, 1))
     changed = write_recording(tmp_path / f"dance{ending}", Recording(skeleton, poses, np.zeros((3, 3)), 50.0))
-    found, _ = read_as_told(tmp_path / f"dance{ending}", AS_IT_IS)
+    found, _ = read_as_given(tmp_path / f"dance{ending}", AS_IT_IS)
     assert found.skeleton.names == plain_names(HOSTILE)
     assert "'line\\nend' to 'line_end'" in changed and "左ひざ" not in changed
 

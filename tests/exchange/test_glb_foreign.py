@@ -14,7 +14,7 @@ from appliance.exchange.glb_file import GlbBuffer
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.exchange.glb_reading import Choice, read_glb
-from appliance.studio.exchange.reading import read_as_told
+from appliance.studio.exchange.reading import read_as_given
 from tests.command import Command
 
 TURNS = np.array([[0, 0, 0, 1], [0, 0, 0.6, 0.8], [0.36, 0.48, 0, 0.8]])  # x, y, z, w at 0, 0.5 and 1 s
@@ -197,7 +197,7 @@ def test_several_root_bones_hang_from_their_armature(tmp_path: Path) -> None:
     skins = [{"joints": [1, 2, 3, 4, 5]}]
     path = glb(tmp_path / "roots.glb", nodes, skins)
     assert read_glb(path).skeleton.names == ("Armature", *ALL, "IK_Target")
-    found, guesses = read_as_told(path)
+    found, guesses = read_as_given(path)
     assert found.skeleton.names == ALL
     assert "left out, with IK_Target: the hips are the root" in guesses[0].message
 

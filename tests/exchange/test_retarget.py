@@ -16,7 +16,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.stage_frame import in_stage_frame
-from appliance.studio.exchange.reading import read_as_told
+from appliance.studio.exchange.reading import read_as_given
 from appliance.studio.exchange.retargeting import leg_m, lowest_m, retarget
 from tests.command import Command
 from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of
@@ -68,7 +68,7 @@ def test_the_command_writes_it_and_refuses_unknown_names(tmp_path: Path, bunraku
     write_bvh(phrase, dance)
     write_bvh(other, as_the_system_writes(dance_of("LAFAN", 2.0), "LAFAN"))
     bunraku("retarget", phrase, "--to", other, "--out", tmp_path / "out.bvh")
-    assert "LeftArm" in read_as_told(tmp_path / "out.bvh")[0].skeleton.names
+    assert "LeftArm" in read_as_given(tmp_path / "out.bvh")[0].skeleton.names
     nameless = replace(dance.skeleton, names=tuple(f"bone{j}" for j in range(len(dance.skeleton))))
     write_bvh(other, replace(dance, skeleton=nameless))
     refused = bunraku("retarget", phrase, "--to", other, "--out", tmp_path / "no.bvh", status=2)

@@ -24,7 +24,7 @@ from appliance.studio.exchange.points_file import (
     read_points,
     with_y_up,
 )
-from appliance.studio.exchange.reading import read_as_told
+from appliance.studio.exchange.reading import read_as_given
 from appliance.studio.exchange.topology import directions_at_rest, parents_by_name
 
 USUAL_FPS = 50.0
@@ -73,12 +73,12 @@ def _figures(errors: Array) -> str:
 def import_points(source: Path, options: PointsOptions, say: Callable[[str], None]) -> Imported:
     """Read points, fit a skeleton, find its poses. Raises ExchangeError or BvhError."""
     listed = None if options.names is None else read_names(options.names)
-    names, read, told_fps, notes = read_points(source, listed)
+    names, read, given_fps, notes = read_points(source, listed)
     for note in notes:
         say(f"{source.name}: {note}.")
-    fps = options.fps or told_fps or USUAL_FPS
+    fps = options.fps or given_fps or USUAL_FPS
     if options.fps is None:
-        why = "by the column of times" if told_fps else "as nothing else is given"
+        why = "by the column of times" if given_fps else "as nothing else is given"
         say(f"Rate: {fps:g} frames a second, {why}. If that is wrong: --fps.")
     given = None if listed is None or listed.parents is None else listed.parents
     read = _with_zeros_as_gaps(names, given, read, say)
@@ -143,7 +143,7 @@ def _as_model(
     source: Path, model: Path, names: Sequence[str], points: Array, say: Callable[[str], None]
 ) -> tuple[Skeleton, Array]:
     reported = ReadingOptions(true_fps={"*": USUAL_FPS})  # its dance is not asked for
-    recording, guesses = read_as_told(model, reported)
+    recording, guesses = read_as_given(model, reported)
     figure = recording.skeleton
     for guess in guesses:
         say(f"{model.name}: {guess.sentence()}.")

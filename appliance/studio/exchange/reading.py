@@ -15,7 +15,7 @@ from appliance.studio.exchange.table_reading import read_csv, read_npz
 _METRE = 1.0  # in all formats but BVH
 
 
-def read_as_told(
+def read_as_given(
     path: Path, reading: ReadingOptions = AS_THE_FILES_SAY, choice: Choice = WHOLE
 ) -> tuple[Recording, list[Guess]]:
     """All of a recording in the stage's frame, and what was lost or changed.

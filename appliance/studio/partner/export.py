@@ -142,16 +142,16 @@ def in_eight_bits(model: onnx.ModelProto) -> onnx.ModelProto:
 def _flow(graph: Graph, layers: Layers, answers: Answers, context: str) -> None:
     """Answers.forward after its context, as codes."""
     seen, codes = layers.elu(graph, context), "noise"
-    told = [
-        layers.linear(graph, seen, layer, f"told.{n}")
-        for n, layer in enumerate(answers.told)
+    conditioned = [
+        layers.linear(graph, seen, layer, f"condition.{n}")
+        for n, layer in enumerate(answers.conditions)
         if isinstance(layer, nn.Linear)
     ]
     for number in range(FLOW_STEPS):
         times, hidden = times_of(torch.full((1, 1), number / FLOW_STEPS)), codes
         for n, (step, when) in enumerate(zip(answers.steps, answers.when, strict=True)):
             weight = graph.constant(f"flow.{n}", step.get_parameter("weight").detach().numpy().T)
-            moved = graph.op("Add", graph.op("MatMul", hidden, weight), told[n])
+            moved = graph.op("Add", graph.op("MatMul", hidden, weight), conditioned[n])
             shift = graph.constant(f"when.{n}.{number}", when(times).detach().numpy())
             hidden = layers.elu(graph, graph.op("Add", moved, shift))
         way = layers.linear(graph, hidden, answers.last, "last")

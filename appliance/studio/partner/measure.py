@@ -154,7 +154,7 @@ def _rows(
     dataset: Dataset,
     apart: Pairs,
     options: DuetOptions,
-    told: Callable[[str], None],
+    report: Callable[[str], None],
     danced: dict[str, tuple[Recording, Recording]],
 ) -> Iterator[Row]:
     """danced: takes the first couple's duets by their names."""
@@ -176,10 +176,10 @@ def _rows(
                 [likeness(one, two, pairs) for one, two in both],
             )
         )
-        told_apart = energy = float("nan")
+        critic = energy = float("nan")
         if recorded:
             made, real = [two for _, two in both], [whole[take.name] for take in recorded]
-            told_apart = _critic(recorded, made, moving)
+            critic = _critic(recorded, made, moving)
             limbs = limbs_of(joints)
             energies = [
                 value
@@ -192,7 +192,7 @@ def _rows(
         roles = [n % 2 if len(both) == len(couples) else 0 for n in range(len(both))]
         accord = [accords[role](*one) for role, one in zip(roles, both, strict=True)]
         error = float(np.std(accord) / np.sqrt(max(1, len(accord) - 1)))
-        return Row(name, above, lag_s, leads, alike, told_apart, energy, float(np.mean(accord)), error)
+        return Row(name, above, lag_s, leads, alike, critic, energy, float(np.mean(accord)), error)
 
     yield row("recorded couples", [(whole[one.name], whole[two.name]) for one, two in apart])
     others = couples[2:] + couples[:2]
@@ -205,7 +205,7 @@ def _rows(
     yield row(COPY_NAME, copies)
     dials = [(follow, 0.0) for follow in _FOLLOWS] + [(1.0, lead) for lead in _LEADS]
     for follow, lead in dials:
-        told(f"dances with follow {follow:g}, lead {lead:g}")
+        report(f"dances with follow {follow:g}, lead {lead:g}")
         duets = [
             danced_duet(
                 network,

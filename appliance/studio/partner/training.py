@@ -34,7 +34,7 @@ OTHERS = 12  # moves drawn at a moment
 _MOST = 12_000  # moments for which they are
 TIMES, FLOW_STEPS, DEEP = 4, 6, (192, 192, 192)  # for the flow
 LOOK_EVERY = 100  # steps between two looks at the take that is kept apart
-Told = Callable[[str], None]
+Report = Callable[[str], None]
 Side = tuple[Tensor, Tensor]  # moves with the steps before them (N, 11, F), and who (N, W)
 N = TypeVar("N", bound=nn.Module)
 
@@ -103,7 +103,7 @@ class Answers(nn.Module):
         self.context = _dense(size, width, width, width, dropped)
         sizes = (code, *DEEP)
         self.steps = nn.ModuleList([nn.Linear(into, out, bias=False) for into, out in pairwise(sizes)])
-        self.told = nn.ModuleList([nn.Linear(width, out) for out in DEEP])
+        self.conditions = nn.ModuleList([nn.Linear(width, out) for out in DEEP])
         self.when = nn.ModuleList([nn.Linear(TIMES, out, bias=False) for out in DEEP])
         self.last = nn.Linear(DEEP[-1], code)
 
@@ -115,8 +115,8 @@ class Answers(nn.Module):
     def way(self, codes: Tensor, time: Tensor, seen: Tensor) -> Tensor:
         """Where codes (N, C) flow at a time (N, 1) or (1, 1), 0..1."""
         hidden, times = codes, times_of(time)
-        for step, told, when in zip(self.steps, self.told, self.when, strict=True):
-            hidden = functional.elu(step(hidden) + told(seen) + when(times))
+        for step, condition, when in zip(self.steps, self.conditions, self.when, strict=True):
+            hidden = functional.elu(step(hidden) + condition(seen) + when(times))
         out: Tensor = self.last(hidden)
         return out
 
@@ -205,12 +205,12 @@ def train(
     steps: int,
     device: str = "cpu",
     seed: int = 1,
-    told: Told = lambda message: None,
+    report: Report = lambda message: None,
 ) -> Partner:
     """All networks within the seconds, or with so many steps each; the best on the stretches kept apart."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    descent = _Descent(steps, told)
+    descent = _Descent(steps, report)
     began = time.monotonic()
     learned, asked = (_moved(moments_of(network, part, rng), dancers, device) for part in (stretches, apart))
     seconds = max(seconds - (time.monotonic() - began), 1.0)
@@ -419,13 +419,13 @@ def _codes(
 ) -> Numbers:
     """(N * count, C) drawn."""
     noise = rng.standard_normal((len(own) * count, answers.code)).astype(np.float32)
-    told = (
+    given = (
         _tensor(own, device),
         _tensor(led, device),
         _one_hot(who, answers.dancers, device),
         _tensor(heard.astype(np.float32)[:, None], device),
     )
-    repeated = (part.float().repeat_interleave(count, 0) for part in told)
+    repeated = (part.float().repeat_interleave(count, 0) for part in given)
     codes: Numbers = answers(*repeated, _tensor(noise, device)).cpu().numpy()
     return codes
 
@@ -478,8 +478,8 @@ class _Descent:
     A network's running mean is what is looked at, and kept where it is best.
     """
 
-    def __init__(self, steps: int, told: Told) -> None:
-        self._steps, self._told, self._seconds, self._name = steps, told, math.inf, ""
+    def __init__(self, steps: int, report: Report) -> None:
+        self._steps, self._report, self._seconds, self._name = steps, report, math.inf, ""
 
     def within(self, seconds: float, name: str) -> _Descent:
         """For the next network."""
@@ -511,7 +511,9 @@ class _Descent:
                     mean.lerp_(own, 1 - min(0.995, step / (step + 10)))
             if step % LOOK_EVERY == 0:
                 value, said = look(average)
-                self._told(f"{self._name}, step {step}: loss {float(loss.detach()):.3f}; kept apart: {said}")
+                self._report(
+                    f"{self._name}, step {step}: loss {float(loss.detach()):.3f}; kept apart: {said}"
+                )
                 if value < least:
                     best, least = copy.deepcopy(average), value
         return average if keeps_last else best
