@@ -13,6 +13,14 @@ from appliance.console.devices import Device, Devices
 
 COOKIE = "bunraku_device"
 _READING = ("GET", "HEAD")
+# Anybody may look, and nobody change anything without the PIN, but for these routes: a phone has a code.
+_FOR_ANYBODY = frozenset(("/api/pin", "/api/phones/join", "/api/phones/reading", "/api/phones/leave"))
+_FOR_DEVICES = frozenset(
+    (
+        *("/hands", "/api/box/file", "/api/cue/show.zip", "/api/devices", "/api/fleet", "/api/help.zip"),
+        *("/api/learn", "/api/logs", "/api/update"),
+    )
+)
 _HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -52,6 +60,8 @@ class Guard:
             self.refused += 1
             return web.Response(status=403, text=complaint, headers=_HEADERS)
         try:
+            if needs_device(request):
+                self.require_device(request)
             response = await handler(request)
         except web.HTTPException as error:
             error.headers.update(_HEADERS)
@@ -96,6 +106,16 @@ class Guard:
         except ValueError:
             return False
         return asker.is_loopback or any(asker in network for network in self._viewers)
+
+
+def needs_device(request: web.Request) -> bool:
+    """Whether the route of a request is only for devices that gave the PIN."""
+    resource = request.match_info.route.resource
+    if resource is None:  # there is no such route
+        return False
+    if request.method in _READING:
+        return resource.canonical in _FOR_DEVICES
+    return resource.canonical not in _FOR_ANYBODY
 
 
 def peer(request: web.Request) -> str:

@@ -14,7 +14,6 @@ from aiohttp import web
 from appliance.console.body import said
 from appliance.console.box_view import BoxView
 from appliance.console.child import answer_of
-from appliance.console.guard import Guard
 from appliance.console.logs import Logs
 
 FILE = "help.zip"  # in the runtime folder
@@ -25,9 +24,9 @@ class Help:
     """Requests for it. journal: its folder; None: this box keeps none. box: as in Settings."""
 
     def __init__(
-        self, guard: Guard, view: BoxView, logs: Logs, runtime: Path, journal: str | None, box: dict[str, str]
+        self, view: BoxView, logs: Logs, runtime: Path, journal: str | None, box: dict[str, str]
     ) -> None:
-        self._guard, self._view, self._logs, self._box = guard, view, logs, box
+        self._view, self._logs, self._box = view, logs, box
         self._file, self._journal, self._name = runtime / FILE, journal, FILE
         self._making = asyncio.Lock()
 
@@ -37,7 +36,6 @@ class Help:
 
     async def _make(self, request: web.Request) -> web.Response:
         """{"journal": whether the newest minutes of it are wanted} -> {"name"} of the file."""
-        self._guard.require_device(request)
         wanted = (await said(request)).get("journal")
         if self._making.locked():
             raise web.HTTPConflict(text="The file is being made already. Try again in a moment.")
@@ -63,7 +61,6 @@ class Help:
         return web.json_response({"name": self._name})
 
     async def _serve(self, request: web.Request) -> web.Response:
-        self._guard.require_device(request)
         try:
             body = self._file.open("rb")  # sent piece by piece, and closed then
         except OSError:

@@ -17,7 +17,6 @@ from aiohttp import web
 from appliance.box.child import environment
 from appliance.console.body import received, said
 from appliance.console.child import answer_of, own_child
-from appliance.console.guard import Guard
 from appliance.console.learning import FOLDER, RECORDINGS, STUDIO_MISSING, USUAL_MIN, Learning, Wanted
 from appliance.console.stage_view import StageView
 from appliance.pose.recorded_minutes import recorded_minutes
@@ -38,15 +37,9 @@ class Learn:
     """
 
     def __init__(
-        self,
-        guard: Guard,
-        state: Path,
-        journal: str | None,
-        box: dict[str, str],
-        is_installed: bool,
-        stage: StageView,
+        self, state: Path, journal: str | None, box: dict[str, str], is_installed: bool, stage: StageView
     ) -> None:
-        self._guard, self._journal, self._box, self._is_installed = guard, journal, box, is_installed
+        self._journal, self._box, self._is_installed = journal, box, is_installed
         self._stage, self._uploading = stage, asyncio.Lock()
         self._recordings, self._learning = state / RECORDINGS, Learning(state / FOLDER)
         self._child: asyncio.subprocess.Process | None = None
@@ -76,7 +69,6 @@ class Learn:
                 await asyncio.wait_for(self._child.wait(), _ENDS_WITHIN_S)
 
     async def _state(self, request: web.Request) -> web.Response:
-        self._guard.require_device(request)
         runs = self._learning.wanted() is not None
         listed = await asyncio.to_thread(self._listed)
         return web.json_response(
@@ -93,7 +85,6 @@ class Learn:
         )
 
     async def _begin(self, request: web.Request) -> web.Response:
-        self._guard.require_device(request)
         values = await said(request)
         name, minutes = values.get("recordings"), values.get("minutes", USUAL_MIN)
         folder, begins_with = self._folder(name), values.get("begins_with", "")
@@ -115,14 +106,12 @@ class Learn:
         return web.json_response({"done": True})
 
     async def _end(self, request: web.Request) -> web.Response:
-        self._guard.require_device(request)
         self._learning.end()
         self._learning.report(state="ended")
         return web.json_response({"done": True})
 
     async def _use_rehearsal(self, request: web.Request) -> web.Response:
         """Turn a live dancer's dance in the journal into recordings to learn from."""
-        self._guard.require_device(request)
         await said(request)
         if self._journal is None:
             raise web.HTTPConflict(text="This box keeps no journal: there is no rehearsal to learn from.")
@@ -134,7 +123,6 @@ class Learn:
 
     async def _take_recording(self, request: web.Request) -> web.Response:
         """The body is a BVH file; ?name= is its name. It is read once, as a training would read it."""
-        self._guard.require_device(request)
         name = request.query.get("name", "")
         if _FILE.fullmatch(name) is None:
             raise web.HTTPBadRequest(text="Recordings are BVH files, such as solo.bvh.")

@@ -11,7 +11,6 @@ from aiohttp import web
 
 from appliance.console.body import said
 from appliance.console.box_view import BoxView
-from appliance.console.guard import Guard
 from appliance.console.stage_view import StageView
 from appliance.levers.addresses import ADDRESSES, THE_SHOW, Address
 from appliance.show_control.midi_bindings import Binding, MidiBindings, checked, range_of
@@ -23,8 +22,8 @@ _FULL = "The binding cannot be saved ({reason}). What was bound before still is.
 class Midi:
     """The bindings of the process that hears MIDI; its report has their folder."""
 
-    def __init__(self, guard: Guard, stage: StageView, box: BoxView) -> None:
-        self._guard, self._stage, self._box = guard, stage, box
+    def __init__(self, stage: StageView, box: BoxView) -> None:
+        self._stage, self._box = stage, box
 
     def routes(self) -> list[web.RouteDef]:
         """For the server."""
@@ -45,7 +44,6 @@ class Midi:
         return await self._change(request, MidiBindings.remove)
 
     async def _change(self, request: web.Request, change: Any) -> web.Response:
-        self._guard.require_device(request)
         try:
             one: Binding = checked(await said(request))
             change(self._bindings(), one)

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 from aiohttp import web
 
 from appliance.console.body import PART, new_file, received, said
-from appliance.console.guard import Guard
 from appliance.console.update_code import CODE_FILE
 
 FOLDER = "update"  # in the runtime folder: the package, its signature, and `install` once it is wanted
@@ -48,14 +47,13 @@ class Update:
 
     def __init__(
         self,
-        guard: Guard,
         runtime: Path,
         is_installed: bool,
         show_goes: Callable[[], bool],
         stick: Path = STICK,
         keys: Path = KEYS,
     ) -> None:
-        self._guard, self._is_installed, self._show_goes = guard, is_installed, show_goes
+        self._is_installed, self._show_goes = is_installed, show_goes
         self._folder, self._card = runtime / FOLDER, runtime / CODE_FILE
         self._stick, self._keys = stick, keys
         self._code: _Code | None = None
@@ -74,7 +72,6 @@ class Update:
 
     async def _state(self, request: web.Request) -> web.Response:
         """can: this box takes updates here; stick: packages on it; ready: the package that is whole here."""
-        self._guard.require_device(request)
         names = await asyncio.to_thread(_names, self._stick)
         return web.json_response(
             {
@@ -87,7 +84,7 @@ class Update:
 
     async def _take_file(self, request: web.Request) -> web.Response:
         """The body is a file; ?name= is its name. A package and its signature come one after the other."""
-        self._require(request)
+        self._require_possible()
         name = request.query.get("name", "")
         if _NAME.fullmatch(name) is None:
             raise web.HTTPBadRequest(
@@ -104,7 +101,7 @@ class Update:
 
     async def _take_stick(self, request: web.Request) -> web.Response:
         """{"name"} of a package on the stick."""
-        self._require(request)
+        self._require_possible()
         name = (await said(request)).get("name")
         if not isinstance(name, str) or name not in _names(self._stick) or name.endswith(_SIGNATURE):
             raise web.HTTPNotFound(text="There is no such update on the stick.")
@@ -122,7 +119,7 @@ class Update:
 
     async def _begin(self, request: web.Request) -> web.Response:
         """Make the code, which the wall shows: the PIN alone does not install from outside of the hall."""
-        self._require(request)
+        self._require_possible()
         await said(request)
         if self._ready() is None:
             raise web.HTTPConflict(text="The update is not here yet: a package and its signature.")
@@ -137,7 +134,7 @@ class Update:
 
     async def _confirm(self, request: web.Request) -> web.Response:
         """{"code"} as the wall shows it."""
-        self._require(request)
+        self._require_possible()
         given = (await said(request)).get("code")
         if self._code is None or time.monotonic() > self._code.until:
             self._forget()
@@ -154,8 +151,7 @@ class Update:
         (self._folder / WANTED).touch()
         return web.json_response({"done": True})
 
-    def _require(self, request: web.Request) -> None:
-        self._guard.require_device(request)
+    def _require_possible(self) -> None:
         if not self._is_installed or not self._keys.is_file():
             raise web.HTTPConflict(
                 text="This box takes no updates here: it is not installed, or knows no key of its maker."

@@ -15,7 +15,6 @@ from aiohttp import web
 
 from appliance.console.body import received, said
 from appliance.console.child import answer_of
-from appliance.console.guard import Guard
 from appliance.console.learning import FOLDER as LEARNING
 from appliance.console.learning import Learning
 from appliance.console.rehearsed import FOLDER as REHEARSED
@@ -38,16 +37,14 @@ class Venue:
 
     def __init__(
         self,
-        guard: Guard,
         runtime: Path,
         box: dict[str, str],
         is_installed: bool,
         state: Path,
         show_goes: Callable[[], bool],
     ) -> None:
-        self._guard, self._box, self._is_installed = guard, box, is_installed
-        self._show_goes = show_goes
-        self._state = state
+        self._box, self._is_installed = box, is_installed
+        self._show_goes, self._state = show_goes, state
         self._anew = runtime / ANEW
         self._busy = asyncio.Lock()
 
@@ -63,11 +60,9 @@ class Venue:
         ]
 
     async def _file(self, request: web.Request) -> web.Response:
-        self._guard.require_device(request)
         return await self._done("box_file")
 
     async def _change(self, request: web.Request) -> web.Response:
-        self._guard.require_device(request)
         values = await said(request, 2 * _LARGEST_FILE)
         text, keys = values.get("text"), values.get("values", [])
         now, sure = values.get("now", False), values.get("sure", False)
@@ -78,14 +73,12 @@ class Venue:
         return await self._done("change_box_file", change=wanted)
 
     async def _dance_again(self, request: web.Request) -> web.Response:
-        self._guard.require_device(request)
         show = (await said(request)).get("id")
         if not self._is_installed or not isinstance(show, str) or _SHOW.fullmatch(show) is None:
             raise web.HTTPBadRequest(text="There is no such show.")
         return await self._done("dance_again", show=show)
 
     async def _dance_here(self, folder: str, source: str, request: web.Request) -> web.Response:
-        self._guard.require_device(request)
         await said(request)
         self._require_shelf()
         if folder == LEARNING and Learning(self._state / folder).reported().get("state") != "learned":
@@ -96,7 +89,6 @@ class Venue:
         """The body is a show, packed by another box. It dances at once, or after the next power-on where a
         show goes now.
         """
-        self._guard.require_device(request)
         self._require_shelf()
         async with self._alone():
             file = self._state / _ARRIVED / "show.zip"

@@ -11,8 +11,7 @@ import subprocess
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
 import yaml
@@ -237,9 +236,8 @@ def test_a_show_that_goes_is_not_interrupted(tmp_path: Path) -> None:
     """The same route, on a box whose show people see: what came counts from the next power-on."""
     with installed(tmp_path / "left") as left:
         pack_show(packed_bundle(tmp_path / "tonight", "tonight"), tmp_path / "show.zip")
-        guard: Any = SimpleNamespace(require_device=lambda request: None)
         box = {"chosen": str(left.run / CHOSEN)}
-        venue = Venue(guard, left.run, box, True, left.data / "state", show_goes=lambda: True)
+        venue = Venue(left.run, box, True, left.data / "state", show_goes=lambda: True)
 
         async def main() -> str:
             app = web.Application(client_max_size=1)

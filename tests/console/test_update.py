@@ -11,6 +11,7 @@ import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestClient, TestServer
 
+from appliance.console.guard import Handler, needs_device
 from appliance.console.update import FOLDER, TRIES, WANTED, Update
 from appliance.console.update_code import CODE_FILE, pending_code
 
@@ -28,9 +29,11 @@ class Hall:
         self.show_goes = False
         self.is_known = self.is_installed = True
 
-    def require_device(self, request: web.Request) -> None:
-        if not self.is_known:
+    @web.middleware
+    async def check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        if needs_device(request) and not self.is_known:
             raise web.HTTPUnauthorized
+        return await handler(request)
 
     @property
     def wants(self) -> bool:
@@ -41,15 +44,8 @@ class Hall:
 
     def run(self, act: Callable[[TestClient[Any, Any]], Awaitable[None]]) -> None:
         async def main() -> None:
-            update: Any = Update(
-                self,  # type: ignore[arg-type]
-                self.runtime,
-                self.is_installed,
-                lambda: self.show_goes,
-                self.stick,
-                self.keys,
-            )
-            app = web.Application()
+            update = Update(self.runtime, self.is_installed, lambda: self.show_goes, self.stick, self.keys)
+            app = web.Application(middlewares=[self.check])
             app.add_routes(update.routes())
             async with TestClient(TestServer(app)) as client:
                 await act(client)
