@@ -6,15 +6,16 @@ import ipaddress
 import os
 import socket
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from appliance.pair.roles import FRESH_S
 from appliance.show.box import OutputsConfig
 
 _ROUTES, _CARDS = Path("/proc/net/route"), Path("/sys/class/net")
 _SETTLE_S = 0.08  # a box hears the other one within that time
 _FORWARDS_S = 32.0  # IEEE 802.1D: a switch may pass nothing on for two times 15 s after a cable came in
-_ON_THE_WAY_S = 0.02  # what came by a cable was sent before it was out
+_ON_THE_WAY_S = 0.02  # a datagram from an unknown link, so soon after the cable was out, came by the cable
 _FIND_EACH_S = 0.25
 
 
@@ -25,10 +26,17 @@ class Carrier:
     receivers need none. Neither: no card is known that leads to them.
     """
 
-    def __init__(self, receivers: Iterable[str], routes: Path = _ROUTES, cards: Path = _CARDS) -> None:
-        """receivers: their addresses, or this machine's in their network."""
+    def __init__(
+        self,
+        receivers: Iterable[str],
+        routes: Path = _ROUTES,
+        cards: Path = _CARDS,
+        peers: Sequence[str] = (),
+    ) -> None:
+        """receivers: their addresses, or this machine's in their network. peers: the other box's."""
         self._receivers = [one for one in receivers if not ipaddress.IPv4Address(one).is_loopback]
-        self._routes, self._folder = routes, cards
+        self._routes, self._folder, self._peers = routes, cards, peers
+        self._beside: list[str] = []  # addresses of the other box that other cards lead to
         self._cards: list[Path] = []
         self.is_out, self.is_up = False, not self._receivers
         self._find_at = self._changed_at = float("-inf")
@@ -40,6 +48,7 @@ class Carrier:
         if not self._cards and now >= self._find_at:
             self._find_at = now + _FIND_EACH_S
             self._cards = [self._folder / one / "carrier" for one in cards_to(self._receivers, self._routes)]
+            self._beside = [one for one in self._peers if self.is_apart([one])]
         was_out, self.is_up = self.is_out, any(map(_is_up, self._cards))
         self.is_out = bool(self._cards) and not self.is_up
         if was_out is not self.is_out:
@@ -57,9 +66,16 @@ class Carrier:
         """
         return not self.is_out and (heard > self._changed_at or now - self._changed_at >= _SETTLE_S)
 
-    def is_heard_nonetheless(self, heard: float) -> bool:
-        """Whether another link still joins the two boxes while the receivers' cable is out."""
-        return self.is_out and heard > self._changed_at + _ON_THE_WAY_S
+    def is_heard_nonetheless(self, now: float, heard: float, heard_from: Mapping[str, float]) -> bool:
+        """Whether another link still joins the two boxes while the receivers' cable is out.
+
+        heard_from: when each of the other box's addresses was last heard.
+        """
+        if not self.is_out:
+            return False
+        return heard > self._changed_at + _ON_THE_WAY_S or any(
+            now - heard_from.get(one, float("-inf")) < FRESH_S for one in self._beside
+        )
 
     def knows_silence(self, now: float, heard: float) -> bool:
         """Whether a follower that hears nothing knows by it that the leader is gone."""

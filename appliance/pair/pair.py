@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from appliance.box.clock import TICK_S
 from appliance.pair import wire
 from appliance.pair.clock_offset import ClockOffset
 from appliance.pair.roles import Heard, Role, Roles
@@ -31,6 +32,7 @@ _PARTS_A_TICK = 12  # a keyframe is sent within some 5 ticks
 _ASK_KEYFRAME_S = 0.06
 _BUFFER_BYTES = 1 << 20
 REPEATS = 2  # each message is sent again in the two ticks after it
+BEATS = 3  # datagrams of a heartbeat, as some may be lost
 _TRY_AGAIN_S = 1.0
 _STALE_S = 0.1  # the kernel keeps datagrams for an address that does not answer, and sends them seconds later
 _KEYFRAME = 0  # first number of a question for a keyframe; messages are numbered from 1
@@ -57,6 +59,7 @@ class Pair:
     is_ready: this box could take over; reaches: see Roles.look; the stage sets both. wants_keyframe: the
     other box asked for one.
     same_show: whether the other box has the same show and software, as far as it was heard.
+    heard_from: when each of its addresses was last heard.
     """
 
     def __init__(
@@ -72,6 +75,7 @@ class Pair:
         self.is_ready = self.wants_keyframe = False
         self.reaches = True
         self.same_show = True
+        self.heard_from = dict.fromkeys(settings.peers, float("-inf"))
         self.trouble = ""  # why nothing can be heard or sent
         self._fingerprint = fingerprint
         self._codec = Codec(settings.key, fingerprint)
@@ -126,9 +130,14 @@ class Pair:
             self.follow_anew()
 
     def beat(self, now: float) -> None:
-        """That this box is there, and what it does; twice, since one may be lost."""
-        for _ in range(2):
+        """That this box is there, and what it does."""
+        for _ in range(BEATS):
             self._send(wire.BEAT, now)
+
+    def begin_tick(self, now: float) -> None:
+        """The leader, before a frame that may wait for a reading: that it is there, and leads."""
+        for _ in range(BEATS):
+            self._send(wire.BEGINS, now)
 
     def publish(self, message: bytes, now: float) -> None:
         """The leader, once a frame has left: the next message, and those before once more."""
@@ -234,17 +243,19 @@ class Pair:
             if now >= self._open_at:
                 self._open(now)
             return
-        came = list[bytes]()
+        came = list[tuple[bytes, tuple[str, int]]]()
         with contextlib.suppress(OSError):
             while len(came) < _AT_ONCE:
-                came.append(self._socket.recv(wire.LARGEST + 1))
+                came.append(self._socket.recvfrom(wire.LARGEST + 1))
         now, before = self._monotonic(), self._heard_at
-        for data in came:
+        for data, (sender, _) in came:
             found = self._codec.accept(data)
             if self._codec.greeting:
                 self._greet(now)
             if found is not None:
                 self._take(found, now, now - before)
+                if sender in self.heard_from:
+                    self.heard_from[sender] = now
         self._heard_at = now
 
     def _greet(self, now: float) -> None:
@@ -259,7 +270,9 @@ class Pair:
             self.offset.restart()
         self.offset.hear(found.sent, now)
         if now - found.sent - self.offset.seconds < _STALE_S + waited_s:
-            self.roles.hear(found.heard, now, self.is_ready)
+            # The frame may still fail to come: a tick that begins counts as much as the frame before it.
+            since = now - TICK_S if found.kind == wire.BEGINS else now
+            self.roles.hear(found.heard, since, self.is_ready)
         if (
             found.heard.role is Role.LEADS
             and not self.leads

@@ -80,9 +80,9 @@ class Roles:
 
     def hear(self, heard: Heard, now: float, is_ready: bool) -> None:
         """A datagram of the other box, authentic and new. is_ready: this box could take over."""
-        self._heard, self._peer = now, heard
+        self._heard, self._peer = max(self._heard, now), heard
         if heard.role is Role.LEADS:
-            self._heard_leader = now
+            self._heard_leader = max(self._heard_leader, now)
             if self.role is not Role.LEADS:
                 if self.role is not Role.FOLLOWS:
                     self._become(Role.FOLLOWS, now, "that one leads")

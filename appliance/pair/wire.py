@@ -14,11 +14,11 @@ from typing import NamedTuple
 from appliance.pair.roles import Heard, Role
 from appliance.sensor.wire import TAG_BYTES, Tagger
 
-MAGIC, VERSION = 0xB0A2, 1
+MAGIC, VERSION = 0xB0A2, 2
 # magic, version, kind; own number, the other's; counter; epoch, role, is ready; fingerprint; time sent
 _HEAD = struct.Struct("<HBBQQQIBB8sd")
-BEAT, MESSAGE, KEYFRAME, ASK = range(1, 5)
-KINDS = (BEAT, MESSAGE, KEYFRAME, ASK)
+BEAT, MESSAGE, KEYFRAME, ASK, BEGINS = range(1, 6)  # BEGINS: a leader begins a tick
+KINDS = (BEAT, MESSAGE, KEYFRAME, ASK, BEGINS)
 MOST_BODY = 1180  # with the heads of UDP and IP below what any Ethernet carries whole
 LARGEST = _HEAD.size + MOST_BODY + TAG_BYTES
 REASONS = ("accepted", "length", "magic", "version", "kind", "tag", "own", "greeting", "ended", "repeat")

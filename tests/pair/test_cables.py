@@ -38,6 +38,7 @@ def test_a_leader_that_reaches_no_receiver_gives_the_lead_to_the_box_that_does(h
     assert hall.leader == other(leader)
     found = lost_in(hall, since, time.time())
     assert found["osc_twice"] == 0 and found["overlap_ms"] == 0.0, found
+    assert found["osc_lost"] <= 1, found
 
 
 def test_a_follower_without_any_cable_leaves_the_lead_where_it_is(hall: Hall) -> None:

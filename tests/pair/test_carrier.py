@@ -55,10 +55,25 @@ def test_a_leader_whose_cable_comes_back_listens_first(routes: Path, tmp_path: P
     plugged(tmp_path, "eth0", "0")
     carrier.look(2.0)
     assert carrier.is_out and not carrier.may_speak(2.0, 2.0) and not carrier.knows_silence(2.0, 2.0)
-    assert not carrier.is_heard_nonetheless(2.01) and carrier.is_heard_nonetheless(2.2)
+    assert not carrier.is_heard_nonetheless(2.01, 2.01, {}) and carrier.is_heard_nonetheless(2.2, 2.2, {})
     plugged(tmp_path, "eth0", "1")
     carrier.look(3.0)
     assert not carrier.may_speak(3.05, 2.5) and carrier.may_speak(3.05, 3.01) and carrier.may_speak(3.1, 2.5)
+
+
+def test_a_leader_whose_cable_is_out_knows_at_once_that_another_link_is_whole(
+    routes: Path, tmp_path: Path
+) -> None:
+    plugged(tmp_path, "eth0", "1")
+    switched, direct = "10.77.0.2", "192.168.1.5"
+    carrier = Carrier(["10.77.0.9"], routes, tmp_path, [switched, direct])
+    carrier.look(1.0)
+    assert not carrier.is_heard_nonetheless(1.0, 1.0, {direct: 1.0})
+    plugged(tmp_path, "eth0", "0")
+    carrier.look(2.0)
+    assert carrier.is_heard_nonetheless(2.0, 1.99, {direct: 1.99})
+    assert not carrier.is_heard_nonetheless(2.0, 1.99, {switched: 1.99, direct: 1.8})
+    assert not carrier.is_heard_nonetheless(2.0, 1.99, {"10.78.0.7": 1.99})
 
 
 def test_a_follower_whose_cable_comes_back_leaves_a_switch_time_to_forward(

@@ -160,3 +160,35 @@ def test_a_box_that_was_held_up_takes_none_for_silent_and_a_late_datagram_for_no
     other.look(2.02)
     assert other.roles.heard == heard
     one.close(), other.close()
+
+
+def test_a_tick_that_begins_keeps_the_lead_no_longer_than_its_frame_is_due() -> None:
+    """A leader that dies between a tick's begin and its frame loses that frame, and no other one."""
+    clock = [0.0]
+    one, other = pair_of(KEY, KEY, clock=clock)
+    one.look(1.0)
+    for now, send in ((1.000, one.begin_tick), (1.002, one.beat), (1.020, one.begin_tick)):
+        clock[0] = now
+        send(now)
+        other.look(now)
+    other.is_ready = True
+    for now, is_over in ((1.0439, False), (1.0441, True)):
+        clock[0] = now
+        other.look(now)
+        assert other.leads is is_over
+    one.close(), other.close()
+
+
+def test_a_leader_whose_frame_is_late_keeps_the_lead_though_the_frame_before_was_lost() -> None:
+    clock = [0.0]
+    one, other = pair_of(KEY, KEY, clock=clock)
+    one.look(1.0)
+    for now, send in ((1.000, one.begin_tick), (1.002, one.beat), (1.040, one.begin_tick)):
+        clock[0] = now
+        send(now)
+        other.look(now)
+    other.is_ready = True
+    clock[0] = 1.055  # the frame of 1.040 waits for a reading
+    other.look(1.055)
+    assert not other.leads
+    one.close(), other.close()
