@@ -32,6 +32,7 @@ class Outputs:
         self.receivers: tuple[DatagramSender, ...] = (*self._osc.receivers, *self._posistagenet)
         self._shared: FrameWriter | None = None
         self.may_speak: Callable[[], bool] | None = None  # asked before each frame, on a box with a pair
+        self.altered_by: Callable[[JointFrame], JointFrame] | None = None  # what receivers get instead
         self.shift_s = 0.0  # frames have times of a clock that is so much behind this machine's
 
     def share(self, shared: FrameWriter) -> None:
@@ -43,6 +44,8 @@ class Outputs:
 
         A box that may not speak encodes and shares it nonetheless: its receivers' state goes on.
         """
+        if self.altered_by is not None:
+            frame = self.altered_by(frame)
         shift_s = self.shift_s  # a box that learns now that it leads no longer has another one after that
         if self.may_speak is not None:
             is_muted = not self.may_speak()
