@@ -19,6 +19,15 @@ def about(box: str | None = None, chosen: str | None = None) -> Any:
     return about.about(_path(chosen), _path(box))
 
 
+def shows_here(
+    danced: str | None, learned: str | None, box: str | None = None, chosen: str | None = None
+) -> Any:
+    """The shows that this box can play."""
+    from appliance.release import shows_here
+
+    return shows_here.shows_here(_path(chosen), _path(danced), _path(learned))
+
+
 def pose_map(show: str | None = None) -> Any:
     """The map of a show's poses."""
     from appliance.generator import pose_map
@@ -178,7 +187,7 @@ def stretch(journal: str, run: int, start: float, seconds: float, out: str | Non
 CALLS: dict[str, Callable[..., Any]] = {
     one.__name__: one
     for one in (
-        *(about, pose_map, keep_cue, box_file, change_box_file, dance_again, adopt_show),
+        *(about, shows_here, pose_map, keep_cue, box_file, change_box_file, dance_again, adopt_show),
         *(pack_show, take_show, timelines, stretch, help_file, use_rehearsal, check_recording),
     )
 }

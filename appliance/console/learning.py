@@ -46,7 +46,7 @@ class Learning:
         self._wanted, self._progress = folder / "wanted.json", folder / "progress.json"
 
     def begin(self, wanted: Wanted) -> None:
-        """Write the request. What was learned before is deleted, or moved aside if this begins with it.
+        """Write the request, after the last learned show was deleted, or moved aside if this begins with it.
 
         Raises OSError.
         """

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from appliance.cli import learn
-from appliance.cli.learn import Learner, begin
+from appliance.cli.learn import Learner
 from appliance.cli.learned import figures_of, sentence_of
 from appliance.console.learning import STUDIO_MISSING, Learning, Wanted
 from appliance.show.bundle import default_show_path, named_show
@@ -93,7 +93,7 @@ def report_of(show: str, folder: Path, **changed: float) -> Path:
 
 def test_what_reaches_the_bar_is_offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     box = Box(tmp_path, monkeypatch, report_of("default", tmp_path))
-    begin(box.learning, Wanted("takes", 60.0))
+    box.learning.begin(Wanted("takes", 60.0))
     box.let_end()
     assert box.run() == 0
     reported = box.learning.reported()
@@ -109,7 +109,7 @@ def test_a_short_time_leaves_a_quarter_for_the_rest_and_the_show_that_it_begins_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = Box(tmp_path, monkeypatch, report_of("default", tmp_path))
-    begin(box.learning, Wanted("takes", 12.0, "martial"))
+    box.learning.begin(Wanted("takes", 12.0, "martial"))
     box.let_end()
     assert box.run() == 0
     train = box.begun()[0]
@@ -131,7 +131,7 @@ def test_null_products_do_not_reach_it_and_the_show_stays(
     changed: dict[str, float], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = Box(tmp_path, monkeypatch, report_of("default", tmp_path, **changed))
-    begin(box.learning, Wanted("takes"))
+    box.learning.begin(Wanted("takes"))
     box.let_end()
     assert box.run() == 1
     reported = box.learning.reported()
@@ -163,7 +163,7 @@ def test_it_pauses_while_a_show_dances_and_goes_on_from_the_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = Box(tmp_path, monkeypatch, report_of("default", tmp_path))
-    begin(box.learning, Wanted("takes"))
+    box.learning.begin(Wanted("takes"))
     states = []
 
     def script() -> None:
@@ -188,7 +188,7 @@ def test_a_stopped_learner_continues_with_the_same_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = Box(tmp_path, monkeypatch, report_of("default", tmp_path))
-    begin(box.learning, Wanted("takes"))
+    box.learning.begin(Wanted("takes"))
 
     def script() -> None:
         box.await_(lambda: box.learning.reported().get("share") == 0.1)
@@ -202,7 +202,7 @@ def test_a_stopped_learner_continues_with_the_same_command(
 
 def test_what_the_page_ends_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     box = Box(tmp_path, monkeypatch, report_of("default", tmp_path))
-    begin(box.learning, Wanted("takes"))
+    box.learning.begin(Wanted("takes"))
 
     def script() -> None:
         box.await_(lambda: box.learning.reported().get("share") == 0.1)
@@ -220,7 +220,7 @@ def test_a_failure_is_told_and_nothing_is_offered(
     train: int, check: int, named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = Box(tmp_path, monkeypatch, report_of("default", tmp_path), train, check)
-    begin(box.learning, Wanted("takes"))
+    box.learning.begin(Wanted("takes"))
     box.let_end()
     assert box.run() == 1
     assert box.learning.reported()["state"] == "failed" and named in box.learning.reported()["message"]
@@ -229,7 +229,7 @@ def test_a_failure_is_told_and_nothing_is_offered(
 
 def test_without_the_studio_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     learning = Learning(tmp_path)
-    begin(learning, Wanted("takes"))
+    learning.begin(Wanted("takes"))
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert Learner(learning, lambda: False).run() == 1
     assert learning.reported() == {"state": "failed", "message": STUDIO_MISSING}

@@ -14,7 +14,8 @@ from appliance.console.learn import LARGEST_RECORDING
 from appliance.console.learning import FOLDER, RECORDINGS, Learning, Wanted
 from appliance.console.settings import WHERE
 from appliance.pose.bvh import write_bvh
-from tests.bundles import swaying_phrase
+from appliance.show.bundle import bundled_shows
+from tests.bundles import swaying_phrase, write_show
 from tests.console.browser import ON_A_LAPTOP, ON_BOTH, press, unlock
 from tests.console.page import Page, page_alone
 from tests.system.box import Box
@@ -119,6 +120,28 @@ def test_only_listed_folders_and_known_devices(venue: tuple[Box, Page], kept: Pa
         assert page.post("/api/learn", {"recordings": name}).status == 400, name
     assert page.post("/api/learn", {"recordings": "box/mine", "minutes": 0}).status == 400
     assert page.post("/api/learn/dance", {}).status == 400, "this box keeps no shows"
+
+
+def test_a_learning_begins_with_any_show_of_the_box_the_last_learned_too(
+    venue: tuple[Box, Page], kept: Path
+) -> None:
+    page, learning = Page(venue[1].port, venue[1].box_file), Learning(kept / FOLDER)
+    page.unlock()
+    bundled = list(bundled_shows())
+    listed = page.get("/api/learn").value["shows"]
+    assert [one["id"] for one in listed] == [str(venue[0].box_file.parent / "show"), *bundled]
+    assert [one["danced"] for one in listed] == [True, *(False for _ in bundled)]
+    write_show(learning.show)
+    assert len(page.get("/api/learn").value["shows"]) == len(listed), "it is not checked yet"
+    learning.report(state="worse")
+    newest = page.get("/api/learn").value["shows"][0]
+    assert newest["id"] == str(learning.show) and newest["since"] > listed[0]["since"]
+    assert page.post("/api/learn", {"recordings": "box/mine", "begins_with": newest["id"]}).status == 200
+    wanted = learning.wanted()
+    assert wanted is not None and wanted.begins_with == str(learning.before)
+    assert (learning.before / "show.yaml").is_file() and not learning.show.exists()
+    assert page.get("/api/learn").value["shows"] == [], "another one is chosen when this has ended"
+    page.post("/api/learn/end", {})
 
 
 def test_a_rehearsal_without_a_live_dancer_is_nothing_to_learn_from(
