@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import count
+from io import StringIO
+from itertools import count, pairwise
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
@@ -14,9 +16,10 @@ from hw_sim.casting import cast_sensors
 from hw_sim.emulated_sensor import EmulatedSensor, sensor_axes
 from hw_sim.emulator import Emulator, Sent
 from hw_sim.network import BAD, VENUE, VenueNetwork
+from hw_sim.status import StatusLine
 from hw_sim.wearer import Wearer
 from tests.hw_sim.joined import Show
-from tests.hw_sim.tiny_box import KEY, FakeClock, Pair
+from tests.hw_sim.tiny_box import KEY, FakeClock, Pair, TinyBox, paired, readings
 
 KEYS = {KEY.name: KEY}
 FIRST_READING_S = 0.7
@@ -196,3 +199,84 @@ def test_a_reboot_is_silent_and_starts_from_zero() -> None:
     first = [s for s in sent if s.sample.boot_nonce == 1]
     assert second[0].sample.sequence == 0
     assert second[0].sent_at - first[-1].sent_at > 1.5 + FIRST_READING_S - 0.001
+
+
+def test_the_round_trip_is_measured_by_the_echo() -> None:
+    pair = paired()
+    pair.run(5.0)
+    assert readings(pair)[0].round_trip == wire.ROUND_TRIP_UNKNOWN
+    assert 0 <= readings(pair)[-1].round_trip < 100  # less than 10 ms on a line without length
+
+
+def test_the_rate_is_the_one_that_the_box_wants() -> None:
+    box = TinyBox()
+    box.rate_hz = 100
+    pair = paired(box=box)
+    pair.run(2.0)
+    assert len(readings(pair)) == pytest.approx(130, abs=2)
+    times_us = [reading.sensor_time_us for reading in readings(pair)]
+    assert {b - a for a, b in pairwise(times_us)} == {10_000}
+
+
+def test_readings_are_in_the_axes_of_the_sensor() -> None:
+    turn = motions.about((0, 1, 0), 0.7)  # stage: about the vertical
+    pair = paired(motions.still(turn))
+    pair.run(1.0)
+    w, x, y, z = readings(pair)[0].orientation
+    assert (w, y, z, x) == pytest.approx(turn, abs=1e-4)  # the box's permutation gives it back
+    assert sensor_axes(turn)[3] == pytest.approx(turn[2])  # the sensor's vertical is z
+
+
+def test_double_taps_are_counted() -> None:
+    pair = paired()
+    pair.run(1.0)
+    pair.device.taps += 1
+    pair.run(0.1)
+    assert (readings(pair)[0].taps, readings(pair)[-1].taps) == (0, 1)
+
+
+def played(answers: bool = True, is_up: bool = True) -> Emulator:
+    """A second of readings, after the start-up of the IMU."""
+    pair = Pair(EmulatedSensor(KEY, Wearer(motions.still())))
+    pair.box.answers, pair.line.is_up = answers, is_up
+    pair.run(1.69)
+    return pair.emulator
+
+
+def test_on_a_terminal_one_line_a_second() -> None:
+    out = StringIO()
+    emulator = played()
+    with StatusLine("box:9750", Console(file=out, force_terminal=True, width=120)) as status:
+        status.show(emulator, 100.0)
+        drawn = len(out.getvalue())
+        status.show(emulator, 100.9)
+        assert len(out.getvalue()) == drawn
+        status.show(emulator, 101.0)
+        assert "left-wrist (light on) -> box:9750" in out.getvalue()[drawn:]
+        status.end(emulator)
+    assert "50 readings sent" in out.getvalue()
+
+
+def test_elsewhere_the_first_and_the_last_word() -> None:
+    out = StringIO()
+    emulator = played()
+    with StatusLine("box:9750", Console(file=out, width=100)) as status:
+        status.show(emulator, 100.0)
+        assert out.getvalue() == "Calling the box at box:9750.\n"
+        status.end(emulator)
+    assert out.getvalue().endswith("box:9750.\n1 sensor -> box:9750: 50 readings sent\n")
+
+
+def test_when_nothing_got_out_it_says_what_to_look_at() -> None:
+    out = StringIO()
+    with StatusLine("/dev/ttyUSB0", Console(file=out, width=100)) as status:
+        status.end(played(is_up=False))
+    assert "Nothing could be sent to /dev/ttyUSB0" in out.getvalue()
+
+
+def test_when_no_box_took_the_sensors_it_says_what_to_look_at() -> None:
+    out = StringIO()
+    with StatusLine("box:9750", Console(file=out, width=100)) as status:
+        status.end(played(answers=False))
+    assert "No box took these sensors at box:9750" in out.getvalue()
+    assert "the same key file" in out.getvalue()

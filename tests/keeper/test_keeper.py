@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -10,13 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.box import mounts
 from appliance.box.checkpoint import Checkpoint, CheckpointReader, CheckpointWriter, Standing
 from appliance.box.clock import TICK_S
+from appliance.box.mounts import memory_of
+from appliance.box.process_health import ProcessHealth
 from appliance.box.ring_file import RingFileWriter
 from appliance.box.runtime_folder import Claim
-from appliance.keeper.fallback import JOURNAL_STOPPED
-from appliance.keeper.keeper import END_S, keep_rest
+from appliance.cli.sensors.box_keys import forgotten
+from appliance.keeper.fallback import JOURNAL_STOPPED, SAVED_IN_MEMORY
+from appliance.keeper.keeper import END_S, KeeperHealth, keep_rest
 from appliance.keeper.mirror import RETRY_S, TURN_S, Mirror, mirror_until
+from appliance.keeper.mirror_process import HANGS_S, STUCK_S, MirrorProcess
 from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
 from appliance.show.box import BoxConfig
@@ -25,6 +32,7 @@ from tests.box import disks
 from tests.bundles import write_show
 from tests.fake_clock import FakeTime
 from tests.recorder.night import Night
+from tests.show_control.doubles import until
 from tests.standing import moved
 
 DISK_BYTES = 8 << 20
@@ -243,3 +251,126 @@ def test_what_a_keeper_did_not_live_to_carry_is_carried_after_the_dance(night: N
         keep_rest(box, tmp_path / "runtime", journal, 1.0, print)
         assert len(read_journal(journal).ticks) == 40
     assert len(segment_paths(journal)) == 1
+
+
+OVERLAY = (
+    "22 1 0:25 / /media/root-rw rw,relatime - tmpfs tmpfs-root rw\n"
+    "23 1 0:24 / / rw,relatime shared:1 - overlay overlayroot "
+    "rw,lowerdir=/media/root-ro,upperdir=/media/root-rw/overlay,workdir=/media/root-rw/overlay-workdir\n"
+)
+PARTITION = "24 23 179:3 / /data rw,noatime shared:2 - ext4 /dev/mmcblk0p3 rw\n"
+STATE = Path("/data/bunraku/state")
+
+
+def lay_mounts(folder: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "mountinfo").write_text(text)
+    monkeypatch.setattr(mounts, "MOUNTINFO", folder / "mountinfo")
+
+
+@pytest.mark.parametrize(("text", "memory"), [(OVERLAY, "overlay (/)"), (OVERLAY + PARTITION, ""), ("", "")])
+def test_a_box_that_keeps_everything_in_memory_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, memory: str
+) -> None:
+    lay_mounts(tmp_path, text, monkeypatch)
+    assert memory_of(STATE) == memory
+    keeper = KeeperHealth(tmp_path, STATE)
+    keeper.report([], 10.0)
+    reported = [one for _, one in ProcessHealth(tmp_path).fallbacks(10.0)]
+    assert [(one.name, one.active, one.about) for one in reported] == (
+        [(SAVED_IN_MEMORY.name, True, memory)] if memory else []
+    )
+    assert bool(memory) == ("gone at power-off" in forgotten(Path("/data/bunraku/keys/sensors.keys")))
+    keeper.end(11.0)
+
+
+def test_a_box_that_nobody_installed_may_keep_things_where_it_likes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lay_mounts(tmp_path, OVERLAY, monkeypatch)
+    keeper = KeeperHealth(tmp_path)
+    keeper.report([], 10.0)
+    assert ProcessHealth(tmp_path).fallbacks(10.0) == []
+    keeper.end(11.0)
+
+
+def test_disks_are_named_as_people_find_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lay_mounts(
+        tmp_path, OVERLAY + PARTITION + "25 23 8:1 / /mnt/a\\040disk rw - ext4 /dev/sda1 rw\n", monkeypatch
+    )
+    assert mounts.disk_of(STATE) == "mmcblk0p3 (/data)"
+    assert mounts.disk_of(Path("/mnt/a disk/journal")) == "sda1 (/mnt/a disk)"
+    assert mounts.disk_of(Path("/home")) == "overlay (/)"
+
+
+STEP_S = 0.5
+
+
+class Stuck:
+    """Its first copy never ends."""
+
+    name, fallback, recovered = "A thing", JOURNAL_STOPPED, ""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def copy(self, now: float) -> None:
+        with self._path.open("a") as file:
+            file.write("turn\n")
+        signal.pause()
+
+    def explain(self, error: Exception) -> str:
+        return str(error)
+
+    def close(self) -> None:
+        pass
+
+
+class Watched:
+    """The process of one that is stuck, and what was said of it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.now, self.said, self._turns = 1000.0, list[str](), folder / "turns"
+        self.process = MirrorProcess(Stuck(self._turns), folder, 0.0, self.said.append)
+
+    @property
+    def turns(self) -> int:
+        return len(self._turns.read_text().splitlines()) if self._turns.exists() else 0
+
+    def look_for(self, seconds: float) -> None:
+        for _ in range(round(seconds / STEP_S)):
+            self.now += STEP_S
+            self.process.supervise(self.now)
+
+    def goes_on(self) -> bool:
+        """With the clock standing still: a start that takes long is no second silence."""
+        self.process.supervise(self.now)
+        return self.turns == 2
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Iterator[Watched]:
+    watched = Watched(tmp_path)
+    watched.look_for(STEP_S)
+    until(lambda: watched.turns == 1)
+    yield watched
+    watched.process.abandon()
+
+
+def test_what_hangs_is_told_after_a_while_and_started_again_in_the_end(watched: Watched) -> None:
+    watched.look_for(HANGS_S - STEP_S)
+    assert watched.process.complaint == "" and watched.said == []
+    watched.look_for(2 * STEP_S)
+    assert "has not answered for 5 s" in watched.process.complaint
+    watched.look_for(STUCK_S - HANGS_S - 2 * STEP_S)
+    time.sleep(0.2)
+    assert watched.turns == 1
+    watched.look_for(3 * STEP_S)
+    until(watched.goes_on)
+    assert len(watched.said) == 2
+    assert "has died" in watched.said[1]
+
+
+def test_a_keeper_that_was_held_up_itself_blames_no_disk(watched: Watched) -> None:
+    watched.now += 1000.0
+    watched.process.supervise(watched.now)
+    assert watched.process.complaint == ""

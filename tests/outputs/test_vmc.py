@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, pi, sin
 
 import numpy as np
@@ -12,9 +13,15 @@ from pythonosc.osc_packet import OscPacket
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.outputs.osc.vmc import TIME_WRAP_S, Vmc
+from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.stage_frame import in_stage_frame
+from appliance.pose.t_pose import t_pose
+from appliance.show_control.figure_pose import FigurePose
+from appliance.show_control.vmc_input import BONE, VmcInput
 from tests.outputs.conftest import JOINTS, fill
 from tests.outputs.small_stage import encoded, one_puppet, stand
+from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of, skeleton_of
 
 # The bone above each bone in Unity's humanoid, as far as the test's dancer has them.
 UNITY_PARENT = {
@@ -179,3 +186,86 @@ def test_xsens_shoulders_are_upper_arms_because_there_are_collars() -> None:
 
 def test_a_root_without_a_known_name_is_the_hips(frame: JointFrame) -> None:
     assert humanoid_bones(["body", "lForeArm", "leftover"]) == {"Hips": 0, "LeftLowerArm": 1}
+
+
+LIMBS = [
+    (f"{side}{start}", f"{side}{end}")
+    for side in ("Left", "Right")
+    for start, end in (
+        ("UpperArm", "LowerArm"),
+        ("LowerArm", "Hand"),
+        ("UpperLeg", "LowerLeg"),
+        ("LowerLeg", "Foot"),
+    )
+]
+WAYS_DEGREES, TWIST_DEGREES = 2.0, 20.0
+
+
+def posed_avatar(messages: dict[str, list[float]]) -> dict[str, NDArray[np.float64]]:
+    """World transforms of an avatar of Unity's with all bones: a T-pose in which no bone is turned, given the
+    rotations; a bone that none was sent for stays as it is."""
+    body = skeleton_of("Mixamo")
+    joint_of = humanoid_bones(body.names)
+    bone_of = {joint: bone for bone, joint in joint_of.items()}
+    posed: dict[str, NDArray[np.float64]] = {}
+    for joint, parent in enumerate(body.parents):
+        bone, offset = bone_of[joint], body.offsets[joint] * [-1, 1, 1]
+        if parent < 0:
+            posed[bone] = matrix(np.array(messages[bone][:3]), *messages[bone][3:])
+        else:
+            turn = messages[bone][3:] if bone in messages else (0.0, 0.0, 0.0, 1.0)
+            posed[bone] = posed[bone_of[parent]] @ matrix(offset, *turn)
+    return posed
+
+
+def returned(skeleton: Skeleton, messages: dict[str, list[float]]) -> NDArray[np.float32]:
+    """The pose (J, 4) that another box takes from these messages."""
+    heard = VmcInput(FigurePose(skeleton))
+    bones = {name: m for name, m in messages.items() if "/" not in name}
+    for _ in range(2):  # of the first frame nobody knows where it ends
+        for name, numbers in bones.items():
+            found = heard.hear(BONE, [name, *numbers])
+    assert found is not None
+    return np.array(found[1], np.float32).reshape(-1, 4)
+
+
+def degrees(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    cosine = float(one @ other) / float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_an_avatar_takes_the_pose_of_every_system_s_figure(convention: str) -> None:
+    meant = dance_of(convention, 4.0)
+    given, _ = in_stage_frame(as_the_system_writes(meant, convention))
+    skeleton = given.skeleton
+    encoder, frame = Vmc(skeleton), one_puppet(len(skeleton))
+    joint_of = humanoid_bones(skeleton.names)
+    in_t_pose = meant.skeleton.forward_kinematics(meant.poses, meant.roots, meant.translations)[1]
+    for number in (0, 90, 199):
+        frame.puppets[0].pose[:], frame.puppets[0].root[:] = given.poses[number], given.roots[number]
+        stand(frame, skeleton)
+        avatar = posed_avatar(sent(encoder, frame))
+        for start, end in LIMBS:
+            positions = frame.puppets[0].positions
+            ours = (positions[joint_of[end]] - positions[joint_of[start]]) * [-1, 1, 1]
+            theirs = avatar[end][:3, 3] - avatar[start][:3, 3]
+            assert degrees(ours.astype(float), theirs) < WAYS_DEGREES, (number, start)
+        came_back = returned(skeleton, sent(encoder, frame))
+        angles = np.degrees(quaternion.angle_between(came_back, frame.puppets[0].pose))
+        assert angles[sorted(joint_of.values())].max() < 0.1
+        for bone, joint in joint_of.items():
+            w, x, y, z = in_t_pose[number, meant.skeleton.index(skeleton.names[joint])]
+            turned = (MIRROR @ matrix(np.zeros(3), x, y, z, w) @ MIRROR)[:3, :3]
+            for column in range(3):
+                assert degrees(avatar[bone][:3, column], turned[:, column]) < TWIST_DEGREES, (number, bone)
+
+
+def test_the_rest_is_upright_from_hips_to_head_whatever_the_stance_bends() -> None:
+    given = in_stage_frame(as_the_system_writes(dance_of("LAFAN", 2.0), "LAFAN"))[0].skeleton
+    assert given.stance is not None
+    bent, between = given.stance.copy(), given.index("Spine1")  # a joint without a role
+    bent[between] = quaternion.multiply(quaternion.from_axis_angle([0.0, 1.0, 0.0], 0.6), bent[between])
+    rest = t_pose(replace(given, stance=bent)).positions
+    up = rest[given.roles["head"]] - rest[given.roles["spine"]]
+    assert up[1] > 0.999 * np.linalg.norm(up)

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
-from appliance.release.adoption import read_choice
+from appliance.box.durable import alone_in
+from appliance.release.adoption import adopt, read_choice
+from appliance.release.arrivals import look
 from appliance.release.choice import (
     APPLIANCE_BOX,
     CHOSEN,
@@ -19,6 +24,7 @@ from appliance.release.choice import (
     box_of,
     write_whole,
 )
+from appliance.release.shelf import Shelf, UnreadableError
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from tests.release.venue import BROKEN, Venue, dancing
@@ -205,3 +211,185 @@ def test_box_and_chosen_contradict_each_other(tmp_path: Path) -> None:
     assert box_of(None, tmp_path / "none.json") == APPLIANCE_BOX
     with pytest.raises(ConfigError, match="not both"):
         box_of(tmp_path, tmp_path / CHOSEN)
+
+
+NO_TEXT = os.fsdecode(b"\xff\xfe.bvh")
+
+
+def _power_on(venue: Venue) -> str:
+    """What dances, and is good from then on."""
+    choice = venue.look().choice
+    choice.with_good(choice.first.id).write(venue.places.data / CHOSEN)
+    return (choice.first.show / "show.yaml").read_text()
+
+
+def test_what_gave_way_to_newer_shows_does_not_come_back_from_the_boot_partition(venue: Venue) -> None:
+    venue.bring(venue.boot, "autumn, last year")
+    _power_on(venue)
+    for text in ("spring", "summer"):
+        venue.bring(venue.stick, text)
+        assert _power_on(venue) == text
+    assert [_power_on(venue) for _ in range(3)] == ["summer"] * 3
+    (venue.stick / "show").rename(venue.stick / "gone")
+    assert _power_on(venue) == "summer"
+
+
+@pytest.mark.parametrize("boot_show", ["", "from the boot partition"])
+def test_a_show_from_the_stick_goes_with_the_box_file_from_the_boot_partition(
+    venue: Venue, boot_show: str
+) -> None:
+    venue.bring(venue.stick, "spring")
+    venue.bring(venue.boot, boot_show, box="sensors: {udp: {port: 9751}}")
+    outcome = venue.look()
+    assert outcome.taken and dancing(outcome) == "spring"
+    assert outcome.choice.first.box_id, "at the first power-on the venue's box file was passed over"
+    assert not venue.look().taken
+    assert dancing(venue.look()) == "spring"
+
+
+def test_a_show_put_aside_does_not_come_back_once_another_one_is_there(venue: Venue) -> None:
+    venue.bring(venue.boot, "never danced")
+    choice = venue.look().choice
+    aside = Choice(aside=(Aside(choice.first.id, "It did not dance."),))
+    choice.without(aside).write(venue.places.data / CHOSEN)
+    venue.bring(venue.stick, "spring")
+    assert [_power_on(venue) for _ in range(3)] == ["spring"] * 3
+
+
+def test_a_show_that_was_lost_comes_back_also_after_a_pulled_stick(venue: Venue) -> None:
+    venue.bring(venue.boot, "before")
+    _power_on(venue)
+    venue.bring(venue.stick, "spring")
+    first = venue.look().choice.first
+    (first.show / "show.yaml").unlink()
+    arrival = look("stick", venue.stick)
+    network = venue.stick / "show" / "puppet.onnx"
+    network.rename(venue.stick / "away")
+    assert adopt(venue.places, [arrival], venue._check).choice.first.id != first.id
+    (venue.stick / "away").rename(network)
+    assert dancing(venue.look()) == "spring"
+
+
+def test_what_is_refused_beside_a_running_show_is_checked_again_at_power_on(venue: Venue) -> None:
+    venue.bring(venue.stick, "spring")
+    arrivals = [look("stick", venue.stick)]
+    late = adopt(venue.places, arrivals, lambda show, box: ["It did not end in time."], late=True)
+    assert not late.taken
+    assert "did not end" in (venue.places.data / "refusals" / "stick.txt").read_text()
+    assert dancing(venue.look()) == "spring"
+    assert not (venue.places.data / "refusals" / "stick.txt").exists()
+
+
+def test_the_same_show_again_is_as_good_as_before(venue: Venue) -> None:
+    venue.bring(venue.stick, "spring")
+    _power_on(venue)
+    os.utime(venue.stick / "show" / "show.yaml", (0, 0))  # copied once more, on a machine in 1970
+    assert venue.look().choice.first.good
+
+
+def test_a_good_show_that_does_not_dance_tonight_is_tried_again_after_power_off(tmp_path: Path) -> None:
+    good, new = Pair(id="good+", good=True), Pair(id="new+")
+    aside = (Aside("good+", "Not danced."), Aside("new+", "Nor this."))
+    kept = Choice((good, new)).without(Choice(aside=aside))
+    assert (kept.pairs, kept.aside) == ((good,), aside[1:])
+
+
+@pytest.mark.parametrize("content", ["spring", BROKEN])
+def test_a_name_that_is_no_text_stops_nobody(venue: Venue, content: str) -> None:
+    venue.bring(venue.stick, content)
+    (venue.stick / "show" / NO_TEXT).write_bytes(b"1")
+    said = adopt(
+        venue.places, [look("stick", venue.stick)], lambda show, box: [f"{show / NO_TEXT}: what is this?"]
+    )
+    for message in (*said.messages, *said.choice.refused):
+        message.encode()
+    venue.bring(venue.stick, "mended")
+    assert dancing(venue.look()) == "mended"
+
+
+def test_a_show_that_is_a_link_is_none(venue: Venue) -> None:
+    (venue.stick / "show").symlink_to("/usr")
+    assert look("stick", venue.stick).listing == []
+
+
+def test_a_folder_without_end_is_listed_in_a_moment(venue: Venue) -> None:
+    for number in range(5000):
+        (venue.stick / "show" / f"{number}").mkdir(parents=True)
+        (venue.stick / "show" / f"{number}" / "file").touch()
+    arrival = look("stick", venue.stick)
+    assert arrival.listing == [["show/?", 0, 0]], "5000 folders are looked at before the first file"
+    assert "cannot be read" in " ".join(venue.look().messages)
+
+
+def test_a_file_that_goes_on_for_ever_is_left_early(venue: Venue) -> None:
+    venue.bring(venue.stick, "spring")
+    arrival = look("stick", venue.stick)
+    with (venue.stick / "show" / "puppet.onnx").open("ab") as grown:
+        grown.truncate(1 << 40)
+    with pytest.raises(UnreadableError, match="goes on after all of 300000 bytes"):
+        Shelf(venue.places.data).take_show(arrival)
+    assert not list((venue.places.data / "shows").iterdir())
+
+
+def test_memory_is_never_filled_by_a_show(venue: Venue) -> None:
+    """The place, the journal and the choice itself have to find room there."""
+    run, shm = venue.places.run, ["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs"]
+    venue.places.data.rmdir()
+    venue.places.data.symlink_to("/nowhere/at/all")
+    if subprocess.run([*shm, str(run)], capture_output=True, check=False).returncode:
+        pytest.skip("this user may not mount a file system")
+    try:
+        venue.bring(venue.stick, "spring")
+        assert not venue.look().taken
+        assert "no room" in " ".join(venue.look().messages)
+    finally:
+        subprocess.run(["umount", str(run)], check=True)
+
+
+_AS_THE_BOX = """
+import os
+from pathlib import Path
+from appliance.release.choice import Aside, Choice
+os.setuid(990)
+choice = Choice.read(Path({file!r}))
+print([one.is_there for one in choice.pairs], choice.complete().first.id)
+"""
+
+
+def test_what_root_has_left_behind_for_itself_is_not_there(venue: Venue) -> None:
+    if os.geteuid() != 0:
+        pytest.skip("only root can leave root's files behind")
+    venue.bring(venue.stick, "spring")
+    first = venue.look().choice.first
+    first.show.chmod(0o700)
+    copied = Path("/tmp") / f"bunraku-{os.getpid()}.json"
+    try:
+        Choice((first,)).write(copied)
+        copied.chmod(0o644)
+        asked = _AS_THE_BOX.format(file=str(copied))
+        done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=False)
+    finally:
+        copied.unlink()
+    assert done.stdout == "[False] \n", done.stderr
+
+
+def test_a_reader_that_hangs_holds_up_nobody_once_its_preflight_has_given_up(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    with alone_in(tmp_path):
+        child = os.fork()
+        if child == 0:
+            os.close(writing)
+            os.read(reading, 1)  # as on a stick that does not answer
+            os._exit(0)
+        with pytest.raises(BlockingIOError), alone_in(tmp_path):
+            raise AssertionError("two at once")
+    with alone_in(tmp_path):
+        pass
+    os.write(writing, b"!")
+    os.waitpid(child, 0)
+    os.close(reading)
+    os.close(writing)
+
+
+def test_nothing_is_remembered_of_nothing(tmp_path: Path) -> None:
+    assert read_choice(tmp_path / "none").pairs == ()

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import socket
+import threading
 import time
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
 
-from appliance.sensor import wire
+import pytest
+import serial
+from hypothesis import given
+from hypothesis import strategies as st
+
+from appliance.sensor import framing, wire
 from appliance.sensor.framing import frame
 from appliance.sensor.link import SensorLink, open_link
-from appliance.sensor.transports.serial import SerialIntake
+from appliance.sensor.provisioning import serial_ports
+from appliance.sensor.provisioning.serial_ports import FoundPort, NoWearableError, only_wearable
+from appliance.sensor.transports.serial import UNSENT_PACKETS, SerialIntake
 from appliance.sensor.transports.udp import UdpIntake
 from tests.sensor.cable import PATIENCE_S, Cable, Plugged, await_reading, await_that, run_until
-from tests.sensor.peers import KEYS
+from tests.sensor.peers import KEYS, Wearable
+from tools import generate_wire
 
 
 def test_a_sensor_pairs_over_a_cable(cable: Cable, opened: tuple[SensorLink, SerialIntake]) -> None:
@@ -112,3 +125,219 @@ def test_what_came_since_the_tick_read_its_time_came_when_it_did(cable: Cable) -
     intake._packets.extend([(b"before", 99.99), (b"since", 100.7), (b"on another clock", 7000.0)])
     assert [arrival for _, arrival, _ in intake.receive_packets(100.0)] == [99.99, 100.7, 100.0]
     intake.close()
+
+
+WEARABLE, MODEM = FoundPort("/dev/ttyACM0", "", True), FoundPort("/dev/ttyS0", "a modem", False)
+WAITING = FoundPort("/dev/ttyACM2", "", False, is_bootloader=True)
+
+
+def test_the_only_wearable_is_found() -> None:
+    assert only_wearable([MODEM, WEARABLE]) == "/dev/ttyACM0"
+
+
+@pytest.mark.parametrize(
+    ("ports", "message"),
+    [
+        ([], "no serial port at all"),
+        ([MODEM], r"Serial ports here: /dev/ttyS0 \(a modem\)"),
+        ([WEARABLE, MODEM, FoundPort("/dev/ttyACM1", "", True)], "2 wearables are plugged in"),
+        ([WAITING], "waits for firmware: press its reset button once"),
+    ],
+)
+def test_no_wearable_or_several_are_told(ports: list[FoundPort], message: str) -> None:
+    with pytest.raises(NoWearableError, match=message):
+        only_wearable(ports)
+
+
+@pytest.mark.parametrize(("vendor", "product"), serial_ports.BOARDS)
+def test_the_usb_ids_of_the_boards_are_known(
+    monkeypatch: pytest.MonkeyPatch, vendor: int, product: int
+) -> None:
+    class Port:
+        device, description, vid, pid = "/dev/ttyACM0", "n/a", vendor, product
+
+    class Bootloader(Port):
+        device, vid, pid = "/dev/ttyACM1", 0x2341, 0x004E
+
+    monkeypatch.setattr(serial_ports.list_ports, "comports", lambda: [Bootloader, Port])
+    first, second = serial_ports.found_ports()
+    assert (first.is_wearable, second.is_wearable, second.is_bootloader) == (True, False, True)
+    assert serial_ports.BOARDS[vendor, product] in str(first)
+
+
+def test_the_box_lets_the_service_open_every_board_that_it_knows() -> None:
+    rules = (Path(__file__).parents[2] / "deploy/system/usr/lib/udev/rules.d/60-bunraku.rules").read_text()
+    for vendor, product in serial_ports.BOARDS:
+        line = next(line for line in rules.splitlines() if f'idVendor}}=="{vendor:04x}"' in line)
+        assert f"{product:04x}" in line
+
+
+def test_packets_that_nobody_fetches_are_dropped_oldest_first(
+    cable: Cable, opened: tuple[SensorLink, SerialIntake]
+) -> None:
+    link, intake = opened
+    sensor = Plugged(cable)
+    sensor.pair(link)
+    for n in range(300):
+        sensor.say(sensor.wearable.reading(degrees=n))
+    await_that(lambda: intake.counts["serial_overrun"] >= 300 - 128)
+    newest: list[int] = []
+
+    def is_heard() -> bool:
+        newest.extend(reading.sequence for reading in link.drain(time.monotonic()))
+        return newest[-1:] == [300]
+
+    await_that(is_heard)
+    assert link.counts["accepted"] <= 129, "the oldest were heard"
+
+
+def test_what_cannot_be_written_is_dropped_and_counted(cable: Cable) -> None:
+    """Without a cable, and where nobody reads at the other end; reading goes on meanwhile."""
+    intake = SerialIntake(str(cable.name))
+    intake.send_packet(b"packet", ())
+    assert intake.counts["send_error"] == 1
+    cable.plug_in()
+    await_that(lambda: intake.trouble is None)
+
+    def stuff() -> bool:
+        for _ in range(UNSENT_PACKETS):
+            intake.send_packet(bytes(60), ())
+        return intake.counts["send_error"] > UNSENT_PACKETS
+
+    await_that(stuff)
+    link = SensorLink(KEYS, [intake])
+    cable.write(frame(Wearable(KEYS["head"]).hello()))
+    await_that(lambda: link.drain(time.monotonic()) == () and link.counts["hello"] == 1)
+    link.close()
+    cable.pull_out()
+
+
+def test_a_write_that_timed_out_as_the_thread_stood_still_drops_nothing_that_waits(cable: Cable) -> None:
+    """pyserial looks at the time after its bytes have left, too."""
+    intake = SerialIntake(str(cable.name))
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        port = TimedOut(ours)
+        intake._unsent.append(b"next")
+        intake._write(port, b"packet")
+        assert (list(intake._unsent), intake.counts["send_error"]) == ([b"next"], 1)
+        ours.setblocking(False)
+        with suppress(BlockingIOError):  # nobody reads
+            while True:
+                ours.send(bytes(4096))
+        intake._write(port, b"packet")
+        assert (list(intake._unsent), intake.counts["send_error"]) == ([], 3)
+    intake.close()
+
+
+class TimedOut(serial.Serial):
+    """A port whose writes come to no end in time."""
+
+    def __init__(self, wire: socket.socket) -> None:
+        super().__init__()
+        self._wire = wire
+
+    def fileno(self) -> int:
+        return self._wire.fileno()
+
+    def write(self, data: bytes) -> int:
+        raise serial.SerialTimeoutException("Write timeout")
+
+
+def test_a_device_that_never_opens_does_not_keep_the_box_from_ending(
+    cable: Cable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a driver does whose device has died: the call does not come back."""
+    is_opening, gives_way = threading.Event(), threading.Event()
+
+    def dead(*_: object, **__: object) -> None:
+        is_opening.set()
+        gives_way.wait(PATIENCE_S)
+        raise serial.SerialException("dead")
+
+    monkeypatch.setattr(serial, "Serial", dead)
+    intake = SerialIntake(str(cable.name))
+    assert is_opening.wait(PATIENCE_S)
+    closing = threading.Thread(target=intake.close, daemon=True)
+    closing.start()
+    closing.join(PATIENCE_S / 2)
+    assert not closing.is_alive()
+    gives_way.set()
+
+
+def test_closing_ends_the_thread_with_and_without_a_cable(cable: Cable) -> None:
+    absent = SerialIntake(str(cable.name))
+    absent.close()
+    cable.plug_in()
+    present = SerialIntake(str(cable.name))
+    await_that(lambda: present.trouble is None)
+    present.close()
+    assert not absent._thread.is_alive()
+    assert not present._thread.is_alive()
+    cable.pull_out()
+
+
+payloads = st.binary(min_size=1, max_size=wire.LARGEST)
+
+
+@given(st.binary(max_size=800))
+def test_stuffing_leaves_no_zero_and_loses_nothing(data: bytes) -> None:
+    stuffed = framing.cobs_encode(data)
+    assert 0 not in stuffed
+    assert framing.cobs_decode(stuffed) == data
+
+
+@given(st.lists(payloads, max_size=6), st.integers(1, 40))
+def test_packets_come_through_in_any_portions(packets: list[bytes], portion: int) -> None:
+    stream = b"".join(framing.frame(packet) for packet in packets)
+    deframer = framing.Deframer(Counter())
+    came = [p for at in range(0, len(stream), portion) for p in deframer.feed(stream[at : at + portion])]
+    assert came == packets
+    assert not deframer.counts
+
+
+@given(st.binary(max_size=300), payloads)
+def test_garbage_before_a_frame_costs_at_most_that_frame(garbage: bytes, packet: bytes) -> None:
+    deframer = framing.Deframer(Counter())
+    deframer.feed(garbage)
+    deframer.feed(framing.frame(packet))
+    assert deframer.feed(framing.frame(packet)) == [packet]
+
+
+@given(payloads, st.data())
+def test_a_flipped_bit_never_passes(packet: bytes, data: st.DataObject) -> None:
+    frame = bytearray(framing.frame(packet))
+    bit = data.draw(st.integers(0, 8 * len(frame) - 1))
+    frame[bit // 8] ^= 1 << bit % 8
+    assert packet not in framing.Deframer(Counter()).feed(bytes(frame) + b"\x00")
+
+
+def test_an_endless_line_without_a_zero_keeps_no_memory_and_is_counted_once() -> None:
+    counts: Counter[str] = Counter()
+    deframer = framing.Deframer(counts)
+    for _ in range(1000):
+        assert deframer.feed(b"\x55" * 100) == []
+    assert len(deframer._rest) <= framing.LONGEST_FRAME
+    deframer.feed(b"\x00")
+    assert counts == {"frame_length": 1}
+    assert deframer.feed(framing.frame(b"after")) == [b"after"]
+
+
+def test_every_kind_of_damage_has_its_counter() -> None:
+    counts: Counter[str] = Counter()
+    deframer = framing.Deframer(counts)
+    deframer.feed(b"\x00\x00\x00")
+    assert not counts
+    deframer.feed(b"\x09\x01\x00")
+    deframer.feed(framing.cobs_encode(b"payload??") + b"\x00")
+    deframer.feed(b"\x01" * 200 + b"\x00")
+    assert counts == {"frame_stuffing": 1, "frame_crc": 1, "frame_length": 1}
+
+
+def test_the_golden_frames() -> None:
+    golden = json.loads(generate_wire.FRAMES.read_text(encoding="utf-8"))
+    for vector in golden["frames"]:
+        frame = bytes.fromhex(vector["frame"])
+        assert framing.Deframer(Counter()).feed(frame) == [bytes.fromhex(vector["payload"])]
+    # By hand: CRC-16/XMODEM of 0x01 is 0x1021; 01 21 10 holds no zero, so COBS puts 04 in front.
+    assert framing.frame(b"\x01") == b"\x04\x01\x21\x10\x00"

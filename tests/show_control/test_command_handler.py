@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,12 @@ import pytest
 from appliance.box.orders import Order
 from appliance.levers.addresses import ADDRESSES
 from appliance.levers.lever import Lever
+from appliance.levers.show_state import ShowState
 from appliance.levers.table import (
     CAMERA,
     CARD,
+    CUE,
+    GOING,
     ITERATIONS,
     LIGHTS,
     LIVELINESS,
@@ -23,6 +27,7 @@ from appliance.levers.table import (
     SEED,
     hand,
 )
+from appliance.sensor.keys import create_keys, load_keys
 from appliance.show_control.show_state_commands import OWN
 from tests.show_control.doubles import Asker, ControlInThread, InboxDouble, StageDouble, until
 from tests.show_control.in_force import declared, show_state
@@ -237,3 +242,217 @@ def test_each_command_is_carried_out_somewhere() -> None:
     gestures = {address for address in ADDRESSES if address.startswith("/gesture/")}  # test_gestures.py
     assert set(ADDRESSES) == {"/ping", "/sensors/list"} | declared | orders | gestures
     assert not declared & orders
+
+
+def shown(now: ShowState) -> tuple[str, str, str, float]:
+    return now.cue, now[LOOK].value, now[LIGHTS].value, now[MASTER].value
+
+
+def test_a_cue_declares_picture_lights_and_dance_and_is_answered_when_the_dance_follows(
+    folder: Path, stage: StageDouble, asker: Asker
+) -> None:
+    stage.remark = "At most 8 iterations fit."
+    assert asker.ask("/cue", "storm") == ["/reply", "/cue", 1, "Cue storm. At most 8 iterations fit."]
+    now = show_state(folder)
+    assert shown(now) == ("storm", "ink", "cold", 0.5)
+    assert (now[CARD].value, now[CAMERA].value) == ("blank", {"angle_deg": 30.0})
+    assert [now[lever].seconds for lever in (LOOK, LIGHTS, MASTER)] == [4.0, 4.0, 4.0]
+    assert declared(folder, PHRASE) == ("quiet", 4.0)
+    assert declared(folder, hand("lShldr")) == (False, 0.0)
+    assert declared(folder, ITERATIONS) == ((12, 11), 4.0)
+    assert declared(folder, LIVELINESS) == (0.25, 4.0)
+    assert declared(folder, SEED) == (7, 0.0)
+    before = now.settings
+    assert asker.ask("/cue", 1)[2] == 1
+    now = show_state(folder)
+    assert shown(now) == ("1", "lines", "cold", 0.5)
+    assert declared(folder, CUE) == ("1", 0.0)
+    assert {name for name in before if now.settings[name] != before[name]} == {"cue", "look"}
+
+
+def test_a_command_again_is_declared_again(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    """A phrase of which a part plays goes back to the whole phrase."""
+    generations = []
+    for message in (("/phrase", "quiet"), ("/phrase", "quiet"), ("/cue", "storm"), ("/cue", "storm")):
+        assert asker.ask(*message)[2] == 1
+        generations.append(show_state(folder)[PHRASE].generation)
+    assert generations == sorted(set(generations))
+
+
+def test_what_is_said_after_a_cue_wins_over_it(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    asker.tell("/look", "lines")
+    asker.tell("/cue", "storm")
+    asker.tell("/master", 0.25)
+    asker.tell("/cue", "1")
+    assert {asker.hear()[1] for _ in range(4)} == {"/look", "/cue", "/master"}  # type: ignore[index]
+    now = show_state(folder)
+    assert shown(now) == ("1", "lines", "cold", 0.25)
+
+
+def test_cues_follow_each_other(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    assert [asker.ask("/cue")[3] for _ in range(2)] == ["Cue 1.", "Cue storm."]
+    _, _, done, message = asker.ask("/cue")
+    assert not done
+    assert "storm was the last cue" in message
+    assert show_state(folder).cue == "storm"
+
+
+def test_panic_is_in_force_when_the_reply_comes_and_go_lifts_it(
+    folder: Path, stage: StageDouble, asker: Asker
+) -> None:
+    for command, lifting in ((["/panic"], ["/go"]), (["/panic", 1.0], ["/go", 1.0])):
+        address, about, done, message = asker.ask(*command)
+        assert (address, about, done) == ("/reply", "/panic", 1)
+        assert "/go lifts it" in message
+        assert show_state(folder).panic
+        assert show_state(folder).level(time.monotonic()) == 0.0
+        assert asker.ask(*lifting)[2] == 1
+        assert not show_state(folder).panic
+    assert show_state(folder).going
+
+
+def test_a_button_let_go_changes_nothing_and_is_not_refused(
+    control: ControlInThread, folder: Path, stage: StageDouble, asker: Asker
+) -> None:
+    asker.ask("/stop", 60.0)
+    fade = show_state(folder)[GOING]
+    assert "runs on" in asker.ask("/stop", 0.0)[3]
+    assert show_state(folder)[GOING] == fade and fade.seconds == 60.0
+    asker.ask("/panic", 1.0)
+    address, about, done, message = asker.ask("/panic", 0.0)
+    assert (address, about, done) == ("/reply", "/panic", 0)
+    assert "let go" in message and "/go lifts a panic" in message
+    assert "let go" in asker.ask("/go", 0.0)[3]
+    assert show_state(folder).panic and not show_state(folder).going
+    assert control.process.handler.refused == 0
+
+
+def test_after_go_picture_and_lights_come_back_slowly(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    asker.ask("/panic")
+    asker.ask("/go")
+    since = show_state(folder)[GOING].since
+    assert [show_state(folder).level(since + t) for t in (0.0, 0.5, 1.0)] == [0.0, 0.5, 1.0]
+
+
+def test_panic_needs_no_stage(folder: Path, asker: Asker) -> None:
+    assert asker.ask("/panic")[2] == 1
+    assert show_state(folder).panic
+
+
+def test_a_slow_stop_can_be_made_a_quick_one(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    assert asker.ask("/stop", 60.0)[2] == 1
+    assert not show_state(folder).is_safe(time.monotonic() + 1.0)
+    assert asker.ask("/stop", 0.1)[2] == 1
+    assert show_state(folder).is_safe(time.monotonic() + 0.1)
+
+
+def test_stop_fades_then_the_phrase_stands_until_go(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    assert asker.ask("/stop", 0.3)[2] == 1
+    stopped = show_state(folder)
+    assert not stopped.going
+    assert [stopped.stands(stopped[GOING].since + t) for t in (0.0, 0.29, 0.31)] == [False, False, True]
+    until(lambda: asker.ask("/stop")[3].startswith("The show stands still already"))
+    assert asker.ask("/go")[2] == 1
+    assert show_state(folder).going and not show_state(folder).stands(time.monotonic())
+
+
+def test_after_go_the_phrase_plays_at_the_shows_rate(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    asker.tell("/player/rate", 2.0)
+    until(lambda: declared(folder, RATE) == (2.0, 0.0))
+    asker.ask("/go")
+    assert declared(folder, RATE) == (2.0, 0.0)  # it goes on already
+    asker.ask("/stop", 0)
+    asker.ask("/go")
+    assert declared(folder, RATE) == (None, 0.0)
+    asker.tell("/player/stop")
+    until(lambda: declared(folder, RATE) == (0.0, 0.0))
+    asker.ask("/go")
+    assert declared(folder, RATE) == (None, 0.0)
+
+
+def test_go_starts_a_show_that_stands_by_itself(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    asker.ask("/go")
+    assert declared(folder, RATE) is None
+    stage.tell(state="stopped")
+    until(lambda: asker.ask("/go")[2] == 1 and declared(folder, RATE) is not None)
+    assert declared(folder, RATE) == (None, 0.0)
+
+
+def test_blackout_is_dark_without_panic_and_go_does_not_lift_it(folder: Path, asker: Asker) -> None:
+    assert asker.ask("/blackout", 1)[2] == 1
+    assert show_state(folder).level(time.monotonic()) == 0.0
+    assert not show_state(folder).is_safe(time.monotonic())
+    assert "/blackout 0" in asker.ask("/go")[3]
+    assert show_state(folder).blackout
+    asker.ask("/blackout", 0)
+    assert not show_state(folder).blackout
+
+
+def test_the_roster_is_told_as_the_stage_saw_it_last(
+    stage: StageDouble, asker: Asker, key_file: Path
+) -> None:
+    line = ["left-wrist", "1a2b3c4d", "linked", "10.0.0.7:2390", 50.0, 0.5, 0.25, -1.0, 87, 51, 1]
+    texts = ["1.0.0", "00112233445566778899aabbccddeeff", "taken", ""]
+    stage.tell(sensors=[line + texts], looked_at=time.monotonic() - 5.0)
+    sensor, end = asker.ask_all("/sensors/list")
+    assert sensor == ["/sensors/sensor", *line, *texts, 0.0, -1.0]
+    assert end[:2] == ["/sensors/end", 1]
+    assert 5.0 <= end[2] < 65.0
+    assert end[3] == str(key_file)
+    stage.tell(looked_at=time.monotonic() + 60.0)  # after show control, held up for a moment, read its clock
+    assert asker.ask_all("/sensors/list")[-1][2] == 0.0
+
+
+def test_the_roster_of_a_box_that_is_starting_and_of_none(folder: Path, key_file: Path, asker: Asker) -> None:
+    [reply] = asker.ask_all("/sensors/list")
+    assert reply[:3] == ["/sensors/reply", "/sensors/list", 0]
+    assert "No stage dances on this box" in reply[3]
+    with StageDouble(folder):
+        until(lambda: asker.ask_all("/sensors/list") == [["/sensors/end", 0, -1.0, str(key_file)]])
+
+
+def test_a_reload_brings_the_keys_along(stage: StageDouble, asker: Asker, key_file: Path) -> None:
+    assert asker.ask("/sensors/reload") == ["/sensors/reply", "/sensors/reload", 1, "reload it is."]
+    [order] = stage.orders
+    assert order.keys == {name: (one.device_id, one.key) for name, one in load_keys(key_file).items()}
+    key_file.unlink()
+    create_keys(key_file, ["left-wrist", "spare-1", "spare-2"])
+    asker.ask("/sensors/reload")
+    assert len(stage.orders[-1].keys) == 3
+
+
+def test_a_key_file_that_has_not_changed_is_not_read_again(
+    stage: StageDouble, asker: Asker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reads: list[Path] = []
+
+    def read(path: Path) -> dict[str, object]:
+        reads.append(path)
+        return dict(load_keys(path))
+
+    monkeypatch.setattr("appliance.sensor.keys.load_keys", read)
+    for _ in range(5):
+        asker.ask("/sensors/reload")
+    assert (len(reads), len(stage.orders)) == (1, 5)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"), [("left-wrist: {", "not valid YAML here"), (None, "No such file")]
+)
+def test_a_reload_of_a_bad_file_changes_nothing_and_is_told(
+    stage: StageDouble, asker: Asker, key_file: Path, text: str | None, complaint: str
+) -> None:
+    key_file.write_text(text) if text is not None else key_file.unlink()
+    _, about, done, message = asker.ask("/sensors/reload")
+    assert (about, done) == ("/sensors/reload", 0)
+    assert complaint in message
+    assert "goes on with the keys that it has" in message
+    assert stage.orders == []
+
+
+def test_a_box_without_a_key_file_says_so(folder: Path) -> None:
+    control = ControlInThread(folder)
+    asker = Asker(control.port)
+    assert "no key file" in asker.ask("/sensors/reload")[3]
+    asker.close()
+    control.close()

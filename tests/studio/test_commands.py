@@ -8,15 +8,26 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+import yaml
 from typer.testing import Result
 
+from appliance.pose import quaternion
+from appliance.pose.body_facts import fronts, sampled_positions
 from appliance.pose.bvh import read_bvh, write_bvh
+from appliance.pose.reading_options import ReadingOptions
+from appliance.show.bundle import default_show_path
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
+from appliance.studio.data.catalogue import Catalogue, recordings_in
+from appliance.studio.data.dataset import load_dataset
+from appliance.studio.data.remembered import Remembered, reading_facts
+from appliance.studio.evaluation.findings import few_data
 from appliance.studio.export import gate
+from appliance.studio.export.packing import write_show_yaml
 from tests.studio.conftest import Said, bunraku
-from tests.studio.tiny import swaying
+from tests.studio.tiny import swaying, write_recordings
 
 Trained = tuple[Path, Said]
 HANDS = ["evaluate", "{show}", "{rec}/sway_0.bvh", "--reference", "{rec}", "--hands"]
@@ -246,3 +257,92 @@ def test_a_show_is_evaluated_without_torch(tiny_show: Path) -> None:
     result = subprocess.run([sys.executable, "-c", blocked], capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["degrees"]["1"]["mean"] > 0
+
+
+UNIT = 0.031  # metres, which no guess knows
+TOLD = ("--metres-per-unit", UNIT, "--facing", "-z")
+
+
+@pytest.mark.usefixtures("quickly_written")
+def test_later_commands_read_as_training_did_and_leave_what_they_made(tmp_path: Path) -> None:
+    folder, out = tmp_path / "takes", tmp_path / "pose"
+    folder.mkdir()
+    for seed in range(2):
+        dance = swaying(6.0, seed)
+        dance.poses[:, 0] = quaternion.multiply(np.array([0.0, 0.0, 1.0, 0.0]), dance.poses[:, 0])
+        write_bvh(folder / f"take_{seed}.bvh", dance, UNIT)
+    trained = bunraku("train", "--model", "pose", "--recordings", folder, "--out", out, "--steps", 2, *TOLD)
+    assert trained.exit_code == 0, said(trained)
+
+    def wobbled(phrase: Path, name: str, *reported: object) -> Path:
+        options = (
+            "--model",
+            out / "checkpoint.pt",
+            "--out",
+            tmp_path / name,
+            "--wobble",
+            0,
+            1,
+            "--seconds",
+            1,
+        )
+        result = bunraku("path", phrase, *options, *reported)
+        assert result.exit_code == 0, said(result)
+        return tmp_path / name
+
+    once = wobbled(folder / "take_0.bvh", "once.bvh")
+    again = wobbled(once, "again.bvh")
+    turned = wobbled(once, "turned.bvh", "--facing", "once=-z")
+    written = read_bvh(folder / "take_0.bvh", metres_per_unit=UNIT).skeleton
+    for made, front in ((once, 1), (again, 1), (turned, -1)):
+        dance = read_bvh(made)
+        np.testing.assert_allclose(dance.skeleton.offsets, written.offsets, atol=1e-4)
+        ways = fronts(written, sampled_positions(dance))
+        assert ways is not None and front * ways.mean(axis=0)[1] > 0.5, made.name
+
+
+def test_what_was_asked_for_goes_before_what_is_remembered(tmp_path: Path) -> None:
+    inches = Catalogue().with_options(ReadingOptions(metres_per_unit={"*": 0.0254}, all_frames=True))
+    assert reading_facts(inches) == {"metres_per_unit": {"*": 0.0254}, "all_frames": True}
+    write_bvh(tmp_path / "raw.bvh", swaying(1.0), 0.0254)
+    write_bvh(tmp_path / "ours.bvh", swaying(1.0))
+    trained = Remembered(inches.reading, read_bvh(tmp_path / "ours.bvh").skeleton)
+    write_bvh(tmp_path / "at_another_rate.bvh", swaying(1.0, fps=60.0))
+
+    def unit(name: str, **asked: float) -> float | None:
+        reported = trained.options_for(tmp_path / name, ReadingOptions(metres_per_unit=asked))
+        return reported.conventions_of(Path(name).stem).metres_per_unit
+
+    assert unit("raw.bvh") == 0.0254 and unit("raw.bvh", raw=0.5) == 0.5
+    assert unit("ours.bvh") is None and unit("ours.bvh", ours=0.5) == 0.5
+    assert unit("at_another_rate.bvh") == 0.0254
+
+
+@pytest.mark.parametrize(
+    "joint", ["lShldr", "mixamorig:LeftArm", "Bip01 L UpperArm", "no", "Skeleton 001:Arm"]
+)
+def test_the_show_has_what_the_default_show_has(tmp_path: Path, joint: str) -> None:
+    hand = {"sensor": "left-wrist", "joint": joint, "at_neutral": [0.766, 0.0, 0.0, -0.643]}
+    path = write_show_yaml(tmp_path, "Anna: one", [hand], "Danced by Anna # and Bert.", "made of\nanna.bvh")
+    text = path.read_text(encoding="utf-8")
+    found, given = yaml.safe_load(text), yaml.safe_load((default_show_path() / "show.yaml").read_text())
+    assert set(found) == set(given) - {"springs", "strings"}
+    assert found["name"] == "Anna: one" and found["acknowledgement"] == "Danced by Anna # and Bert."
+    assert found["hands"] == [hand]
+    assert found["dancer"] == given["dancer"] and found["looks"] == given["looks"]
+    assert found["cues"][0]["hands"] == [joint] and found["cues"][-1]["hands"] == [joint]
+    assert "# made of anna.bvh" in text and text.count("#") > 8
+    path.write_text("name: mine\n")
+    write_show_yaml(tmp_path, "other", [hand])
+    assert path.read_text() == "name: mine\n"
+
+
+def test_a_show_s_own_phrase_is_no_recording(tmp_path: Path) -> None:
+    folder = write_recordings(tmp_path / "dancer")
+    before = recordings_in(folder)
+    (folder / "phrase.bvh").write_text("HIERARCHY")
+    assert folder / "phrase.bvh" in recordings_in(folder)
+    (folder / "checkpoint.pt").touch()
+    (folder / "skeleton.bvh").write_text("HIERARCHY")
+    assert recordings_in(folder) == before
+    assert "2 minutes of dance are enough to begin with" in few_data(load_dataset(folder))[0]

@@ -27,7 +27,7 @@ from appliance.studio.exchange.retargeting import lowest_m
 from hw_sim.osc_receiver import OscReceiver
 from tests.cli.test_cli import write_box
 from tests.command import Command
-from tests.outputs.test_vmc_rest import LIMBS, WAYS_DEGREES, degrees, posed_avatar
+from tests.outputs.test_vmc import LIMBS, WAYS_DEGREES, degrees, posed_avatar
 from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of
 from tests.studio.conftest import bunraku as studio
 from tests.studio.test_commands import said

@@ -13,13 +13,21 @@ import torch
 from onnx import numpy_helper
 
 from appliance.pose import quaternion
+from appliance.show.bundle import default_show_path
 from appliance.show.network import resting_feed
+from appliance.studio import train_command
+from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.coupled import Coupled
 from appliance.studio.autoencoder.held_joints import HeldJoints, HeldPlaces
 from appliance.studio.autoencoder.models import PUPPETS
-from appliance.studio.evaluation.coders import OnnxCoder
+from appliance.studio.data.dataset import load_dataset
+from appliance.studio.evaluation.coders import OnnxCoder, load_checkpoint
+from appliance.studio.export import gate
 from appliance.studio.export.export import export
 from appliance.studio.export.exported import read_exported
+from appliance.studio.model_uses import REMOVED
+from appliance.studio.studio_error import StudioError
+from tests.studio.conftest import Said, bunraku
 from tests.studio.test_autoencoder import bones_of_tiny, some_windows
 from tests.studio.tiny import moving, skeleton, untrained
 
@@ -192,3 +200,144 @@ def test_the_file_says_what_it_is(network: str, exported: dict[str, Path]) -> No
         assert (facts["bunraku.window"], facts["bunraku.latent"]) == ("8", "16")
         assert (facts["bunraku.architecture"], facts["bunraku.precision"]) == (network, precision)
         assert np.array(json.loads(facts["bunraku.rest"])).shape == (17, 4)
+
+
+def constants(path: Path) -> dict[str, np.ndarray]:
+    return {each.name: numpy_helper.to_array(each) for each in onnx.load(path).graph.initializer}
+
+
+@pytest.mark.parametrize("network", ["coupled", "mlp"])
+def test_what_is_read_back_computes_what_the_file_computes(tmp_path: Path, network: str) -> None:
+    file, count = tmp_path / "puppet.onnx", len(NAMES)
+    export(untrained(network), NAMES, file, int8=False, architecture=network)
+    read, played = read_exported(file), OnnxCoder(file)
+    assert read.joints == tuple(NAMES) and read.facts["architecture"] == network
+    windows, targets = torch.nn.functional.normalize(torch.randn(2, 4, 8, count, 4), dim=-1)
+    hold = HeldJoints(np.arange(count) == 2, targets.numpy(), np.full(count, 0.7, dtype=np.float32))
+    for iterations in ((1, 0), (10, 9)):
+        one, _ = read.iterate(windows.numpy(), *iterations, hold)
+        other, _ = played.iterate(windows.numpy(), *iterations, hold)
+        assert np.abs(quaternion.aligned(one, other) - other).max() < 1e-4
+
+
+def test_the_default_show_read_and_exported_again_has_the_same_levels(tmp_path: Path) -> None:
+    shipped = default_show_path() / "puppet.onnx"
+    read, again = read_exported(shipped), tmp_path / "again.onnx"
+    export(read.autoencoder, list(read.joints), again, int8=True, architecture=read.facts["architecture"])
+    ours, theirs = constants(again), constants(shipped)
+    assert ours.keys() == theirs.keys()
+    assert sum(name.endswith(".q") for name in ours) == 3
+    for name, values in theirs.items():
+        if values.dtype == np.uint8:
+            assert np.array_equal(ours[name], values), name
+        else:
+            np.testing.assert_allclose(ours[name], values, atol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("network", REMOVED)
+def test_networks_of_an_earlier_version_are_refused_with_the_version_that_reads_them(
+    network: str, tmp_path: Path
+) -> None:
+    torch.save({"settings": {"seed": 1, "network": network}}, tmp_path / "checkpoint.pt")
+    with pytest.raises(StudioError, match=rf"'{network}'\. Only Bunraku 0\.1\.0 can read it"):
+        load_checkpoint(tmp_path / "checkpoint.pt")
+    export(untrained("mlp"), NAMES, tmp_path / "puppet.onnx", int8=False, architecture=network)
+    with pytest.raises(StudioError, match=rf"'{network}'\. Only Bunraku 0\.1\.0 can read it"):
+        read_exported(tmp_path / "puppet.onnx")
+
+
+def test_files_that_give_no_network_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "other.onnx").write_bytes(b"no network")
+    with pytest.raises(StudioError, match=r"not a puppet that bunraku exported"):
+        read_exported(tmp_path / "other.onnx")
+    export(untrained("lstm"), NAMES, tmp_path / "lstm.onnx", int8=False, architecture="lstm")
+    with pytest.raises(StudioError, match=r"lstm.*Give its checkpoint\.pt"):
+        read_exported(tmp_path / "lstm.onnx")
+
+
+def test_a_training_goes_on_from_a_show(
+    trained: tuple[Path, Said], recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        train_command, "release", lambda *_: {"puppetry": {}}
+    )  # as after any training, and slow
+    show, _ = trained
+    train = ("train", "--recordings", recordings, "--from", show / "puppet.onnx", "--threads", 1)
+    result = bunraku(*train, "--out", tmp_path / "next", "--steps", 2)
+    assert result.exit_code == 0, result.output
+    before, after = (json.loads((each / "training.json").read_text()) for each in (show, tmp_path / "next"))
+    assert after["settings"]["width"] == 48 and after["settings"]["learning_rate"] == 2e-4
+    assert after["settings"]["alive_from"] == 0 < before["settings"]["alive_from"]
+    errors = [reported["history"][-1]["held_out_degrees"] for reported in (before, after)]
+    assert errors[1] < 1.1 * errors[0], "it began anew"
+    for message, options in (
+        ("--width comes with", ("new", "--width", 16)),
+        ("Omit one of them", ("new", "--model", "pose")),
+        ("Give one", ("next", "--resume")),
+    ):
+        refused = bunraku(*train, "--out", tmp_path / options[0], *options[1:])
+        assert refused.exit_code == 2 and message in refused.stderr
+
+
+def judged(autoencoder: Autoencoder, folder: Path) -> gate.Verdict:
+    for precision in ("fp32", "int8"):
+        path = folder / f"{precision}.onnx"
+        export(autoencoder, NAMES, path, int8=precision == "int8", architecture="mlp")
+    coders = [OnnxCoder(folder / f"{precision}.onnx") for precision in ("fp32", "int8")]
+    return gate.judge(*coders, some_windows(8).numpy())
+
+
+def test_a_network_that_quantizes_badly_ships_as_fp32(tmp_path: Path) -> None:
+    """One large weight in each row leaves no levels for the others."""
+    autoencoder = untrained()
+    with torch.no_grad():
+        last = autoencoder.network.decoder.stack[-1]
+        last.weight[:] *= 4
+        last.weight[:, 0] = 60.0
+        last.bias -= 60.0 * autoencoder.network.decoder.stack[:-1](torch.zeros(1, 16))[0, 0]
+    verdict = judged(autoencoder, tmp_path)
+    assert verdict.mean["1"] > 0.25
+    assert not verdict.passed and verdict.precision == "fp32"
+    assert (
+        "fp32 ships" in verdict.sentence()
+        and f"{verdict.mean['1']:.2f} degrees after 1" in verdict.sentence()
+    )
+
+
+def test_a_network_that_quantizes_well_ships_as_int8(tmp_path: Path) -> None:
+    verdict = judged(untrained(), tmp_path)
+    assert verdict.passed and verdict.precision == "int8"
+    assert 0 < verdict.mean["1"] <= verdict.largest["1"]
+
+
+def test_all_limits_count() -> None:
+    sound = {"1": 0.25, "10": 1.5, "10/9": 1.5}
+    assert gate.Verdict(sound, sound).passed
+    for passes, degrees in (("1", 0.26), ("10", 1.51), ("10/9", 1.51), ("1", float("nan"))):
+        assert not gate.Verdict({**sound, passes: degrees}, sound).passed
+
+
+def test_the_gate_looks_at_the_answer_to_hands_too(tmp_path: Path) -> None:
+    """int8 weights that spoil only what the network makes of held joints do not ship."""
+
+    class Deaf(OnnxCoder):
+        def iterate(self, windows, coding_iterations, interaction_iterations=0, *held):  # type: ignore[no-untyped-def]
+            return super().iterate(windows, coding_iterations)
+
+    path, autoencoder = tmp_path / "fp32.onnx", untrained("coupled")
+    with torch.no_grad():
+        autoencoder.network.hands.last.weight *= 300
+        autoencoder.network.decoder.stack[-1].weight *= 100
+    export(autoencoder, NAMES, path, int8=False, architecture="coupled")
+    verdict = gate.judge(OnnxCoder(path), Deaf(path), some_windows(8).numpy())
+    assert verdict.mean["10"] == 0.0
+    assert verdict.mean["10/9"] > 1.5 and not verdict.passed
+
+
+def test_the_sample_is_spread_over_all_takes(recordings: Path) -> None:
+    found = load_dataset(recordings)
+    windows = gate.sample_windows(found.training, found.moving, count=10)
+    assert windows.shape == (10, 8, 17, 4)
+    first, last = found.training[0].recording, found.training[-1].recording
+    np.testing.assert_allclose(windows[0], first.poses[:8, found.moving], atol=1e-6)
+    np.testing.assert_allclose(windows[-1], last.poses[-8:, found.moving], atol=1e-6)

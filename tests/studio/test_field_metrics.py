@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from appliance.pose import quaternion
+from appliance.studio.data.dataset import Take
 from appliance.studio.evaluation.coverage import RecordedMotion
 from appliance.studio.evaluation.critic import area_under_curve
 from appliance.studio.evaluation.field_metrics import foot_skate_ratio, jerk, physical_foot_contact
@@ -20,9 +22,11 @@ from appliance.studio.evaluation.motion_features import (
     kinetic_features,
 )
 from appliance.studio.evaluation.nearest import without_heading
+from appliance.studio.improviser.naturalness import Yardstick, measure
+from appliance.studio.improviser.naturalness_table import UNDER, naturalness_table
 from tests.studio.dancers import ARM, danced, motions
 from tests.studio.puppets import NAMES
-from tests.studio.tiny import moving
+from tests.studio.tiny import moving, swaying
 
 PLACES = list(moving())
 
@@ -135,3 +139,30 @@ def test_coverage_is_the_share_that_is_danced() -> None:
     assert recorded.coverage(poses) > 0.95 and recorded.recall(poses) > 0.95
     assert 0.3 < recorded.coverage(poses[:500]) < 0.8
     assert recorded.coverage(poses[:1].repeat(50, axis=0)) < 0.1
+
+
+def cells(line: str) -> list[str]:
+    return [cell for cell in line.split("  ") if cell.strip()]
+
+
+def test_a_row_for_each_dance_and_the_recordings_last() -> None:
+    recorded = [swaying(4.0, seed) for seed in (0, 1)]
+    takes = [Take(f"{n}", f"{n}", one, one.poses[:, 0, 0] < 2, 50, 50) for n, one in enumerate(recorded)]
+    yardstick = Yardstick.of(takes, moving())
+    floating = recorded[0].roots.copy()
+    floating[:100, 1] += 0.04  # too little for a jump
+    made = {
+        "as_recorded": measure(recorded[0], yardstick),
+        "floating": measure(replace(recorded[0], roots=floating), yardstick, endless=False),
+    }
+    console = Console(width=80)
+    with console.capture() as captured:
+        console.print(naturalness_table(made))
+    _, head, *rows = (line for line in captured.get().splitlines()[1:] if line.strip(" ─"))
+    assert [cell.strip() for cell in cells(head)] == list(UNDER)
+    assert [row.strip().split("  ")[0] for row in rows] == ["as recorded", "floating", "recordings"]
+    as_recorded, above, own = (cells(row)[1:] for row in rows)
+    assert float(as_recorded[2]) == pytest.approx(1, abs=0.3)
+    lifted, usual = (float(row[6]) for row in (above, own))
+    assert lifted > usual + 1
+    assert len(as_recorded) == len(UNDER) and len(above) == len(own) == len(UNDER) - 1, "a seam is a loop's"
