@@ -29,9 +29,7 @@ class FixedRoles(Roles):
 class LockedPair(Pair):
     """The link to one other box."""
 
-    def __init__(self, settings: PairSettings, fingerprint: bytes, now: float) -> None:
-        super().__init__(settings, fingerprint, now)
-        self.roles: Roles = FixedRoles(settings.is_first, now, settings.silent_s)
+    ROLES = FixedRoles
 
 
 class Followers(LockedPair):

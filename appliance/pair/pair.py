@@ -62,6 +62,8 @@ class Pair:
     heard_from: when each of its addresses was last heard.
     """
 
+    ROLES: type[Roles] = Roles
+
     def __init__(
         self,
         settings: PairSettings,
@@ -70,7 +72,7 @@ class Pair:
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self.settings, self._monotonic = settings, monotonic
-        self.roles = Roles(settings.is_first, now, settings.silent_s)
+        self.roles = self.ROLES(settings.is_first, now, settings.silent_s)
         self.offset = ClockOffset()
         self.is_ready = self.wants_keyframe = False
         self.reaches = True
@@ -267,6 +269,7 @@ class Pair:
         self.same_show = found.fingerprint == self._fingerprint
         start = self._codec.others
         if start != self._start:
+            self._epoch = -1  # it may lead again with the same number
             self.offset.restart()
         self.offset.hear(found.sent, now)
         if now - found.sent - self.offset.seconds < _STALE_S + waited_s:

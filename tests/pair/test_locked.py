@@ -10,14 +10,17 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
+from appliance.pose import quaternion
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from hw_sim.osc_receiver import decode
@@ -137,6 +140,48 @@ def test_a_box_that_loses_the_leader_dances_by_itself_until_it_is_back(tmp_path:
             box.await_output("dances by itself")
         boxes[0].start()
         boxes[0].frames(10)
+        wait_until(lambda: (again := measured(boxes, 1.0)).ticks > 20 and again.same == again.ticks)
+
+
+def shown(box: Box, until: Callable[[list[int]], bool]) -> tuple[list[int], npt.NDArray[np.float64]]:
+    """Ticks and poses (n, J, 4) that a box shows from now on, until `until` says so of the ticks."""
+    came: list[tuple[float, bytes]] = []
+
+    def is_over() -> bool:
+        came.extend(box.receiver.poll_datagrams(0.05))
+        return until([tick for tick, _ in _frames(came)])
+
+    wait_until(is_over, lambda: box.output, pause=lambda: None)
+    frames = [(tick, decode(data)[0][1]) for tick, (_, data) in _frames(came)]
+    return [tick for tick, _ in frames], np.array([pose for _, pose in frames], float).reshape(
+        len(frames), -1, 4
+    )
+
+
+def test_a_box_that_comes_back_into_step_jumps_nowhere(tmp_path: Path) -> None:
+    """The leader begins anew, without the hand that the others still hold: its shoulder is 69 degrees away.
+
+    The null: a box that shows the leader's frame at once turns it by all of that.
+    """
+    with three_boxes(tmp_path) as boxes:
+        leader = Asker(boxes[0].control)
+        leader.tell("/mocap/setjointrot", "lShldr", 0.0, 0.0, 1.0, 1.2)
+        assert leader.ask("/iterations", 2, 1)[2] == 1
+        leader.close()
+        time.sleep(1.0)  # until the hand holds
+        boxes[0].kill()
+        boxes[1].await_output("dances by itself")
+        boxes[1].pause()
+        boxes[0].start()
+        ticks, poses = shown(boxes[1], lambda ticks: ticks[-1:] < ticks[:1] and ticks[-1] > 150)
+        turns = np.degrees(quaternion.angle_between(poses[1:], poses[:-1]))
+        (back,) = [place for place, (a, b) in enumerate(pairwise(ticks)) if b < a]
+        away = np.degrees(quaternion.angle_between(poses[back], poses[-1]))
+        shoulder, usual = int(away.argmax()), turns[: back - 1].max(axis=0)
+        assert away[shoulder] > 60.0, away
+        assert turns[back].max() < 0.1, "the first frame of the leader's is where the box stood"
+        beyond = turns - usual
+        assert beyond.max() < 3.0, (beyond.max(axis=0), away)
         wait_until(lambda: (again := measured(boxes, 1.0)).ticks > 20 and again.same == again.ticks)
 
 

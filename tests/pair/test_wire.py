@@ -8,6 +8,7 @@ import pytest
 
 from appliance.pair import wire
 from appliance.pair.clock_offset import ClockOffset
+from appliance.pair.locked import LockedPair
 from appliance.pair.pair import Pair, PairSettings
 from appliance.pair.roles import Heard, Role
 from appliance.pair.stream import KEPT, MOST_PART, Incoming, Outgoing, body_of, numbers_in
@@ -116,14 +117,14 @@ def test_the_shortest_way_tells_how_far_clocks_are_apart() -> None:
     assert offset.seconds == pytest.approx(-60.0 + 0.0003)
 
 
-def pair_of(*keys: bytes, clock: list[float]) -> list[Pair]:
+def pair_of(*keys: bytes, clock: list[float], kind: type[Pair] = Pair) -> list[Pair]:
     """Both boxes on this machine, with a clock that stands where the test puts it."""
     port, hosts = free_ports(1)[0], ("127.0.0.1", "127.0.0.2")
     settings = (
         PairSettings("", number == 0, hosts[number], port, [hosts[1 - number]], key, 0.042)
         for number, key in enumerate(keys)
     )
-    made = [Pair(one, PRINT, clock[0], lambda: clock[0]) for one in settings]
+    made = [kind(one, PRINT, clock[0], lambda: clock[0]) for one in settings]
     for _ in range(3):
         for box in made:
             box.beat(clock[0])
@@ -136,6 +137,36 @@ def test_another_secret_is_told_from_a_box_that_is_away(same: bool) -> None:
     one, other = pair_of(KEY, KEY if same else bytes(16), clock=[0.0])
     assert one.has_other_secret is other.has_other_secret is not same
     assert one.roles.peer_lives(0.0) is same
+    one.close(), other.close()
+
+
+def test_a_leader_that_starts_again_is_followed_anew_though_it_waited_first() -> None:
+    """It leads with the same number as before, and its messages begin at 1 again."""
+    clock = [0.0]
+    one, other = pair_of(KEY, KEY, clock=clock, kind=LockedPair)
+    for start in range(2):
+        for clock[0] in (1.5 * start + 0.1, 1.5 * start + 1.0):  # it waits, and says so; then it leads
+            one.look(clock[0])
+            one.beat(clock[0])
+            other.look(clock[0])
+        assert one.leads
+        other.ask(clock[0])
+        one.look(clock[0])
+        assert one.wants_keyframe, f"start {start}: nothing was asked for"
+        for number in range(5 - start):
+            one.publish(b"message %d of start %d" % (number, start), clock[0])
+        one.give_keyframe(b"the state")
+        one.publish(b"after the keyframe", clock[0])
+        one.answer(clock[0])
+        other.look(clock[0])
+        assert other.take_keyframe() == b"the state"
+        assert other.take_message() == b"after the keyframe"
+        one.close()
+        clock[0] += 0.5
+        one = LockedPair(one.settings, PRINT, clock[0], lambda: clock[0])
+        for box in (one, other, one):
+            box.beat(clock[0])
+            other.look(clock[0]), one.look(clock[0])
     one.close(), other.close()
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -30,7 +32,7 @@ def frame_at(tick: int, degrees: float, x_m: float) -> JointFrame:
 def steps(frames: list[JointFrame]) -> tuple[float, float]:
     """The largest turn of a joint, degrees, and step of a joint's position, metres, between two frames."""
     turns, metres = [], []
-    for before, after in zip(frames, frames[1:], strict=False):
+    for before, after in pairwise(frames):
         one, two = before.puppets[0], after.puppets[0]
         turns.append(np.degrees(quaternion.angle_between(one.pose, two.pose)).max())
         metres.append(np.linalg.norm(one.positions - two.positions, axis=1).max())
