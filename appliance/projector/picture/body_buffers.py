@@ -14,16 +14,20 @@ from appliance.projector.picture.vertices import layout, packed
 COARSE = 0.02  # share of the figure's height: vertices closer than this are merged for shadows
 OCCLUDER = 0.03  # share of the figure's height: size of the points that shade each other
 SMOOTHINGS = 6
+DETAIL = 0.006  # share of the figure's height: shorter edges are a face, fingers and toes
+SINKINGS = 60  # steps in which details sink into the head, hand or foot that they belong to
 REACH = 0.22  # share of the figure's height: points further away cast no shade
 
 Floats = NDArray[np.float32]
-PARTS = ("position", "normal", "joints", "weights")
+CURVE_BITS = 10  # of each axis, for the order in which faces are drawn
+PARTS = ("position", "normal", "sunk", "calm", "joints", "weights")
 
 
 class BodyBuffers:
     """The surface in figure heights, rest pose; content(coarse) is what a vertex array is made of.
 
     positions, normals: (V, 3); joints, weights: (V, 4); faces: (F, 3); open: (V,) how much light comes near.
+    A figure that melts loses its details first: then a vertex is `sunk` (V, 3) away, with the normal `calm`.
     """
 
     def __init__(self, ctx: moderngl.Context, mesh: BodyMesh) -> None:
@@ -31,6 +35,7 @@ class BodyBuffers:
         self.normals, self.joints, self.weights = mesh.normals, mesh.joints, mesh.weights
         self.faces = mesh.faces
         self.open = openness(self.positions, self.normals, mesh.faces)
+        self.sunk, self.calm = sunk(self.positions, self.normals, mesh.faces)
         self._fine = self._uploaded(ctx, np.arange(len(self.positions)), mesh.faces)
         self._coarse = self._uploaded(ctx, *merged(self.positions, mesh.faces, COARSE))
 
@@ -46,8 +51,12 @@ class BodyBuffers:
     def _uploaded(
         self, ctx: moderngl.Context, chosen: NDArray[np.int64], faces: NDArray[np.int32]
     ) -> tuple[moderngl.Buffer, moderngl.Buffer]:
+        chosen, faces = neighbours_together(self.positions, chosen, faces)
         whole = np.concatenate([self.normals, self.open[:, None]], axis=1)
-        values: tuple[Any, ...] = (self.positions, whole, self.joints, self.weights)
+        values: tuple[Any, ...] = (
+            *(self.positions, whole, self.sunk),
+            *(self.calm, self.joints, self.weights),
+        )
         parts = {name: value[chosen] for name, value in zip(PARTS, values, strict=True)}
         return ctx.buffer(packed(parts)), ctx.buffer(np.ascontiguousarray(faces, np.int32).tobytes())
 
@@ -69,6 +78,26 @@ def merged(
     return first, corners[(a != b) & (b != c) & (c != a)].astype(np.int32)
 
 
+def neighbours_together(
+    positions: Floats, chosen: NDArray[np.int64], faces: NDArray[np.int32]
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """The chosen vertices and the faces (F, 3) between them, in another order: faces along Morton's curve
+    through space, vertices as the faces come to them. A GPU then moves each vertex once and not twice.
+    """
+    places = positions[chosen][faces].mean(axis=1)
+    places = (places - places.min(axis=0)) / np.ptp(places, axis=0).max()
+    cell = (places * (2**CURVE_BITS - 1)).astype(np.int64)
+    along = np.zeros(len(faces), np.int64)
+    for bit, axis in np.ndindex(CURVE_BITS, 3):
+        along |= (cell[:, axis] >> bit & 1) << 3 * bit + axis
+    faces = faces[np.argsort(along, kind="stable")]
+    used, first = np.unique(faces, return_index=True)
+    order = used[np.argsort(first)]
+    number = np.zeros(len(chosen), np.int32)
+    number[order] = np.arange(len(order))
+    return chosen[order], number[faces]
+
+
 def openness(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> Floats:
     """(V,) 0..1: how much of the light from all around reaches each point of a body with spread limbs.
 
@@ -88,3 +117,24 @@ def openness(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> Fl
         of_faces = np.repeat(values[faces].mean(axis=1), 3)
         values = np.bincount(corners, of_faces, len(positions)) / np.maximum(count, 1)
     return np.asarray(values, np.float32)
+
+
+def sunk(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> tuple[Floats, Floats]:
+    """(V, 3) each: the way of every vertex, in heights, and its normal, once a face, fingers and toes are smooth."""
+    corners = positions[faces]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
+    count = np.maximum(np.bincount(faces.reshape(-1), minlength=len(positions)), 1)
+    is_detail = np.bincount(faces.reshape(-1), np.repeat(edges, 3), len(positions)) / count < DETAIL
+    near = faces[is_detail[faces].any(axis=1)]
+    chosen, at = np.unique(near, return_inverse=True)
+    at, moves = at.reshape(-1, 3), is_detail[chosen]
+    shares = 1.0 / np.bincount(at.reshape(-1), minlength=len(chosen))
+    values = np.concatenate([positions, normals], axis=1)[chosen]
+    for _ in range(SINKINGS if len(chosen) else 0):
+        of_faces = np.repeat(values[at].mean(axis=1), 3, axis=0)
+        means = np.stack([np.bincount(at.reshape(-1), column, len(chosen)) for column in of_faces.T], axis=1)
+        values[moves] = (shares[:, None] * means)[moves]
+    away, calm = np.zeros_like(positions), normals.copy()
+    away[chosen] = values[:, :3] - positions[chosen]
+    calm[chosen] = values[:, 3:] / np.maximum(np.linalg.norm(values[:, 3:], axis=1, keepdims=True), 1e-6)
+    return away, calm

@@ -14,7 +14,6 @@ DEPTH_SIDE, CAST_SIDE = 384, 192  # pixels
 FIELD = 0.85  # figure heights around the dancer's middle that the lamp sees
 REACH = 1.7  # figure heights of floor around the dancer on which a shadow can fall
 OVERHEAD = np.array([0.0, 1.0, 0.0])  # what is near the floor darkens it right below, whatever the lamp
-SPREAD = 1.0  # pixels from one sample of the floor shadow's blur to the next
 
 
 class Shadow:
@@ -55,7 +54,7 @@ class Shadow:
         easel.draw_figures(self._cast, {"row": 0, "held": 0.0, **on_floor})
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.enable_only(moderngl.NOTHING)
-        easel.blur(self._blur, first, second, (SPREAD / side, SPREAD / side))
+        easel.blur(self._blur, first, second, (1 / side, 1 / side))
         return {"floor_shadow": first.texture, "middle": middle, "reach": on_floor["reach"]}
 
 
