@@ -1,7 +1,8 @@
-"""Judges the projector's prediction on a dance: `python -m tools.wall_prediction JOURNAL`.
+"""Judges the projector's prediction on a dance: `python -m tools.wall_prediction JOURNAL lShldr`.
 
-JOURNAL: a folder that `bunraku play --emulate --journal JOURNAL` wrote. The display runs at 60 Hz; at each
-picture the predicted dance is compared with the dance as it then was.
+JOURNAL: a folder that `bunraku play --emulate --journal JOURNAL` wrote; the joint is the one that its hand
+holds, or the root for a figure of which all is led. The display runs at 60 Hz; at each picture the predicted
+dance is compared with the dance as it then was.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from appliance.cli.pictures import load_dance
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.projector.prediction import SPAN, Figure, Prediction
+from appliance.projector.prediction import REST, SPAN, Figure, Prediction
 
 PICTURES_HZ = 60.0
 STANDS_M_S = 0.05
@@ -37,29 +38,42 @@ class Wall(NamedTuple):
         return Wall(*(part[before] * (1.0 - share) + part[before + 1] * share for part in self))
 
 
-def judged(dance: Recording, milliseconds: float) -> str:
-    """A row of the table: of the dance predicted by so much; 0: interpolated, one tick late."""
-    positions, world = dance.skeleton.forward_kinematics(dance.poses, dance.roots)
+def judged(dance: Recording, held: str, milliseconds: float) -> str:
+    """A row of the table: of the dance predicted by so much; 0: interpolated, one tick late.
+
+    held: the joint that the hand holds.
+    """
+    skeleton = dance.skeleton
+    joint = skeleton.index(held)
+    led = np.isin(np.arange(len(skeleton)), skeleton.descendants(joint))
+    positions, world = skeleton.forward_kinematics(dance.poses, dance.roots)
     danced = Wall(_without_jumps(world), positions)
     times = np.arange(len(dance)) * TICK_S
     pictures = np.arange(1.0, times[-1] - 0.5, 1.0 / PICTURES_HZ)
     truth = danced.at(times, pictures)
     when = pictures - TICK_S  # a picture is between the two newest frames
-    shown = _predicted(dance, danced, milliseconds / 1000.0 / TICK_S).at(times, when)
-    meant = danced.at(times, when + milliseconds / 1000.0)
+    shown = _predicted(dance, danced, joint, milliseconds / 1000.0 / TICK_S).at(times, when)
+    error = np.where(
+        led,
+        _apart(shown, danced.at(times, when + milliseconds / 1000.0)),
+        _apart(shown, danced.at(times, when + REST * milliseconds / 1000.0)),
+    )
+    off = _apart(shown, truth)
     rough, smooth = (np.sqrt(np.mean(np.diff(wall.positions, 2, axis=0) ** 2)) for wall in (shown, truth))
     name = f"predicted by {milliseconds:g} ms" if milliseconds else "interpolated"
     return (
-        f"| {name} | {_apart(shown, meant):.1f} | {_apart(shown, truth):.1f} | {rough / smooth:.2f} | "
+        f"| {name} | {_worst(error)} | {_worst(off)} | {_worst(off[:, joint])} | {rough / smooth:.2f} | "
         f"{_slides(dance, shown, truth):.1f} |"
     )
 
 
-def _predicted(dance: Recording, danced: Wall, ticks: float) -> Wall:
+def _predicted(dance: Recording, danced: Wall, joint: int, ticks: float) -> Wall:
     if not ticks:
         return danced
+    holds = np.zeros(len(dance.skeleton), np.float32)
+    holds[joint] = 1.0
     figures = [
-        Figure(positions.astype(np.float32), world.astype(np.float32), np.zeros(len(world), np.float32))
+        Figure(positions.astype(np.float32), world.astype(np.float32), holds)
         for world, positions in zip(*danced, strict=True)
     ]
     predict = Prediction(dance.skeleton)
@@ -71,11 +85,14 @@ def _predicted(dance: Recording, danced: Wall, ticks: float) -> Wall:
     return Wall(_without_jumps(world), positions)
 
 
-def _apart(one: Wall, other: Wall) -> float:
-    """95th percentile over joints and pictures, degrees."""
-    return float(
-        np.degrees(np.percentile(quaternion.angle_between(_unit(one.world), _unit(other.world)), 95))
-    )
+def _apart(one: Wall, other: Wall) -> Array:
+    """(N, J) degrees between two walls' world rotations."""
+    return np.degrees(quaternion.angle_between(_unit(one.world), _unit(other.world)))
+
+
+def _worst(degrees: Array) -> str:
+    """95th percentile."""
+    return f"{np.percentile(degrees, 95):.1f}"
 
 
 def _slides(dance: Recording, shown: Wall, truth: Wall) -> float:
@@ -99,16 +116,17 @@ def _unit(rotations: Array) -> Array:
     return unit
 
 
-def print_table(journal: Path) -> None:
+def print_table(journal: Path, held: str) -> None:
     """The table of docs/notebook.md."""
     dance = load_dance(journal).recordings[0]
     print(
-        "| at 60 pictures a second | error of prediction | off the dance | roughness | standing feet, cm/s |"
+        "| at 60 pictures a second | error of prediction | off the dance | the held joint | roughness | "
+        "standing feet, cm/s |"
     )
-    print("|---|---|---|---|---|")
+    print("|---|---|---|---|---|---|")
     for milliseconds in (0.0, *MILLISECONDS):
-        print(judged(dance, milliseconds))
+        print(judged(dance, held, milliseconds))
 
 
 if __name__ == "__main__":
-    print_table(Path(sys.argv[1]))
+    print_table(Path(sys.argv[1]), sys.argv[2])

@@ -13,6 +13,7 @@ from appliance.projector.moment import Floats
 
 SPAN = 2  # ticks over which velocities are measured
 CONFIDENCE = 0.8  # share of a velocity that is carried on; 1 is nearer and rougher
+REST = 0.5  # share of the time for joints that no hand leads: their lag is not seen, sliding is
 MOST_RADIANS = math.radians(30.0)  # that a joint is turned on
 MOST_M = 0.1  # that the root is moved on
 _HARDLY_ANYTHING = 1e-9
@@ -29,10 +30,11 @@ class Figure(NamedTuple):
 class Prediction:
     """Carries a figure on with CONFIDENCE of the velocity of its last SPAN ticks; limbs keep their lengths.
 
-    One share of that velocity for the whole figure, as van Albada's limiter gives it (see
-    dancer/extrapolation.py): 0 after a jump or where the figure turns back, 1 where it moves evenly. A share
-    for each joint would be as good for hands, but a standing foot, which rests because hip, knee and ankle
-    move against one another, would slide twice as fast (docs/notebook.md has the figures).
+    Held joints, and those below them, are carried on for the whole time, all others for REST of it. The
+    limiter is one for the whole figure, van Albada's (see dancer/extrapolation.py): 0 after a jump or where
+    the figure turns back, 1 where it moves evenly. With a limiter for each joint a standing foot, which rests
+    because hip, knee and ankle move against one another, would slide twice as fast (docs/notebook.md has the
+    figures).
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -54,8 +56,10 @@ class Prediction:
         farthest = float(np.sqrt(np.max(np.sum(turn * turn, axis=-1))))
         share = min(share, math.tan(MOST_RADIANS / 2.0) / (farthest + _HARDLY_ANYTHING))
         share = min(share, MOST_M / (math.hypot(*last[0].tolist()) + _HARDLY_ANYTHING))
-        world = now.world + np.float32(share) * turn
+        led = np.max(self._chains * now.holds, axis=1, keepdims=True)
+        part = np.float32(share) * (REST + (1.0 - REST) * led)
+        world = now.world + part * turn
         world /= np.sqrt(np.sum(world * world, axis=-1, keepdims=True))
         bones = quaternion.rotate(world[self._above], self._bones)
-        root = now.positions[0] + np.float32(share) * last[0]
+        root = now.positions[0] + part[0] * last[0]
         return Figure((root + self._chains @ bones).astype(np.float32), world, now.holds)

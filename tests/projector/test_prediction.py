@@ -9,7 +9,7 @@ import pytest
 
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.prediction import CONFIDENCE, MOST_M, MOST_RADIANS, SPAN, Figure, Prediction
+from appliance.projector.prediction import CONFIDENCE, MOST_M, MOST_RADIANS, REST, SPAN, Figure, Prediction
 from appliance.release.choice import EMBEDDED_SHOW
 from appliance.show.show import load_show
 
@@ -20,12 +20,14 @@ def skeleton() -> Skeleton:
 
 
 def figure_at(
-    skeleton: Skeleton, turns: np.ndarray, root: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    skeleton: Skeleton, turns: np.ndarray, root: tuple[float, float, float] = (0.0, 1.0, 0.0), held: str = ""
 ) -> Figure:
-    """turns (J,): radians of each joint about its own x."""
+    """turns (J,): radians of each joint about its own x. held: a joint; "": the root, so the whole figure."""
     pose = quaternion.from_axis_angle([1, 0, 0], turns)
     positions, world = skeleton.forward_kinematics(pose, np.array(root))
-    return Figure(positions.astype(np.float32), world.astype(np.float32), np.zeros(len(skeleton), np.float32))
+    holds = np.zeros(len(skeleton), np.float32)
+    holds[skeleton.index(held) if held else 0] = 1.0
+    return Figure(positions.astype(np.float32), world.astype(np.float32), holds)
 
 
 def moving(
@@ -52,6 +54,19 @@ def test_an_even_turn_is_carried_on_with_its_share(skeleton: Skeleton, ticks: fl
     wanted = figure_at(skeleton, rates * ticks * CONFIDENCE)
     np.testing.assert_allclose(found.world, wanted.world, atol=2e-4)
     np.testing.assert_allclose(found.positions, wanted.positions, atol=3e-4)
+
+
+def test_limbs_that_a_hand_leads_are_carried_on_further(skeleton: Skeleton) -> None:
+    rates = np.full(len(skeleton), 0.01)
+    now, before, earlier = (
+        figure_at(skeleton, rates * tick, held="lShldr") for tick in (0, -SPAN, -2 * SPAN)
+    )
+    found = Prediction(skeleton)(now, before, earlier, 1.0)
+    turned = quaternion.angle_between(found.world, now.world) / quaternion.angle_between(
+        now.world, before.world
+    )
+    for name, share in (("lShldr", 1.0), ("lHand", 1.0), ("rShldr", REST), ("lCollar", REST), ("hip", REST)):
+        assert turned[skeleton.index(name)] == pytest.approx(CONFIDENCE * share / SPAN, rel=0.01), name
 
 
 def test_after_a_jump_nothing_is_carried_on(skeleton: Skeleton) -> None:

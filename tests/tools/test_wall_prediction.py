@@ -25,10 +25,12 @@ def figures(row: str) -> list[float]:
 
 @pytest.mark.parametrize(("milliseconds", "wanted"), [(0.0, 4.0), (10.0, 2.4), (20.0, 0.8)])
 def test_an_even_turn_is_behind_by_what_is_not_predicted(milliseconds: float, wanted: float) -> None:
-    _, behind, *_ = figures(judged(dance(200.0), milliseconds))  # 0.2 of the velocity is not carried on
+    _, _, behind, *_ = figures(
+        judged(dance(200.0), "lShldr", milliseconds)
+    )  # 0.2 of the velocity is not carried on
     assert behind == pytest.approx(wanted, abs=0.11)
 
 
 def test_what_is_not_predicted_is_as_rough_as_the_dance_and_stands_as_still() -> None:
-    error, _, rough, feet = figures(judged(dance(200.0), 0.0))
+    error, _, _, rough, feet = figures(judged(dance(200.0), "lShldr", 0.0))
     assert (error, feet) == (0.0, 0.0) and rough == pytest.approx(1.0, abs=0.05)

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.body.skinning import BodyMesh
+from appliance.body.skinning import BodyMesh, neighbours
 from appliance.projector.picture.vertices import layout, packed
 
 COARSE = 0.02  # share of the figure's height: vertices closer than this are merged for shadows
@@ -19,7 +19,7 @@ SINKINGS = 60  # steps in which details sink into the head, hand or foot that th
 REACH = 0.22  # share of the figure's height: points further away cast no shade
 
 Floats = NDArray[np.float32]
-CURVE_BITS = 10  # of each axis, for the order in which faces are drawn
+CURVE_BITS = 10  # an axis has so many, in the order in which faces are drawn
 PARTS = ("position", "normal", "sunk", "calm", "joints", "weights")
 
 
@@ -120,20 +120,18 @@ def openness(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> Fl
 
 
 def sunk(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> tuple[Floats, Floats]:
-    """(V, 3) each: the way of every vertex, in heights, and its normal, once a face, fingers and toes are smooth."""
+    """(V, 3) each: the way of every vertex, in heights, and its normal, once face, fingers and toes are smooth."""
     corners = positions[faces]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
     count = np.maximum(np.bincount(faces.reshape(-1), minlength=len(positions)), 1)
     is_detail = np.bincount(faces.reshape(-1), np.repeat(edges, 3), len(positions)) / count < DETAIL
-    near = faces[is_detail[faces].any(axis=1)]
-    chosen, at = np.unique(near, return_inverse=True)
-    at, moves = at.reshape(-1, 3), is_detail[chosen]
-    shares = 1.0 / np.bincount(at.reshape(-1), minlength=len(chosen))
+    chosen, near = np.unique(faces[is_detail[faces].any(axis=1)], return_inverse=True)
     values = np.concatenate([positions, normals], axis=1)[chosen]
-    for _ in range(SINKINGS if len(chosen) else 0):
-        of_faces = np.repeat(values[at].mean(axis=1), 3, axis=0)
-        means = np.stack([np.bincount(at.reshape(-1), column, len(chosen)) for column in of_faces.T], axis=1)
-        values[moves] = (shares[:, None] * means)[moves]
+    if len(chosen):
+        around = neighbours(near.reshape(-1, 3).astype(np.int32), len(chosen))
+        moves = is_detail[chosen]
+        for _ in range(SINKINGS):
+            values[moves] = values[around[:, moves]].mean(axis=0)
     away, calm = np.zeros_like(positions), normals.copy()
     away[chosen] = values[:, :3] - positions[chosen]
     calm[chosen] = values[:, 3:] / np.maximum(np.linalg.norm(values[:, 3:], axis=1, keepdims=True), 1e-6)
