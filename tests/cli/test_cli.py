@@ -11,14 +11,19 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import typer
 
 from appliance.cli.app import parser, plug_ins
+from appliance.dancer.material import map_reach
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.export import export
+from appliance.recorder.reading import read_journal
 from appliance.sensor.keys import create_keys
-from appliance.show.bundle import write_checksums
+from appliance.show.bundle import bundled_shows, write_checksums
+from appliance.show.show import load_show
+from hw_sim.bundled_shows import show_folder
 from tests.bundles import swaying_phrase, write_show
 from tests.command import Command
 from tests.recorder.night import Night
@@ -298,3 +303,75 @@ def test_a_hand_on_the_hips_turns_the_figure_and_both_commands_say_so(
         said = bunraku(*command).out
         assert ("'Hips' is the root of the skeleton: a hand there turns the whole figure" in said) == warned
         assert ("To lead the body hold 'Chest'" in said) == warned
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("play --alone --window", "--window does nothing with --alone"),
+        ("project --offscreen 64x64 --key", "--key does nothing without --raw or --frames"),
+        ("kept --out a.bvh", "--out does nothing without the NAME"),
+        ("sound --show x", "--show does nothing without --file"),
+        ("emulate --serial /dev/none --host 10.0.0.1 --port 1", "--host, --port do nothing with --serial"),
+        ("emulate --baud 9600", "--baud does nothing without --serial"),
+        ("emulate --joint head", "--joint does nothing without the motion 'trace'"),
+        ("filmstrip a.journal --facing x", "--facing does nothing with a journal"),
+        ("filmstrip a.bvh --show default", "--show does nothing without --look"),
+    ],
+)
+def test_it_is_named_and_nothing_is_done(arguments: str, message: str, bunraku: Command) -> None:
+    said = " ".join(bunraku(*arguments.split(), status=2).err.replace("│", " ").split())
+    assert message in said and "out." in said, said
+
+
+def test_an_option_that_the_user_did_not_write_is_no_reason(bunraku: Command) -> None:
+    """A default counts as left out, also where it is not empty."""
+    assert (
+        "does nothing" not in bunraku("emulate", "--serial", "/dev/none", "--keys", "/absent/x", status=2).err
+    )
+
+
+SHOWS = bundled_shows()
+
+
+@pytest.mark.parametrize("given", [("martial",), ("--show", "martial")])
+def test_check_takes_its_name(bunraku: Command, tmp_path: Path, given: tuple[str, ...]) -> None:
+    output = bunraku("check", *given, "--box", write_box(tmp_path)).out
+    assert f"{load_show(SHOWS['martial']).config.name}: the bundle is whole." in output
+
+
+def test_check_says_that_a_map_leads_nowhere(
+    bunraku: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = write_box(tmp_path)
+    assert "map is dead" not in bunraku("check", "--box", box).out
+    monkeypatch.setattr(map_reach, "DEAD", 100.0)  # of what its poses differ by: no map leads so far
+    assert "pose.onnx: The map is dead: from corner to corner" in bunraku("check", "--box", box).out
+
+
+def test_check_takes_one_show(bunraku: Command) -> None:
+    assert "name one show" in bunraku("check", "martial", "--show", "default", status=2).err
+
+
+@pytest.mark.parametrize("name", SHOWS)
+def test_it_dances_and_its_journal_knows_it(
+    bunraku: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+    box, journal = write_box(tmp_path), tmp_path / "dance"
+    bunraku("play", "--show", name, "--box", box, "--seconds", 1, "--alone", "--journal", journal)
+    danced = read_journal(journal)
+    assert danced.header["show"] == load_show(SHOWS[name]).config.name
+    assert len(danced.ticks) > 20
+    assert np.ptp(danced.ticks["pose"], axis=0).max() > 0.01
+    assert "All are the same, bit for bit." in bunraku("replay", journal).out
+
+
+def test_a_misspelt_name_is_refused_with_the_nearest(bunraku: Command) -> None:
+    assert "Did you mean 'martial'" in bunraku("play", "--show", "marital", status=2).err
+
+
+def test_the_simulation_finds_it_without_the_box_s_modules(tmp_path: Path) -> None:
+    assert {name: show_folder(Path(name)) for name in SHOWS} == SHOWS
+    assert show_folder(None) == SHOWS["default"]
+    assert show_folder(tmp_path) == tmp_path

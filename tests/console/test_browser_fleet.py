@@ -29,7 +29,7 @@ BOXES = [
 
 
 def test_a_ticked_box_asks_for_its_pin_and_takes_the_show(tab: Tab, venue: tuple[Box, Page]) -> None:
-    """The other boxes are made up; tests/console/test_fleet_push.py has real ones."""
+    """The other boxes are made up; tests.console.test_fleet.py has real ones."""
     asked: list[Any] = []
 
     def pushed(route: Route) -> None:

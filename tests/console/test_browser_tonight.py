@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import socket
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import BrowserContext, expect
+from playwright.sync_api import Browser, BrowserContext, expect
 from playwright.sync_api import Page as Tab
 
-from tests.console.browser import ON_BOTH, await_box, await_true, declared, press, unlock
+from hw_sim.peers import free_ports
+from tests.bundles import write_show
+from tests.console.browser import ON_BOTH, PATIENCE_MS, PHONE, await_box, await_true, declared, press, unlock
 from tests.console.page import Page
 from tests.console.test_browser_picture import drag
 from tests.stage.test_fallbacks import EVERY
-from tests.system.box import Box
+from tests.system.box import Box, playing
 from tests.system.processes import wait_until
 
 pytestmark = pytest.mark.realtime
@@ -247,3 +251,23 @@ def _corner(taps: Taps) -> None:
     assert box is not None
     drag(taps.tab, box["x"] + 30, box["y"] + 30, 20, 20)
     taps.count += 1
+
+
+@pytest.mark.parametrize(
+    ("locale", "message"), [("de-DE", "bekommt den Tanz nicht"), ("en-GB", "does not get the dance")]
+)
+def test_a_dead_receiver_has_its_name_in_each_language(
+    browser: Browser, tmp_path: Path, locale: str, message: str
+) -> None:
+    (port,), (nobody,) = free_ports(1, socket.SOCK_STREAM), free_ports(1)
+    settings = {"console": {"port": port}, "outputs": {"osc": [{"port": nobody}]}}
+    with playing(write_show(tmp_path / "show"), tmp_path, settings=settings) as box:
+        page = Page(port, box.box_file)
+        wait_until(page.is_open, lambda: box.output)
+        context = browser.new_context(**PHONE, locale=locale)
+        context.set_default_timeout(PATIENCE_MS)
+        tab = context.new_page()
+        tab.goto(page.origin)
+        reported = tab.locator("#fallbacks-now li", has_text=message)
+        expect(reported).to_contain_text(f"127.0.0.1:{nobody}", timeout=PATIENCE_MS)
+        context.close()

@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import json
 import os
 import re
+import socket
+import stat
+import subprocess
+import zipfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 import yaml
+from aiohttp import web
+from aiohttp.test_utils import TestClient, TestServer
 
 from appliance.console.fleet import Neighbour, neighbours
 from appliance.console.metrics import metrics
+from appliance.console.push import PASSES
+from appliance.console.venue import Venue
 from appliance.levers.status import Status
-from hw_sim.peers import HOST
-from tests.console.page import page_alone
+from appliance.release.choice import CHOSEN, Choice, Pair
+from appliance.release.packed_show import pack_show, require_known_maker, unpack_show
+from appliance.show.bundle import CHECKSUMS, SIGNATURE, write_checksums
+from appliance.stage.stage_error import StageError
+from hw_sim.peers import HOST, free_ports
+from tests.bundles import write_show
+from tests.console.page import Page, box_with_page, page_alone
+from tests.system.processes import BUNRAKU, Process, run_bunraku, wait_until
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy" / "monitoring"
 # As avahi-browse 0.8 prints it: a box on two networks, one by IPv6, one that is only announced.
@@ -77,3 +95,226 @@ def test_the_examples_for_monitoring_name_metrics_that_there_are() -> None:
     assert len(asked) >= 9
     (job,) = yaml.safe_load((DEPLOY / "prometheus.yml").read_text())["scrape_configs"]
     assert job["metrics_path"] == "/metrics"
+
+
+def packed_bundle(folder: Path, name: str, network: str = "plain") -> Path:
+    show = write_show(folder, hands=[], network=network, name=name)
+    write_checksums(show)
+    return show
+
+
+class Installed(NamedTuple):
+    """The page of an installed box without a stage, and the folders of its preflight."""
+
+    page: Page
+    data: Path
+    run: Path
+
+    @property
+    def chosen(self) -> Choice:
+        choice = Choice.read(self.run / CHOSEN)
+        assert choice is not None
+        return choice
+
+    @property
+    def dances(self) -> str:
+        name: str = yaml.safe_load((self.chosen.first.show / "show.yaml").read_text())["name"]
+        return name
+
+
+def answers(port: int) -> bool:
+    with contextlib.suppress(OSError), socket.create_connection((HOST, port), 1.0):
+        return True
+    return False
+
+
+@contextlib.contextmanager
+def installed(folder: Path, **console: object) -> Iterator[Installed]:
+    (port,) = free_ports(1, socket.SOCK_STREAM)
+    data, run = folder / "data", folder / "run"
+    for one in (data / "boxes", run):
+        one.mkdir(mode=0o700, parents=True)
+    box_file = data / "boxes" / "hall.yaml"
+    settings = {"console": {"port": port, **console}, "control": None}
+    box_file.write_text(yaml.safe_dump(settings | {"runtime": str(run), "state": str(data / "state")}))
+    show = packed_bundle(data / "shows" / "before", "before")
+    choice = Choice((Pair(show, box_file, "before+hall", "show from the stick", True),), data=data)
+    for place in (data, run):
+        choice.write(place / CHOSEN)
+    with Process(folder / "page.txt", [*BUNRAKU, "console", "--chosen", run / CHOSEN]) as process:
+        page = Page(port, box_file)
+        wait_until(lambda: answers(port), lambda: process.output)
+        yield Installed(page, data, run)
+
+
+def test_three_boxes_get_the_show_and_each_tells_what_came_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One takes it, one has it already, one knows no maker of it, and one is away; avahi is made up."""
+    keys = tmp_path / "shows.keys"
+    keys.write_text("ssh-ed25519 AAAAC3NzaC1lZDI1NTE5AAAAIJLsLqmXDzuE9Q1kH1bZ0Q8VvFzSXQ0Y2jdZ6zK0t3pN anna\n")
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    monkeypatch.setenv("PATH", f"{programs}:/usr/bin:/bin")
+    show = packed_bundle(tmp_path / "tonight", "tonight")
+    (tmp_path / "own").mkdir()
+    with (
+        installed(tmp_path / "left") as left,
+        installed(tmp_path / "right", show_keys=str(keys)) as right,
+        box_with_page(show, tmp_path / "own", has_sensors=False) as (_, own),
+    ):
+        boxes = {"left": left.page.port, "right": right.page.port, "away": 9}
+        lines = [f"=;lo;IPv4;{one};_bunraku._tcp;local;{one}.local;{HOST};{at};" for one, at in boxes.items()]
+        browser = programs / "avahi-browse"
+        browser.write_text("#!/bin/sh\ncat <<'END'\n" + "\n".join(lines) + "\nEND\n")
+        browser.chmod(0o755)
+
+        def push(name: str, pin: str = "") -> tuple[str, str]:
+            answer = own.post("/api/fleet/push", {"host": f"{name}.local", "pin": pin})
+            assert answer.status == 200, answer.text
+            return answer.value["state"], answer.value["message"]
+
+        assert own.post("/api/fleet/push", {"host": "left.local"}).status == 401
+        own.unlock()
+        assert own.post("/api/fleet/push", {"host": "left.local"}).status == 404, "nobody looked for it"
+        assert len(own.get("/api/fleet").value) == 3
+        assert push("left") == ("pin", "")
+        wrong = f"{(int(left.page.pin) + 1) % 1_000_000:06}"
+        assert push("left", wrong)[0] == "pin" and left.dances == "before"
+        state, message = push("left", left.page.pin)
+        assert (state, left.dances) == ("taken", "tonight"), message
+        assert left.chosen.first.source == "show from another box"
+        assert [one.source for one in left.chosen.pairs[:2]] == [
+            "show from another box",
+            "show from the stick",
+        ]
+        assert push("left") == ("taken", "This show counts already."), "the PIN is given once"
+        wait_until((left.run / "anew").exists)
+        state, message = push("right", right.page.pin)
+        assert state == "refused" and "not signed" in message
+        assert right.dances == "before" and not any(right.data.rglob("show.zip"))
+        assert push("away")[0] == push("away", "123456")[0] == "unreachable"
+        (passes,) = (tmp_path / "own").rglob(PASSES)
+        assert stat.S_IMODE(passes.stat().st_mode) == 0o600
+        assert list(json.loads(passes.read_text())) == [
+            f"{one}.local:{boxes[one]}" for one in ("left", "right")
+        ]
+        left.page.unlock()
+        (device,) = [
+            one for one in left.page.get("/api/devices").value if one["name"] == socket.gethostname()
+        ]
+        assert left.page.post("/api/revoke", {"id": device["id"]}).status == 200
+        assert push("left")[0] == "pin", "the right to push can be taken back"
+
+
+def test_a_broken_or_torn_show_leaves_a_box_as_it_was(tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    pack_show(packed_bundle(tmp_path / "show", "broken", network="broken"), broken)
+    whole = broken.read_bytes()
+    with installed(tmp_path / "left") as left:
+        assert left.page.post("/api/show", whole).status == 401
+        left.page.unlock()
+        before = left.run.joinpath(CHOSEN).read_bytes()
+        for body in (whole[: len(whole) // 2], b"", b"no zip"):
+            answer = left.page.post("/api/show", body)
+            assert answer.status == 404 and "did not arrive whole" in answer.text
+        torn = socket.create_connection((HOST, left.page.port))
+        head = f"POST /api/show HTTP/1.1\r\nHost: {HOST}:{left.page.port}\r\nOrigin: {left.page.origin}\r\n"
+        head += f"Cookie: {left.page.cookie}\r\nContent-Length: {len(whole)}\r\n\r\n"
+        torn.sendall(head.encode() + whole[:1000])
+        wait_until(lambda: any(left.data.rglob("show.zip")))
+        torn.close()
+        wait_until(lambda: not any(left.data.rglob("show.zip")), "a half file stays")
+        (tmp_path / "show" / "puppet.onnx").write_bytes(b"damaged")
+        pack_show(tmp_path / "show", broken)
+        problems = left.page.post("/api/show", broken.read_bytes()).value["problems"]
+        assert any("puppet.onnx" in one["message"] for one in problems), problems
+        assert left.run.joinpath(CHOSEN).read_bytes() == before
+        assert not (left.run / "anew").exists() and left.dances == "before"
+        assert not any(left.data.rglob("arrived")), "what came is taken away"
+
+
+def test_the_command_sends_a_show_and_asks_for_a_pin(tmp_path: Path) -> None:
+    show = packed_bundle(tmp_path / "tonight", "tonight")
+    own = tmp_path / "own.yaml"
+    own.write_text(yaml.safe_dump({"runtime": str(tmp_path / "run"), "state": str(tmp_path / "state")}))
+    with installed(tmp_path / "left", https=True, names=["left.hall"]) as left:
+        at = f"https://{HOST}:{left.page.port}"
+        command = ("fleet", "push", show, "--box", own, "--to", at)
+        done = run_bunraku(*command, stdin=f"{left.page.pin}\n")
+        assert done.returncode == 0 and "taken" in done.stdout, done
+        assert left.dances == "tonight"
+        again = run_bunraku(*command, "--to", f"{HOST}:9")
+        assert again.returncode == 1
+        assert "counts already" in again.stdout and "unreachable" in again.stdout
+
+
+def test_a_show_from_elsewhere_is_its_maker_s(tmp_path: Path) -> None:
+    """Signed by ssh-keygen as people do it; a copy, another key, a file more and no signature are refused."""
+    for name in ("anna", "other"):
+        command = ("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", tmp_path / name)
+        subprocess.run(command, check=True)
+    show, keys = packed_bundle(tmp_path / "made", "signed"), tmp_path / "keys"
+    keys.write_text((tmp_path / "anna.pub").read_text())
+
+    def verdict() -> str:
+        pack_show(show, tmp_path / "show.zip")
+        (tmp_path / "into").mkdir(exist_ok=True)
+        unpack_show(tmp_path / "show.zip", tmp_path / "into")
+        try:
+            require_known_maker(tmp_path / "into" / "show", keys)
+        except StageError as error:
+            return str(error)
+        return ""
+
+    def sign(name: str) -> None:
+        (show / SIGNATURE).unlink(missing_ok=True)
+        command = ("ssh-keygen", "-q", "-Y", "sign", "-n", "bunraku-show", "-f", tmp_path / name)
+        subprocess.run((*command, show / CHECKSUMS), check=True, capture_output=True)
+
+    assert "not signed" in verdict()
+    sign("other")
+    assert "not known" in verdict()
+    sign("anna")
+    assert verdict() == ""
+    (show / "more.yaml").write_text("more")
+    assert "more.yaml" in verdict()
+    write_checksums(show)
+    assert "not known" in verdict(), "the signature is of the checksums before"
+    sign("anna")
+    assert verdict() == ""
+
+
+@pytest.mark.parametrize(
+    "name", ["../show.yaml", "/etc/show.yaml", "bunraku/show/../../x", "bunraku/box.yaml", "bunraku/show/"]
+)
+def test_a_hostile_zip_writes_nothing_beside_its_folder(tmp_path: Path, name: str) -> None:
+    with zipfile.ZipFile(tmp_path / "show.zip", "w") as packed:
+        packed.writestr(name if not name.endswith("/") else f"{name}a\0/../b", "x")
+    inside = tmp_path / "a" / "b"
+    inside.mkdir(parents=True)
+    with contextlib.suppress(StageError):
+        unpack_show(tmp_path / "show.zip", inside)
+    found = [one for one in tmp_path.rglob("*") if one.is_file() and not one.is_relative_to(inside / "show")]
+    assert found == [tmp_path / "show.zip"]
+
+
+def test_a_show_that_goes_is_not_interrupted(tmp_path: Path) -> None:
+    """The same route, on a box whose show people see: what came counts from the next power-on."""
+    with installed(tmp_path / "left") as left:
+        pack_show(packed_bundle(tmp_path / "tonight", "tonight"), tmp_path / "show.zip")
+        box = {"chosen": str(left.run / CHOSEN)}
+        venue = Venue(left.run, box, True, left.data / "state", show_goes=lambda: True)
+
+        async def main() -> str:
+            app = web.Application(client_max_size=1)
+            app.add_routes(venue.routes())
+            async with TestClient(TestServer(app)) as client:
+                answer = await client.post("/api/show", data=(tmp_path / "show.zip").read_bytes())
+                message: str = (await answer.json())["message"]
+                return message
+
+        assert "after the next power-on" in asyncio.run(main())
+        kept = Choice.read(left.data / CHOSEN)
+        assert kept is not None and kept.first.source == "show from another box"
+        assert left.dances == "before" and not (left.run / "anew").exists()

@@ -1,9 +1,8 @@
-"""Two projectors on one wall: what both light adds up to one picture, and neither needs much more memory."""
+"""Two projectors on one wall: what both light adds up to one picture."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import moderngl
 import numpy as np
@@ -19,10 +18,8 @@ from appliance.projector.resolution import SHARES
 from appliance.projector.still import moment_of
 from appliance.show.look import STYLES
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
-from tests.projector.golden_looks import AT_S, difference, renderer
-from tests.projector.gpu_cost import GpuCost, passes
+from tests.projector.golden_looks import AT_S, difference
 from tests.projector.stage_double import pixels
-from tests.projector.test_wall import FULL_HD, MOST_GPU_BYTES, MOST_PASSES
 
 SIZE = 160, 80
 GAMMA = 2.2
@@ -165,28 +162,3 @@ def test_overlap_and_gamma_follow_the_technician(gl: moderngl.Context) -> None:
     assert (kept[-1].overlap, kept[-1].blend_gamma) == (0.4, 3.0)
     done, sentence = Controls(Alignment(), kept.append).blend("overlap", 0.4)
     assert not done and "edge_blend" in sentence
-
-
-def test_cost_of_half_a_wall_at_1080p(gl: moderngl.Context, dance: Recording) -> None:
-    """GPU memory within that of one projector; time as of one, though twice as much is drawn."""
-    cost = GpuCost()
-    blend = EdgeBlendConfig(part="left", overlap=0.15)
-    config = ProjectorConfig(edge_blend=blend)
-    controls = Controls(Alignment.of_box(config), lambda _: None)
-    with cost.watching(), renderer(gl, dance.skeleton) as looks:
-        final = FinalPass(gl, config)
-
-        def draw(style: str, share: float) -> None:
-            size = picture_size(config, FULL_HD, blend.overlap, share)
-            wall = final.wall(gl.screen, FULL_HD, controls, 1.0, size)
-            looks.draw(moment_of(dance, AT_S), style, style, 1.0, wall)
-            if wall.framebuffer is not gl.screen:
-                final.draw(gl.screen, FULL_HD, controls, 1.0, ())
-            final.darken(gl.screen, FULL_HD, controls)
-
-        for style in STYLES:
-            for share in SHARES:
-                draw(style, share)
-                assert cost.memory_bytes < MOST_GPU_BYTES, style
-            assert passes(gl, FULL_HD, partial(draw, style, SHARES[0])) < MOST_PASSES, style
-        final.release()

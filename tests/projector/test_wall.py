@@ -16,7 +16,7 @@ from appliance.projector.picture.renderer import Renderer
 from appliance.projector.resolution import SHARES
 from appliance.projector.still import moment_of
 from appliance.show.look import STYLES
-from appliance.show.projector import ProjectorConfig
+from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 from tests.projector.golden_looks import AT_S, P99_LIMIT, SIZE, difference, renderer
 from tests.projector.gpu_cost import GpuCost, passes
 from tests.projector.stage_double import pixels
@@ -98,18 +98,29 @@ def test_a_smaller_picture_is_softer_and_otherwise_the_same(
     final.release()
 
 
-def test_cost_with_the_last_step_at_1080p(gl: moderngl.Context, dance: Recording) -> None:
-    """Corner-pinned: GPU memory at each share of the display's size, and time at the largest."""
-    controls, cost = Controls(Alignment(PINNED), lambda _: None), GpuCost()
+@pytest.mark.parametrize(
+    "blend", [None, EdgeBlendConfig(part="left", overlap=0.15)], ids=["one projector", "half a wall"]
+)
+def test_cost_with_the_last_step_at_1080p(
+    gl: moderngl.Context, dance: Recording, blend: EdgeBlendConfig | None
+) -> None:
+    """GPU memory at each share of the display's size, and time at the largest. Half a wall costs no more than
+    a picture that is corner-pinned, though twice as much is drawn.
+    """
+    config = ProjectorConfig(edge_blend=blend)
+    alignment = Alignment.of_box(config) if blend else Alignment(PINNED)
+    controls, cost = Controls(alignment, lambda _: None), GpuCost()
     with cost.watching(), renderer(gl, dance.skeleton) as looks:
-        final = FinalPass(gl, ProjectorConfig())
+        final = FinalPass(gl, config)
 
         def draw(style: str, share: float) -> None:
-            size = picture_size(ProjectorConfig(), FULL_HD, 0.0, share)
+            size = picture_size(config, FULL_HD, alignment.overlap, share)
             wall = final.wall(gl.screen, FULL_HD, controls, 1.0, size)
             looks.draw(moment_of(dance, AT_S), style, style, 1.0, wall)
             if wall.framebuffer is not gl.screen:
                 final.draw(gl.screen, FULL_HD, controls, 1.0, ())
+            if blend:
+                final.darken(gl.screen, FULL_HD, controls)
 
         for style in STYLES:
             for share in SHARES:

@@ -19,25 +19,10 @@ from appliance.studio.evaluation.findings import findings
 from appliance.studio.evaluation.masked import draw_masked, masked_stretches
 from tests.studio.bodies import body, moved
 from tests.studio.conftest import bunraku
-from tests.studio.test_catalogue import upside_down
 from tests.studio.test_commands import said
-from tests.studio.tiny import moving, skeleton, swaying
+from tests.studio.tiny import flipped, moving, skeleton, swaying, turned, upside_down
 
 RATES = (30.0, 60.0, 120.0)
-FLIP = quaternion.from_axis_angle([1.0, 0.0, 0.2], np.radians(170.0))
-
-
-def turned(recording: Recording, joint: str, turns: np.ndarray, first: int = 0) -> Recording:
-    """The recording with a joint turned besides, by turns (K, 4) from a frame on."""
-    poses, place = recording.poses.copy(), recording.skeleton.index(joint)
-    span = slice(first, first + len(turns))
-    poses[span, place] = quaternion.multiply(turns, poses[span, place])
-    return replace(recording, poses=quaternion.continuous(poses))
-
-
-def flipped(recording: Recording, joint: str, start_s: float, end_s: float) -> Recording:
-    first, last = round(start_s * recording.fps), round(end_s * recording.fps)
-    return turned(recording, joint, np.tile(FLIP, (last - first, 1)), first)
 
 
 def errors_of(*recordings: Recording) -> list[list[CaptureError]]:

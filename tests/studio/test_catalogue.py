@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.pose.bvh import write_bvh
 from appliance.show.config_error import ConfigError
 from appliance.studio.data.capture_errors import JUMP, MARKED, CaptureError, sound_frames, without
 from appliance.studio.data.catalogue import (
@@ -20,8 +19,7 @@ from appliance.studio.data.catalogue import (
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.data.sources import given, remembered
 from appliance.studio.studio_error import StudioError
-from tests.studio.test_capture_errors import flipped
-from tests.studio.tiny import swaying, write_recordings
+from tests.studio.tiny import upside_down, write_recordings
 
 
 def write_known(folder: Path, *names: str) -> list[Path]:
@@ -68,15 +66,6 @@ def test_a_catalogue_beside_the_recordings_goes_before_all(tmp_path: Path) -> No
     assert [take.name for take in found.held_out] == ["sway_0"]
     assert found.training[0].true_fps == 25
     assert found.training[0].recording.seconds == pytest.approx(8.0, abs=0.1)
-
-
-def upside_down(folder: Path) -> Path:
-    """Three takes of 12 s; in one the head hangs upside down from 4 to 6 s, in another from 8 to 9 s."""
-    folder.mkdir()
-    for number, (start, end) in enumerate([(4, 6), (8, 9), (0, 0)]):
-        dance = swaying(12.0, seed=number)
-        write_bvh(folder / f"sway_{number}.bvh", flipped(dance, "head", start, end))
-    return folder
 
 
 def loaded(folder: Path, text: str) -> dict[str, Take]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -97,4 +98,30 @@ def write_tiny_show(folder: Path) -> Path:
     packing.write_phrase(folder, phrase)
     packing.write_show_yaml(folder, "tiny", [{"sensor": "left-wrist", "joint": "lShldr"}])
     packing.seal(folder)
+    return folder
+
+
+FLIP = quaternion.from_axis_angle([1.0, 0.0, 0.2], np.radians(170.0))
+
+
+def turned(recording: Recording, joint: str, turns: np.ndarray, first: int = 0) -> Recording:
+    """The recording with a joint turned besides, by turns (K, 4) from a frame on."""
+    poses, place = recording.poses.copy(), recording.skeleton.index(joint)
+    span = slice(first, first + len(turns))
+    poses[span, place] = quaternion.multiply(turns, poses[span, place])
+    return replace(recording, poses=quaternion.continuous(poses))
+
+
+def flipped(recording: Recording, joint: str, start_s: float, end_s: float) -> Recording:
+    """The recording with a joint upside down from `start_s` to `end_s`."""
+    first, last = round(start_s * recording.fps), round(end_s * recording.fps)
+    return turned(recording, joint, np.tile(FLIP, (last - first, 1)), first)
+
+
+def upside_down(folder: Path) -> Path:
+    """Three takes of 12 s; in one the head hangs upside down from 4 to 6 s, in another from 8 to 9 s."""
+    folder.mkdir()
+    for number, (start, end) in enumerate([(4, 6), (8, 9), (0, 0)]):
+        dance = swaying(12.0, seed=number)
+        write_bvh(folder / f"sway_{number}.bvh", flipped(dance, "head", start, end))
     return folder

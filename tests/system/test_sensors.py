@@ -212,3 +212,15 @@ def test_from_the_network_to_a_cable_and_back(show: Path, tmp_path: Path) -> Non
         assert wearables.sensors[0].reboots == 0
         assert box.end() == 0
     assert "Traceback" not in box.output
+
+
+def test_wearables_send_as_often_as_the_box_file_asks(show: Path, tmp_path: Path) -> None:
+    with (
+        playing(show, tmp_path, settings={"sensors": {"rate_hz": 100}}) as box,
+        box.wearables() as wearables,
+    ):
+        box.await_output("neutral pose taken")
+        wearables.dance()
+        wait_until(lambda: box.listed_sensors()["left-wrist"]["rate_hz"] > 80, lambda: box.output)
+        assert box.listed_sensors()["left-wrist"]["loss"] < 0.5
+        assert box.end() == 0
