@@ -19,11 +19,11 @@ from appliance.studio.export.motion_network import (
     checked_model,
     coder_nodes,
     motion_facts,
+    require_as_trained,
     sizes_of,
 )
 from appliance.studio.improviser.improviser import Improviser
 from appliance.studio.improviser.moves import Dense
-from appliance.studio.studio_error import StudioError
 
 FILE = "improviser.onnx"
 _ROUNDING = 0.1  # most that 16-bit weights may change of any number of a step, in its deviations
@@ -43,13 +43,7 @@ def export_improviser(
     trained = improviser.improvise(heard, _CHECKED_MOVES, 0.0, 1)
     played = improvised(ImproviserNetwork(path, joints), heard.numpy(), _CHECKED_MOVES, 0.0, 1)
     apart = improviser.scale.inside(trained) - improviser.scale.inside(torch.from_numpy(played))
-    difference = float(apart.abs().mean())
-    if not difference <= _ROUNDING:
-        path.unlink()
-        raise StudioError(
-            f"The exported improviser differs from the trained one by {difference:.1g}. No file was written. "
-            "This is a bug in the export: report it."
-        )
+    require_as_trained(path, "improviser", float(apart.abs().mean()), _ROUNDING)
     return path
 
 

@@ -38,14 +38,18 @@ def export_motion(coder: TorchCoder, dataset: Dataset, model: str, folder: Path)
     with torch.no_grad():
         trained = coder.autoencoder.decode_raw(few).numpy()
     played = MotionNetwork(path, coder.joints).decode(few.numpy())
-    difference = float(np.abs(played - trained).max())
-    if not difference <= _ROUNDING:
+    require_as_trained(path, "network", float(np.abs(played - trained).max()), _ROUNDING)
+    return path
+
+
+def require_as_trained(path: Path, name: str, difference: float, most: float) -> None:
+    """Remove a file that differs more from what was trained. Raises StudioError then."""
+    if not difference <= most:
         path.unlink()
         raise StudioError(
-            f"The exported network differs from the trained one by {difference:.1g}. No file was written. "
+            f"The exported {name} differs from the trained one by {difference:.1g}. No file was written. "
             "This is a bug in the export: report it."
         )
-    return path
 
 
 def write_motion_network(

@@ -13,9 +13,8 @@ from torch import nn
 from appliance.dancer.material.improviser_network import ImproviserNetwork
 from appliance.dancer.material.partner_network import LED_STEPS, SEEN, PartnerNetwork
 from appliance.studio.export.graph import Graph, Layers
-from appliance.studio.export.motion_network import Port, checked_model, sizes_of
+from appliance.studio.export.motion_network import Port, checked_model, require_as_trained, sizes_of
 from appliance.studio.partner.training import EMBEDDING, FLOW_STEPS, Answers, Partner, Scale, times_of
-from appliance.studio.studio_error import StudioError
 
 FILE = "partner.onnx"
 _ROUNDING = 0.1  # most that 8-bit weights may change of a score or of a code's number
@@ -49,12 +48,7 @@ def export_partner(partner: Partner, network: ImproviserNetwork, path: Path) -> 
         played.answers(known[0], None, known[2], noise.numpy()),
     )
     apart = max(float(np.abs(own.numpy() - other).mean()) for own, other in zip(trained, found, strict=True))
-    if not apart <= _ROUNDING:
-        path.unlink()
-        raise StudioError(
-            f"The exported partner differs from the trained one by {apart:.1g}. No file was written. "
-            "This is a bug in the export: report it."
-        )
+    require_as_trained(path, "partner", apart, _ROUNDING)
 
 
 def write_partner_network(partner: Partner, network: ImproviserNetwork, path: Path) -> None:
