@@ -73,7 +73,6 @@ class BlockReader:
         return newest[1][len(self._prefix) :]
 
     def close(self) -> None:
-        """Release the file."""
         self._file.close()
 
 

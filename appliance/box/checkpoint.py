@@ -200,7 +200,6 @@ class CheckpointReader:
         return self._block.writer_lives()
 
     def close(self) -> None:
-        """Release the file."""
         self._block.close()
 
 

@@ -43,7 +43,6 @@ class LivePoseWriter:
         self._block.write(head + array("f", rotations).tobytes())
 
     def close(self) -> None:
-        """Release the file."""
         self._block.close()
 
 
@@ -67,7 +66,6 @@ class LivePoseReader:
         return LivePose(arrival, (root[0], root[1], root[2]), rotations)
 
     def close(self) -> None:
-        """Release the file."""
         self._block.close()
 
 

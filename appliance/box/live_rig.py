@@ -63,5 +63,4 @@ class LiveRigReader:
         return read if read is not None and self._block.writer_lives() else NOTHING
 
     def close(self) -> None:
-        """Release the file."""
         self._block.close()

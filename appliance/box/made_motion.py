@@ -60,7 +60,6 @@ class MadeMotionReader:
         return self._made
 
     def close(self) -> None:
-        """Release the file."""
         self._block.close()
 
 
@@ -94,7 +93,6 @@ class SavedNamesReader:
             return ()
 
     def close(self) -> None:
-        """Release the file."""
         self._block.close()
 
 

@@ -68,7 +68,6 @@ class Notifier:
         self._send(ENDING)
 
     def close(self) -> None:
-        """Say nothing more."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
@@ -113,7 +112,6 @@ class NotifyListener:
                     yield _SENDER.unpack(sender)[0], message.decode(errors="replace")
 
     def close(self) -> None:
-        """Hear nothing more."""
         self._socket.close()
 
 

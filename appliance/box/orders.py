@@ -95,7 +95,6 @@ class OrderInbox:
             self._socket.send(ANSWERS, json.dumps(answer).encode())
 
     def close(self) -> None:
-        """Remove the socket."""
         self._socket.close()
 
 
@@ -122,7 +121,6 @@ class OrderSender:
         return None
 
     def close(self) -> None:
-        """Remove the socket."""
         self._socket.close()
 
 

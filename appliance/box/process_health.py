@@ -111,7 +111,6 @@ class ProcessHealthWriter:
         self._write(now, ended=True)
 
     def close(self) -> None:
-        """Release the block."""
         if self._block is not None:
             self._block.close()
             self._block = None
@@ -186,7 +185,6 @@ class ProcessHealth:
         return found + [("preflight", one) for one in self._choice()]
 
     def close(self) -> None:
-        """Release all blocks."""
         for block in self._blocks.values():
             block.close()
 

@@ -111,7 +111,6 @@ class SlotFile:
         self._newest += 1
 
     def close(self) -> None:
-        """Release the file."""
         if self._descriptor >= 0:
             with contextlib.suppress(OSError):
                 os.close(self._descriptor)

@@ -176,7 +176,6 @@ class RingFileReader:
         self.complaint = f"{self._path} {reason}"
 
     def close(self) -> None:
-        """Release the file."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
         self._descriptor, self._identity, self.rings = -1, None, []

@@ -36,7 +36,6 @@ class ShowStateReader:
         return self._show_state
 
     def close(self) -> None:
-        """Let go of the file."""
         self._file.close()
 
 

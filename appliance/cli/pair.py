@@ -78,7 +78,6 @@ def reported_pair(config: BoxConfig) -> dict[str, Any] | None:
 
 
 def sentence(reported: dict[str, Any]) -> str:
-    """For people."""
     role = _ROLES.get(str(reported["role"]), str(reported["role"]))
     other = "second" if reported["box"] == "first" else "first"
     if not reported["peer"]:

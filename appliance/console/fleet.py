@@ -88,7 +88,6 @@ class Fleet:
         self._seen_at = -_FRESH_S
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [web.get("/api/fleet", self._serve), web.post("/api/fleet/push", self._push)]
 
     async def _serve(self, request: web.Request) -> web.Response:

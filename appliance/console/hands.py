@@ -59,7 +59,6 @@ class Hands:
         self._releasing: set[asyncio.Task[None]] = set()
 
     def routes(self) -> list[web.RouteDef]:
-        """Where browsers connect."""
         return [web.get("/hands", self.serve)]
 
     async def watch(self) -> None:
@@ -105,7 +104,6 @@ class Hands:
         return browser
 
     async def close(self) -> None:
-        """Give every joint back."""
         for joint in list(self._held):
             self._give_back(joint)
         await asyncio.gather(*self._releasing)

@@ -31,7 +31,6 @@ class Help:
         self._making = asyncio.Lock()
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [web.post("/api/help", self._make), web.get("/api/help.zip", self._serve)]
 
     async def _make(self, request: web.Request) -> web.Response:

@@ -45,7 +45,6 @@ class Learn:
         self._child: asyncio.subprocess.Process | None = None
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [
             web.get("/api/learn", self._state),
             web.post("/api/learn", self._begin),

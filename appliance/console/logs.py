@@ -29,7 +29,6 @@ class Logs:
         self._said, self._is_installed = runtime / SAID, is_installed
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [web.get("/api/logs", self._lines)]
 
     async def _lines(self, request: web.Request) -> web.Response:

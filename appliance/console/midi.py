@@ -26,7 +26,6 @@ class Midi:
         self._stage, self._box = stage, box
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [
             web.get("/api/midi", self._list),
             web.post("/api/midi/bind", self._bind),

@@ -36,7 +36,6 @@ class Night:
         self._stage, self._box, self._folder, self._runtime = stage, box, state / FOLDER, runtime
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [
             web.get("/api/night", self._list),
             web.get("/api/night/{at}.svg", self._serve),

@@ -155,7 +155,6 @@ class Phones:
             self._codes.set_names(names)
 
     def routes(self) -> list[web.RouteDef]:
-        """Where phones and technicians ask."""
         return [
             web.get("/api/phones", self._list),
             web.post("/api/phones/code", self._new_code),
@@ -176,7 +175,6 @@ class Phones:
             await asyncio.sleep(_TURN_S)
 
     def close(self) -> None:
-        """Free the sockets."""
         for place in self._places.values():
             place.sensor.close()
 

@@ -21,7 +21,6 @@ class PoseMap:
         self._made, self._generation = b"", 0
 
     def routes(self) -> list[web.RouteDef]:
-        """Where browsers ask."""
         return [web.get("/api/map", self.serve)]
 
     async def serve(self, request: web.Request) -> web.Response:

@@ -33,7 +33,6 @@ class Prove:
         self._proving.end()  # what a page before this one began ended with it, or ends now
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [
             web.get("/api/prove", self._state),
             web.post("/api/prove", self._begin),

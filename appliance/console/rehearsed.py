@@ -29,7 +29,6 @@ class Rehearsed:
         self._writing = asyncio.Lock()
 
     def routes(self) -> list[web.RouteDef]:
-        """Where browsers ask."""
         return [web.post("/api/cue", self.keep), web.get("/api/cue/show.zip", self.download)]
 
     async def keep(self, request: web.Request) -> web.Response:

@@ -16,7 +16,6 @@ class Rig:
         self._reader = LiveRigReader(folder)
 
     def routes(self) -> list[web.RouteDef]:
-        """Where browsers ask, five times a second while they show it."""
         return [web.get("/api/rig", self._newest)]
 
     async def _newest(self, request: web.Request) -> web.Response:
@@ -24,5 +23,4 @@ class Rig:
         return web.Response(body=self._reader.newest(), content_type="application/json")
 
     def close(self) -> None:
-        """Let go of the file."""
         self._reader.close()

@@ -53,6 +53,5 @@ class SeenStage:
         return self._processes.members(now)
 
     def close(self) -> None:
-        """Let go of the files."""
         self._processes.close()
         self._saved.close()

@@ -95,7 +95,6 @@ class StageView:
         return said if isinstance(said, dict) else {}
 
     def close(self) -> None:
-        """Let go of the file."""
         self._file.close()
 
     def _follow(self, now: float) -> None:

@@ -61,7 +61,6 @@ class Update:
         self._forget()
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [
             web.get("/api/update", self._state),
             web.post("/api/update/file", self._take_file),

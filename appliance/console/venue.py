@@ -49,7 +49,6 @@ class Venue:
         self._busy = asyncio.Lock()
 
     def routes(self) -> list[web.RouteDef]:
-        """For the server."""
         return [
             web.get("/api/box/file", self._file),
             web.post("/api/box/file", self._change),

@@ -58,7 +58,6 @@ class MirroredJournal:
             raise
 
     def explain(self, error: Exception) -> str:
-        """The complaint."""
         if not isinstance(error, OSError):
             return str(error)
         return (

@@ -57,11 +57,9 @@ class MirroredRecord:
         self._folder = found.st_dev, found.st_ino
 
     def explain(self, error: Exception) -> str:
-        """The complaint."""
         return self._message.replace("{reason}", reason_of(error))
 
     def close(self) -> None:
-        """Release both files."""
         self._block.close()
         self._file.close()
 

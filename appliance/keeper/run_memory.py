@@ -114,7 +114,6 @@ class RunMemory:
             self.entries = piece.entries[-1].number
 
     def close(self) -> None:
-        """Release the file."""
         self._reader.close()
 
     def _keyframes(self) -> Iterator[Keyframe]:

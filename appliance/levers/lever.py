@@ -74,7 +74,6 @@ class Lever(Generic[T]):
 
     @property
     def form(self) -> Form:
-        """The form of its address."""
         kind, has_fade = self.kind, self.fade_s is not AT_ONCE and self.is_faded_by_osc
         if has_fade:
             return Form(kind.text, (*kind.numbers, FADE), 1)

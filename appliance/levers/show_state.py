@@ -101,7 +101,6 @@ class ShowState:
 
 
 def packed(state: ShowState) -> bytes:
-    """As JSON."""
     values = {
         "panic": state.panic,
         "blackout": state.blackout,

@@ -53,7 +53,6 @@ class Patch:
         return np.array(found, np.intp)
 
     def own(self, fixture: FixtureConfig) -> Sequence[int]:
-        """The slots of one fixture."""
         return self._own[fixture.name]
 
     def dimmed(self, values: Values, level: Values | float) -> Values:

@@ -73,7 +73,6 @@ class Walk:
         return patch.encode(shown)
 
     def dark(self) -> dict[int, bytes]:
-        """Zeros."""
         return {universe: bytes(UNIVERSE_CHANNELS) for universe in self._patch.universes}
 
     def _lit(self, fixture: str) -> Values:

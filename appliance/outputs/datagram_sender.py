@@ -133,7 +133,6 @@ class DatagramSender:
         self.dropped += len(datagrams) - left
 
     def close(self) -> None:
-        """Close the socket."""
         if self._socket is not None:
             self._socket.close()
         self._socket = None

@@ -98,7 +98,6 @@ class FrameReader:
         return self._writer_lives
 
     def close(self) -> None:
-        """Close the file."""
         self._file.close()
 
     def _follow(self, now: float) -> None:

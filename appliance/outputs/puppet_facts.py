@@ -25,7 +25,6 @@ class PuppetFacts(NamedTuple):
     is_led: bool = True
 
     def packed(self) -> dict[str, Any]:
-        """For JSON."""
         return self._asdict() | {"hands": [hand._asdict() for hand in self.hands]}
 
 

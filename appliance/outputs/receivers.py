@@ -68,6 +68,5 @@ class OscOutputs:
             receiver.send_datagrams(datagrams, frame.frame_time)
 
     def close(self) -> None:
-        """Close all sockets."""
         for receiver in self.receivers:
             receiver.close()

@@ -75,7 +75,6 @@ class Facts:
         return frame.puppets[self.puppets.index(self.led)]
 
     def packed(self) -> bytes:
-        """As JSON."""
         skeleton = self.skeleton
         facts = {name: getattr(self, name) for name in self.__dataclass_fields__} | {
             "show_directory": str(self.show_directory),

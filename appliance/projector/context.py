@@ -49,7 +49,6 @@ class GlContext:
         self._finish()
 
     def close(self) -> None:
-        """Give the graphics card's memory back."""
         self.gl.release()
         sdl2.SDL_GL_DeleteContext(self._handle)
 

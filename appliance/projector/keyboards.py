@@ -76,7 +76,6 @@ class Keyboards:
                     yield from self._key(descriptor, code, value)
 
     def close(self) -> None:
-        """Close all of them."""
         for path in list(self._open):
             self._forget(path)
 

@@ -73,7 +73,6 @@ class Window:
         sdl2.SDL_SetWindowFullscreen(self.handle, whole)
 
     def close(self) -> None:
-        """Give the display back."""
         if self.keyboards is not None:
             self.keyboards.close()
         sdl2.SDL_DestroyWindow(self.handle)

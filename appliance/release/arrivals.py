@@ -31,7 +31,6 @@ class Arrival(NamedTuple):
 
     @property
     def box(self) -> Path | None:
-        """The box file."""
         return self.folder / BOX if any(name == BOX for name, *_ in self.listing) else None
 
     @property

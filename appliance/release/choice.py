@@ -102,7 +102,6 @@ class Choice(NamedTuple):
             raise ValueError(f"This is no choice of a show ({error}).") from error
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
         pairs = [pair._asdict() | {"show": str(pair.show), "box": str(pair.box)} for pair in self.pairs]
         lists = {"pairs": pairs, "refused": list(self.refused), "aside": list(self.aside)}
         return lists | {"data": str(self.data)}

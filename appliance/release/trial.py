@@ -94,7 +94,6 @@ class MirroredProof:
         return choice.data if choice is not None else self._chosen.parent
 
     def explain(self, error: Exception) -> str:
-        """The complaint."""
         return (
             f"{self._chosen.parent} or the data partition: that the show has danced cannot be kept "
             f"({reason_of(error)}). The dance goes on; after the next power-on the show is tried again. "
@@ -102,7 +101,6 @@ class MirroredProof:
         )
 
     def close(self) -> None:
-        """Release the shared frame."""
         if self._frames is not None:
             self._frames.close()
 

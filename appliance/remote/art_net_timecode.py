@@ -16,7 +16,6 @@ _LENGTH = 19
 
 
 def packed(label: Timecode) -> bytes:
-    """A packet with this label."""
     numbers = label.frames, label.seconds, label.minutes, label.hours, RATES.index(label.rate)
     return _HEAD + bytes([0, PROTOCOL_VERSION, 0, 0, *numbers])
 

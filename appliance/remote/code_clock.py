@@ -49,7 +49,6 @@ class CodeClock:
             self._follow(code_s, now)
 
     def state(self, now: float) -> CodeState:
-        """How it is at a moment."""
         silent_s = now - self._heard_at
         if not self._is_locked or silent_s > self._gap_s + self._freewheel_s:
             return "locking" if self._other is not None and silent_s <= self._gap_s else "absent"

@@ -82,7 +82,6 @@ class LtcDecoder:
                 yield CodeHeard(code, ahead), (self._at - frame.off_end) / self._sample_rate
 
     def close(self) -> None:
-        """Free the decoder."""
         if self._decoder:
             self._library.ltc_decoder_free(self._decoder)
         self._decoder = ctypes.c_void_p()
@@ -129,7 +128,6 @@ class LtcInput:
             self._drop("The sound input for timecode gives nothing.", now)
 
     def close(self) -> None:
-        """Give the input back."""
         self._drop("", 0.0)
 
     def _open(self, now: float) -> None:

@@ -66,7 +66,6 @@ class NetworkMidi:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the sessions."""
         return tuple(session.name for session in self._sessions.values() if session.data is not None)
 
     @property
@@ -95,7 +94,6 @@ class NetworkMidi:
                     yield from self._midi(received, now)
 
     def send(self, name: str, message: bytes, now: float) -> None:
-        """One message to the sessions of this name."""
         for session in self._sessions.values():
             if session.name == name and session.data is not None and len(message) < 16:
                 session.sent = session.sent + 1 & 0xFFFF

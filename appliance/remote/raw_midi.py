@@ -98,7 +98,6 @@ class RawMidi:
                 cable.send(message)
 
     def close(self) -> None:
-        """Let go of all."""
         for cable in self._cables.values():
             cable.close()
         self._cables.clear()

@@ -79,7 +79,6 @@ class KnownSensor:
         )
 
     def state(self, now: float) -> SensorState:
-        """Its state, for people."""
         session, hello = self.pairing.session, self.pairing.hello
         newest = session.newest if session is not None else None
         last = newest or hello

@@ -88,7 +88,6 @@ class SpringsConfig(Section):
     )
 
     def region(self, name: Region) -> RegionConfig:
-        """The springs of a region."""
         region: RegionConfig = getattr(self, name)
         return region
 

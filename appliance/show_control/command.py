@@ -31,7 +31,6 @@ class Command:
 
 
 def reply_to(address: str) -> str:
-    """Address of the reply to a command."""
     return SENSORS_REPLY if address.startswith("/sensors/") else REPLY
 
 

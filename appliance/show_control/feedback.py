@@ -47,7 +47,6 @@ class Feedback:
                 self._send(listener, changed)
 
     def close(self) -> None:
-        """Send no more."""
         for one in self._listeners:
             one.close()
 

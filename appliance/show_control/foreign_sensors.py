@@ -140,7 +140,6 @@ class ForeignSensors:
             yield self._sentence(one, strangers)
 
     def close(self) -> None:
-        """Free all ports."""
         for one in self._listeners:
             with suppress(OSError):
                 one.close()

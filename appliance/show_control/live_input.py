@@ -165,5 +165,4 @@ class LiveInput:
         return f"{self._came} come, without {', '.join(names[:_MOST_NAMED])}{more}" if names else ""
 
     def close(self) -> None:
-        """Release the file."""
         self._writer.close()

@@ -88,7 +88,6 @@ class Port:
         )
 
     def close(self) -> None:
-        """Free the port."""
         self._socket.close()
 
     def _may_command(self, host: str) -> bool:

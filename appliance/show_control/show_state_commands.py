@@ -114,7 +114,6 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
 
 
 def in_cue(cue: Mapping[str, Any], facts: Facts) -> Iterator[Change[Any]]:
-    """The changes of a cue."""
     fade_s = float(cue["fade_s"])
     yield Change(CUE, str(cue["name"]))
     for lever in LEVERS:

@@ -79,7 +79,6 @@ class StageObserver:
         return self._reader.generation
 
     def close(self) -> None:
-        """Let go of the shared frame."""
         self._reader.close()
         self._process_health.close()
         self._saved.close()

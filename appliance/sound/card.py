@@ -63,7 +63,6 @@ class Card:
             self._open(now)
 
     def close(self) -> None:
-        """Give the card back."""
         self._drop("")
 
     def _drops_out_often(self, now: float) -> bool:

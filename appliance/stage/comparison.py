@@ -29,7 +29,6 @@ class Difference:
     message: str = ""
 
     def sentence(self) -> str:
-        """For people."""
         off = f"{self.joint} is off by {self.degrees:.3g} degrees, the root by {1000 * self.metres:.3g} mm"
         return f"tick {self.tick}, at {self.at_s:.2f} s: {self.message or off}."
 

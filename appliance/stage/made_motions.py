@@ -103,7 +103,6 @@ class MadeMotions:
         return read_material(self._folder / f"{number}{SUFFIX}", self._joints)
 
     def close(self) -> None:
-        """Release the file."""
         self._reader.close()
 
 

@@ -275,7 +275,6 @@ class PairedStage:
         return ""
 
     def close(self) -> None:
-        """Free port and files."""
         self.pair.close()
         self._part.close()
 

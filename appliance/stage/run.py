@@ -141,7 +141,6 @@ class Stage:
             leave_realtime()
 
     def close(self) -> None:
-        """Free every port, socket and file."""
         if self.paired is not None:
             self.paired.close()
         self._closing.close()

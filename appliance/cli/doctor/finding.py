@@ -27,7 +27,6 @@ def for_phone(text: str) -> str:
 
 
 def ok(what: str, message: str) -> Finding:
-    """All is well."""
     return Finding(what, "ok", message)
 
 

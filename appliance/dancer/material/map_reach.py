@@ -40,7 +40,6 @@ class MapReach:
         return not self.corners >= DEAD * self.usual
 
     def sentence(self) -> str:
-        """For people."""
         seen = (
             f"from corner to corner the figure changes by {self.corners:.0f} degrees a joint, two poses of "
             f"the dancer usually differ by {self.usual:.0f}"

@@ -63,5 +63,4 @@ class ArtNetWire(NetworkWire):
         self.send_datagrams((cancel_merge(),), now)
 
     def send_universe(self, levels: bytes | bytearray, now: float) -> None:
-        """Send one universe, 512 levels."""
         self.send_datagrams((self._packets.pack(levels),), now)

@@ -49,7 +49,6 @@ class OpenDmx:
             time.sleep(self._lasts_s)
 
     def close(self) -> None:
-        """Close the port."""
         close_port(self._port)
 
 

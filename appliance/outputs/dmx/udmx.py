@@ -37,7 +37,6 @@ class Udmx:
         self._shown = data[: self._channels]
 
     def close(self) -> None:
-        """Give the device back."""
         with contextlib.suppress(usb.core.USBError):
             usb.util.dispose_resources(self._device)
 

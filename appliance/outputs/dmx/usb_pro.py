@@ -26,7 +26,6 @@ class UsbPro:
         write(self._port, self._head + data[: self._channels] + _END)
 
     def close(self) -> None:
-        """Close the port."""
         close_port(self._port)
 
 

@@ -42,7 +42,6 @@ class Poses:
         return float(np.hypot(away[:, 0], away[:, 2]).max())
 
     def of_figure(self, figure: int) -> Poses:
-        """One of the figures."""
         if self.figures == 1:
             return self
         count = self.positions.shape[1] // self.figures

@@ -144,7 +144,6 @@ def _ndi_source(config: StreamConfig) -> NdiSource | None:
 
 
 def jpeg_of(picture: Picture, quality: int) -> bytes:
-    """A picture as JPEG."""
     width, height, pixels = picture
     file = BytesIO()
     Image.frombuffer("RGBX", (width, height), pixels, "raw", "RGBX", 0, 1).convert("RGB").save(

@@ -119,7 +119,6 @@ class ForeignSensor:
             )
 
     def close(self) -> None:
-        """Free the socket."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None

@@ -120,7 +120,6 @@ class SourceSettings:
     drifts: bool = True
 
     def source(self) -> OscSource | BoneSource:
-        """A source that reads it."""
         usual = PROGRAMS[self.program]
         axes = self.axes or usual.axes
         if usual.has_bones:
