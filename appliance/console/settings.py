@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 
+from appliance.pose.foreign_file import with_tuples
+
 WHERE = "console.path"  # in the runtime folder: PIN and devices, host and port of the page that runs, https
 
 
@@ -38,14 +40,4 @@ class Settings:
     @classmethod
     def unpacked(cls, text: str) -> Settings:
         """From that argument."""
-        values = json.loads(text)
-        control = values["control"]
-        return cls(
-            **values
-            | {
-                "control": None if control is None else (str(control[0]), int(control[1])),
-                "viewers": tuple(values["viewers"]),
-                "names": tuple(values["names"]),
-                "phones": tuple(values["phones"]),
-            }
-        )
+        return cls(**with_tuples(json.loads(text)))

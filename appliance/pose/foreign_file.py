@@ -84,3 +84,10 @@ def plain_json(text: str | bytes) -> Any:
         return json.loads(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+
+
+def with_tuples(value: Any) -> Any:
+    """Values from JSON with tuples for its lists, as frozen settings have them."""
+    if isinstance(value, dict):
+        return {name: with_tuples(one) for name, one in value.items()}
+    return tuple(map(with_tuples, value)) if isinstance(value, list) else value

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 
+from appliance.pose.foreign_file import with_tuples
 from appliance.sensor.foreign.sources import SourceSettings
 from appliance.show_control.foreign_sensors import ForeignPort
 
@@ -34,19 +35,9 @@ class Settings:
     @classmethod
     def unpacked(cls, text: str) -> Settings:
         """From that argument."""
-        values = json.loads(text)
-        listeners = {
-            name: tuple((str(host), int(port)) for host, port in values[name])
-            for name in ("heartbeat", "replies", "feedback")
-        }
+        values = with_tuples(json.loads(text))
         foreign = tuple(
-            ForeignPort(
-                str(one["host"]),
-                int(one["port"]),
-                tuple(one["senders"]),
-                tuple(SourceSettings(**sensor) for sensor in one["sensors"]),
-            )
-            for one in values["foreign"]
+            ForeignPort(**port | {"sensors": tuple(SourceSettings(**one) for one in port["sensors"])})
+            for port in values["foreign"]
         )
-        changed = {"foreign": foreign, "senders": tuple(values["senders"])}
-        return cls(**values | listeners | changed)
+        return cls(**values | {"foreign": foreign})
