@@ -19,14 +19,15 @@ _UP = np.array([0.0, 1.0, 0.0])
 
 # Along the spine from below the pelvis to the neck (1): half the width as a share of the hips' and of the
 # shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.
-_SPINE = np.array([-0.14, 0.00, 0.12, 0.24, 0.36, 0.50, 0.66, 0.80, 0.91, 1.00])
-_OF_HIPS = np.array([0.10, 0.90, 0.92, 0.70, 0.40, 0.20, 0.00, 0.00, 0.00, 0.00])
-_OF_SHOULDERS = np.array([0.00, 0.00, 0.00, 0.10, 0.30, 0.50, 0.72, 0.78, 0.60, 0.25])
+_SPINE = np.array([-0.112, 0.00, 0.12, 0.24, 0.36, 0.50, 0.66, 0.80, 0.91, 1.00])
+_OF_HIPS = np.array([0.05, 0.74, 0.90, 0.70, 0.40, 0.20, 0.00, 0.00, 0.00, 0.00])
+_OF_SHOULDERS = np.array([0.00, 0.00, 0.00, 0.10, 0.30, 0.50, 0.72, 0.62, 0.46, 0.25])
 _FLESH = np.array([0.012, 0.034, 0.037, 0.034, 0.031, 0.034, 0.036, 0.030, 0.018, 0.014])
-_DEPTH = np.array([0.026, 0.053, 0.055, 0.051, 0.048, 0.054, 0.061, 0.058, 0.042, 0.030])
+_DEPTH = np.array([0.012, 0.049, 0.055, 0.051, 0.048, 0.054, 0.061, 0.058, 0.042, 0.030])
 _AHEAD = np.array([0.000, -0.002, 0.001, 0.007, 0.012, 0.012, 0.010, 0.008, 0.000, -0.002])
 _SMALL = 0.07  # heights: larger parts of a head need no small cells
-_BELOW = 0.05  # heights that the pelvis reaches below its joint
+_HIP = 0.047  # where the hip joints are along the spine
+_BELOW = 0.057  # heights that the pelvis reaches below them
 
 
 @dataclass(frozen=True)
@@ -48,10 +49,10 @@ def sculpture(anatomy: Anatomy) -> Sculpture:
         details.append(_box(end))
     face = head(anatomy)
     if face:
-        limbs.append(Group((*neck(anatomy), *face), 0.022 * anatomy.height))
+        limbs.append(Group(tuple(face), 0.012 * anatomy.height))
         small = [step for step in face if float(np.ptp(step.box, axis=0).max()) < _SMALL * anatomy.height]
         details += [_box(small)] if small else []
-    body = Group((*_trunk(anatomy), *_back_and_chest(anatomy)), 0.0)
+    body = Group((*_trunk(anatomy), *neck(anatomy), *_back_and_chest(anatomy)), 0.0)
     covered = {solid.owner for group in limbs for solid in group.movers}
     covered |= {
         mover.owner for mover in body.movers if not isinstance(mover, Slab) or mover.start is not mover.end
@@ -79,9 +80,13 @@ def _trunk(anatomy: Anatomy) -> list[Step]:
         ball = min(anatomy.thickness(spine[0]), 0.045 * height)
         return [cone(anatomy, spine[0], places[spine[0]], places[spine[0]], (ball, ball), 0.0)]
     ends = [places[joint] for joint in spine]
+    levels, marks = [0.0], [0.0]  # metres along the spine, and what they are in the tables
     if anatomy.is_person:
-        below = ends[0] - ends[1]
-        ends.insert(0, ends[0] + _BELOW * height * below / max(float(np.linalg.norm(below)), 1e-9))
+        up = (ends[1] - ends[0]) / max(float(np.linalg.norm(ends[1] - ends[0])), 1e-9)
+        level = float(np.mean([(place - ends[0]) @ up for place in _limb_starts(anatomy, spine[0])]))
+        below = max(_BELOW * height - level, 0.01 * height)
+        ends.insert(0, ends[0] - below * up)
+        levels, marks = [-below, level], [float(_SPINE[0]), _HIP]
         spine = [spine[0], *spine]
     lengths = np.array([float(np.linalg.norm(b - a)) for a, b in pairwise(ends)])
     begins = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -92,7 +97,7 @@ def _trunk(anatomy: Anatomy) -> list[Step]:
     pieces = max(8, round(float(lengths.sum()) / (0.012 * height)))
     along = np.linspace(begins[0], begins[-1], pieces + 1)
     axis = np.stack([np.interp(along, begins, [end[i] for end in ends]) for i in range(3)], axis=1)
-    shares = along / whole
+    shares = np.interp(along, [*levels, whole], [*marks, 1.0])
     of_hips, of_shoulders, flesh, depth, ahead = (
         _curve(shares, _SPINE, table) for table in (_OF_HIPS, _OF_SHOULDERS, _FLESH, _DEPTH, _AHEAD)
     )
@@ -165,6 +170,7 @@ def _back_and_chest(anatomy: Anatomy) -> list[Step]:
             nape = start - aside + height * (0.046 * _UP - 0.004 * ahead)
             ends, radii = (nape, start - 0.2 * aside), (0.012 * height, 0.016 * height)
             steps.append(Slab(trunk, *ends, *radii, 0.03 * height, across))
+            steps.append(_armpit(anatomy, trunk, start, aside / float(np.linalg.norm(aside))))
     return steps
 
 
@@ -181,13 +187,15 @@ def _spine(anatomy: Anatomy) -> list[int]:
 
 def _half_width(anatomy: Anatomy, joint: int) -> float:
     """How far to the side the limbs of a trunk joint begin, metres."""
-    sides = []
-    for trunk, first in anatomy.limbs():
-        if trunk == joint:
-            chain = anatomy.chain(first)
-            start = anatomy.positions[chain[anatomy.limb_start(chain)]]
-            sides.append(abs(float((start - anatomy.positions[joint]) @ anatomy.across)))
+    starts = _limb_starts(anatomy, joint)
+    sides = [abs(float((start - anatomy.positions[joint]) @ anatomy.across)) for start in starts]
     return max(sides, default=0.03 * anatomy.height)
+
+
+def _limb_starts(anatomy: Anatomy, joint: int) -> list[Array]:
+    """Where the limbs of a trunk joint begin: hips, shoulders."""
+    chains = [anatomy.chain(first) for trunk, first in anatomy.limbs() if trunk == joint]
+    return [anatomy.positions[chain[anatomy.limb_start(chain)]] for chain in chains]
 
 
 def _limb(anatomy: Anatomy, trunk: int, first: int) -> tuple[Group, list[Step]]:
@@ -198,11 +206,21 @@ def _limb(anatomy: Anatomy, trunk: int, first: int) -> tuple[Group, list[Step]]:
     end, bones = (foot(anatomy, chain[last]), []) if is_leg else hand(anatomy, chain[last])
     steps = list(end)
     long = list(range(begin, last))
+    if is_leg and anatomy.is_person and len(long) == 2:
+        bones = [_hip(anatomy, chain[begin], chain[begin + 1])]
     for place in reversed(long):
         shape = _muscles_of(anatomy, chain, place, long, is_leg)
         steps += shape
     steps += _root_of_limb(anatomy, trunk, chain[: begin + 1], is_leg)
-    return Group(tuple(steps), (0.026 if is_leg else 0.020) * anatomy.height, tuple(bones)), end
+    return Group(tuple(steps), (0.026 if is_leg else 0.022) * anatomy.height, tuple(bones)), end
+
+
+def _hip(anatomy: Anatomy, thigh: int, shank: int) -> Slab:
+    """What moves the skin with a thigh, instead of its flesh: behind and above the joint, so that the skin
+    stretched by a bend is as far from the joint as the skin that the bend folds, and volume is kept."""
+    height = anatomy.height
+    start = anatomy.positions[thigh] + height * (0.030 * _UP - 0.028 * anatomy.forward)
+    return cone(anatomy, thigh, start, anatomy.positions[shank], (0.05 * height, 0.04 * height), 0.0)
 
 
 def _muscles_of(
@@ -276,7 +294,7 @@ _UPPER_ARM = _Flesh(
         (1.00, 0.000, 0.000, 0.0220, 0.0195),
     ),
     (
-        ((0.05, 0.000, 0.006, 0.0250), (0.36, 0.000, 0.006, 0.0160), 0.014),  # shoulder muscle
+        ((0.07, 0.000, 0.006, 0.0265), (0.40, 0.000, 0.006, 0.0150), 0.016),  # shoulder muscle
         ((0.36, 0.011, 0.000, 0.0160), (0.60, 0.010, 0.000, 0.0150), 0.020),  # biceps
         ((0.26, -0.012, 0.002, 0.0170), (0.56, -0.011, 0.001, 0.0150), 0.020),  # triceps
         ((0.97, -0.010, 0.000, 0.0120), (1.01, -0.010, 0.000, 0.0115), 0.012),  # elbow
@@ -369,8 +387,8 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
         axes, soft = np.array([out, _UP, ahead]), 0.030 * height
         seat = start + height * (-0.030 * ahead - 0.010 * out - 0.024 * _UP)
         hip = start + height * (-0.012 * out - 0.010 * _UP - 0.006 * ahead)
-        groin = start - 0.75 * abs(away) * out - height * (0.052 * _UP - 0.010 * ahead)
-        inside = start - height * (0.150 * _UP + 0.016 * out)
+        groin = start - 0.50 * abs(away) * out - height * (0.022 * _UP - 0.010 * ahead)
+        inside = start - height * (0.130 * _UP + 0.008 * out)
         return [
             Ball(trunk, seat, height * np.array([0.042, 0.048, 0.040]), axes, soft),
             Ball(owner, hip, height * np.array([0.042, 0.052, 0.036]), axes, soft),
@@ -380,7 +398,7 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
     inner = start - 0.85 * abs(away) * out
     notch = inner + height * (0.040 * ahead + 0.002 * _UP)
     top = start + height * (0.020 * _UP + 0.012 * ahead - 0.012 * out)
-    flank = start - height * (0.150 * _UP - 0.014 * ahead) - 0.30 * abs(away) * out
+    flank = start - height * (0.150 * _UP - 0.004 * ahead) - 0.24 * abs(away) * out
     breast = start - 0.55 * abs(away) * out + height * (0.034 * ahead - 0.036 * _UP)
     blade = start - 0.45 * abs(away) * out - height * (0.022 * ahead + 0.012 * _UP)
     tip = blade + height * (0.004 * out - 0.060 * _UP - 0.004 * ahead)
@@ -392,17 +410,26 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
         Slab(
             trunk,
             flank,
-            start - 0.010 * height * ahead,
+            start - height * (0.018 * ahead + 0.004 * _UP),
             0.004 * height,
-            0.022 * height,
-            0.040 * height,
+            0.019 * height,
+            0.034 * height,
             across,
         ),  # broad back muscle
         Slab(owner, blade, tip, 0.015 * height, 0.009 * height, 0.034 * height, across, 0.020 * height, 0.0),
         Slab(
             owner, blade + 0.012 * height * _UP, start, 0.013 * height, 0.014 * height, 0.018 * height, across
         ),
+        _armpit(anatomy, owner, start, out),
     ]
+
+
+def _armpit(anatomy: Anatomy, owner: int, shoulder: Array, out: Array) -> Ball:
+    """The hollow between chest muscle and broad back muscle; out: along an arm that is held to the side."""
+    height, ahead = anatomy.height, anatomy.forward
+    middle = shoulder - height * (0.049 * _UP + 0.002 * ahead - 0.006 * out)
+    radii, axes = height * np.array([0.030, 0.022, 0.017]), np.array([out, _UP, ahead])
+    return Ball(owner, middle, radii, axes, 0.024 * height, removes=True)
 
 
 def _plain_root(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bool) -> list[Step]:

@@ -71,7 +71,7 @@ def weights_of(
         column = away[:, place[volume.owner]]
         np.minimum(column, volume.distance(x, y, z), out=column)
     nearest = away.argmin(axis=1)
-    around = _neighbours(faces, len(vertices))
+    around = neighbours(faces, len(vertices))
     parts = np.array([part_of(owner) for owner in owners])
     names, part = np.unique(parts, return_inverse=True)
     share = _spread(np.eye(len(names), dtype=np.float32)[part[nearest]], around, FAR_STEPS)
@@ -84,6 +84,16 @@ def weights_of(
     kept = np.take_along_axis(weights, strongest, axis=1)
     joints = np.array([*owners, *owners[:1] * MOVERS])[strongest]
     return joints.astype(np.uint8), (kept / kept.sum(axis=1, keepdims=True)).astype(np.float32)
+
+
+def neighbours(faces: NDArray[np.int32], count: int) -> NDArray[np.int64]:
+    """(most, V): the vertices with which each shares an edge, then itself."""
+    edges = np.concatenate([faces[:, [a, (a + 1) % 3]] for a in range(3)])
+    edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
+    first = np.searchsorted(edges[:, 0], np.arange(count + 1))
+    around = np.tile(np.arange(count), (int(np.diff(first).max()), 1))
+    around[np.arange(len(edges)) - first[edges[:, 0]], edges[:, 0]] = edges[:, 1]
+    return around
 
 
 def _divided(
@@ -102,19 +112,9 @@ def _divided(
     return weights
 
 
-def _neighbours(faces: NDArray[np.int32], count: int) -> NDArray[np.int64]:
-    """(most, V): the vertices with which each shares an edge, then itself."""
-    edges = np.concatenate([faces[:, [a, (a + 1) % 3]] for a in range(3)])
-    edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
-    first = np.searchsorted(edges[:, 0], np.arange(count + 1))
-    around = np.tile(np.arange(count), (int(np.diff(first).max()), 1))
-    around[np.arange(len(edges)) - first[edges[:, 0]], edges[:, 0]] = edges[:, 1]
-    return around
-
-
 def _spread(weights: NDArray[np.float32], around: NDArray[np.int64], steps: int) -> NDArray[np.float32]:
     """Weights (V, C) after they flowed to the neighbours `steps` times, half of them each time."""
     for _ in range(steps):
-        flow = sum(weights[neighbours] for neighbours in around)
+        flow = sum(weights[near] for near in around)
         weights = 0.5 * weights + np.float32(0.5 / len(around)) * flow
     return weights

@@ -176,6 +176,63 @@ def test_a_bent_or_twisted_limb_keeps_its_volume_and_length(joint: str, child: s
         assert np.linalg.norm(after - elbow) == pytest.approx(np.linalg.norm(before - elbow), rel=0.02)
 
 
+@pytest.mark.parametrize(("name", "thigh"), [("dancer", "lThigh"), ("mixamo", "mixamorig:LeftUpLeg")])
+def test_a_raised_thigh_keeps_its_volume(name: str, thigh: str) -> None:
+    """At 95 degrees the dancer gains or loses less than 320 ml; linear blending loses 1 l."""
+    mesh, skeleton = mesh_of(name), skeleton_of(name)
+    most, most_aside = 9e-5 * mesh.height**3, 4e-4 * mesh.height**3
+
+    def gain(axis: tuple[int, int, int], degrees: float, linear: bool = False) -> float:
+        turn = quaternion.from_axis_angle(axis, np.radians(degrees))
+        vertices, _ = skin(mesh, *turned(skeleton, {skeleton.index(thigh): turn}), linear)
+        return volume(vertices, mesh.faces) - volume(mesh.vertices, mesh.faces)
+
+    for degrees in (-115, -95, -60, -30, 30):
+        assert abs(gain((1, 0, 0), degrees)) < most, degrees
+    assert gain((1, 0, 0), -95, linear=True) < -2 * most
+    assert abs(gain((0, 0, 1), 60)) < most_aside
+
+
+def test_legs_begin_where_a_dancer_s_do() -> None:
+    """The crotch is at 0.46 of the stature, the hip joints at 0.53."""
+    mesh = mesh_of("dancer")
+    low, high = mesh.vertices[:, 1].min(), mesh.vertices[:, 1].max()
+    middle = mesh.vertices[np.abs(mesh.vertices[:, 0]) < 0.003 * mesh.height, 1]
+    assert 0.44 < (middle.min() - low) / (high - low) < 0.49
+
+
+def test_an_armpit_is_a_hollow_between_chest_and_back() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    places = (mesh.vertices - mesh.bind_positions[skeleton.index("lShldr")]) / mesh.height
+    under = places[(np.abs(places[:, 0] - 0.012) < 0.006) & (places[:, 1] < 0) & (places[:, 1] > -0.12)]
+
+    def lowest(ahead: float) -> float:
+        return float(under[np.abs(under[:, 2] - ahead) < 0.005, 1].min())
+
+    assert lowest(-0.01) > max(lowest(-0.03), lowest(0.01)) + 0.004
+
+
+def test_no_fold_beside_the_neck_when_arms_are_above_the_head() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    turns = {
+        skeleton.index(side + joint): quaternion.from_axis_angle((0, 0, sign), np.radians(degrees))
+        for side, sign in (("l", 1), ("r", -1))
+        for joint, degrees in (("Shldr", 62), ("Collar", 22))
+    }
+    vertices, _ = skin(mesh, *turned(skeleton, turns))
+    corners = vertices[mesh.faces].astype(float)
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-12)
+    edges, owner = np.sort(edges_of(mesh.faces), axis=1), np.tile(np.arange(len(mesh.faces)), 3)
+    order = np.lexsort(edges.T)
+    one, other = facing[owner[order[::2]]], facing[owner[order[1::2]]]
+    bends = np.degrees(np.arccos(np.clip((one * other).sum(axis=1), -1, 1)))
+    at = mesh.vertices[edges[order[::2], 0]] / mesh.height
+    collar = mesh.bind_positions[skeleton.index("lCollar")] / mesh.height
+    near = (np.linalg.norm(at - collar, axis=1) < 0.09) & (at[:, 1] > collar[1] - 0.03)
+    assert near.sum() > 500 and np.percentile(bends[near], 99) < 33.0
+
+
 def test_an_arm_at_the_hip_is_not_tied_to_the_hip() -> None:
     mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
     legs = [skeleton.index(name) for name in ("hip", "lThigh", "rThigh", "abdomen")]

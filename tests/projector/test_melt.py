@@ -8,7 +8,9 @@ import moderngl
 import numpy as np
 import pytest
 
+from appliance.body.body_mesh import body_mesh
 from appliance.pose.recording import Recording
+from appliance.projector.picture.body_buffers import sunk
 from appliance.projector.picture.scene import WHOLE, Scene
 from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import LookConfig
@@ -32,6 +34,27 @@ def test_the_figure_melts_step_by_step(style: str, dance: Recording, gl: moderng
     whole = difference(pictures[0], pictures[-1])[0]
     assert min(steps) > 0.1 and max(steps) < whole < sum(steps)
     assert pictures[-1].max() > 100
+
+
+def test_the_face_sinks_before_the_body_swells(dance: Recording) -> None:
+    """Else the nose of a third-melted figure is a ball; limbs keep their shape."""
+    mesh = body_mesh(dance.skeleton)
+    places = mesh.vertices / np.float32(mesh.height)
+    way, calm = sunk(places, mesh.normals, mesh.faces)
+    length = np.linalg.norm(way, axis=1)
+    eyes = mesh.bind_positions[[dance.skeleton.index(f"{side}Eye") for side in ("left", "right")]].mean(
+        axis=0
+    )
+    face = np.linalg.norm(places - eyes / mesh.height, axis=1) < 0.05
+    nose = face & (places[:, 2] > places[face, 2].max() - 0.004)
+    assert nose.sum() > 5 and length[nose].min() > 0.006
+    limb = np.isin(mesh.joints[:, 0], [dance.skeleton.index(name) for name in ("lThigh", "abdomen")])
+    assert limb.sum() > 1000 and (length[limb] == 0.0).mean() > 0.95
+    before, after = (
+        np.linalg.norm(np.diff(normals[mesh.faces], axis=1), axis=2)[face[mesh.faces].all(axis=1)].mean()
+        for normals in (mesh.normals, calm)
+    )
+    assert after < 0.6 * before
 
 
 def test_a_fade_of_looks_is_a_passage_of_the_shape(dance: Recording, gl: moderngl.Context) -> None:

@@ -15,7 +15,8 @@ COARSE = 0.02  # share of the figure's height: vertices closer than this are mer
 OCCLUDER = 0.03  # share of the figure's height: size of the points that shade each other
 SMOOTHINGS = 6
 DETAIL = 0.006  # share of the figure's height: shorter edges are a face, fingers and toes
-SINKINGS = 60  # steps in which details sink into the head, hand or foot that they belong to
+SINKINGS = 45  # steps in which details sink into the head, hand or foot that they belong to
+THIN, FLAT = 0.5, 0.7  # mean normal's length: a finger would become a spike and stays, a nose sinks
 REACH = 0.22  # share of the figure's height: points further away cast no shade
 
 Floats = NDArray[np.float32]
@@ -120,7 +121,7 @@ def openness(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> Fl
 
 
 def sunk(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> tuple[Floats, Floats]:
-    """(V, 3) each: the way of every vertex, in heights, and its normal, once face, fingers and toes are smooth."""
+    """(V, 3) each: the way of a vertex, in heights, and its normal, when the face is smooth."""
     corners = positions[faces]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
     count = np.maximum(np.bincount(faces.reshape(-1), minlength=len(positions)), 1)
@@ -133,6 +134,9 @@ def sunk(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> tuple[
         for _ in range(SINKINGS):
             values[moves] = values[around[:, moves]].mean(axis=0)
     away, calm = np.zeros_like(positions), normals.copy()
-    away[chosen] = values[:, :3] - positions[chosen]
-    calm[chosen] = values[:, 3:] / np.maximum(np.linalg.norm(values[:, 3:], axis=1, keepdims=True), 1e-6)
+    alike = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)  # of the normals: small around a finger
+    whole = np.clip((alike - THIN) / (FLAT - THIN), 0.0, 1.0)
+    away[chosen] = whole * (values[:, :3] - positions[chosen])
+    mixed = (1.0 - whole) * normals[chosen] + whole * values[:, 3:] / np.maximum(alike, 1e-6)
+    calm[chosen] = mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-6)
     return away, calm

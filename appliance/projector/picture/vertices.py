@@ -11,6 +11,8 @@ FORMATS = {  # moderngl's word for it, and numpy's
     "position": ("3f4", "f4"),
     "normal": ("4f1", "u1"),
     "tangent": ("4f1", "u1"),
+    "calm": ("4f1", "u1"),
+    "sunk": ("4f2", "f2"),
     "chance": ("4f2", "f2"),
     "along": ("4f2", "f2"),
     "joints": ("4u1", "u1"),
@@ -26,13 +28,13 @@ def layout(parts: tuple[str, ...]) -> tuple[str, ...]:
 def packed(parts: Mapping[str, Any]) -> bytes:
     """Parts (V, ..) by name, vertex after vertex; what has fewer numbers than its format ends in zeros.
 
-    Bytes hold 0 to 1, or -1 to 1 for normals and tangents; a shader doubles those and takes 1 away.
+    Bytes hold 0 to 1, or -1 to 1 for directions; a shader doubles those and takes 1 away.
     """
     count = len(next(iter(parts.values())))
     kinds: list[Any] = [(part, FORMATS[part][1], int(FORMATS[part][0][0])) for part in parts]
     records = np.zeros(count, kinds)
     for part, values in parts.items():
-        if part in ("normal", "tangent"):
+        if part in ("normal", "tangent", "calm"):
             values = 0.5 + 0.5 * values
         if FORMATS[part][0].endswith("f1"):
             values = np.round(255.0 * values)

@@ -4,6 +4,8 @@
 #include held
 in vec3 in_position;
 in vec4 in_normal;  // w: how much light comes near
+in vec4 in_sunk;
+in vec4 in_calm;
 in uvec4 in_joints;
 in vec4 in_weights;
 uniform mat4 projection;
@@ -21,8 +23,9 @@ out float pressed;
 
 void main() {
     mat2x4 by = blended(in_joints, in_weights, row);
-    place = moved(by, in_position);
-    normal = turned(by, 2.0 * in_normal.xyz - 1.0);
+    float without_face = smoothstep(0.0, 0.25, melt);
+    place = moved(by, in_position + without_face * in_sunk.xyz);
+    normal = turned(by, mix(2.0 * in_normal.xyz - 1.0, 2.0 * in_calm.xyz - 1.0, without_face));
     melt_body(place, normal, row);
     skin = in_position;
 #ifdef BRUSH
