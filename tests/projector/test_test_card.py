@@ -61,6 +61,28 @@ def test_greys_rise_from_black_to_white_in_even_steps() -> None:
     assert runs(image[582, 371:909, 0]) == [255 - level for level in reversed(NEAR)]
 
 
+@pytest.mark.parametrize("size", [(640, 360), (1280, 720)])
+def test_name_and_pin_are_larger_than_the_other_words(size: tuple[int, int]) -> None:
+    """8 m from a picture 2 m high the PIN is 0.7 degrees tall: eight times what an eye needs."""
+    unit = size[1] // 36
+    words = card(size)[11 * unit : 25 * unit, 28 * unit : 45 * unit, 0] > 200
+    rows = np.flatnonzero(np.diff(np.concatenate([[False], words.any(axis=1), [False]]).astype(int)))
+    name, page, pin, mode = rows[1::2] - rows[::2]
+    assert min(name, pin) > 1.4 * max(page, mode) and min(name, pin) >= 1.8 * unit
+
+
+@pytest.mark.parametrize("more", [0, 4])
+def test_each_step_next_to_black_and_white_has_its_number(more: int) -> None:
+    """Many words leave them free."""
+    image = drawn((1280, 720), (*LINES, *["network bunraku-4f2a"] * more), ADDRESS)[..., 0]
+    for top, bottom in ((505, 522), (607, 624)):
+        columns = (image[top:bottom, 371:909] > 100).any(axis=0)
+        across = 538 / len(NEAR)
+        for number in range(len(NEAR)):
+            middle = round((number + 0.5) * across)
+            assert 6 < np.count_nonzero(columns[middle - 20 : middle + 20]) < 40
+
+
 def test_lines_of_one_pixel_tell_the_focus() -> None:
     image = card((1280, 720))[..., 0]
     fine = image[420:440, 80:340]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import segno
 from numpy.typing import NDArray
 from PIL import Image as Files
-from PIL import ImageDraw
+from PIL import ImageDraw, ImageFont
 
 from appliance.projector.picture.lettering import lettered
 
@@ -21,13 +21,17 @@ _COLOURS = ("#ffffff", "#ffff00", "#00ffff", "#00ff00", "#ff00ff", "#ff0000", "#
 _FOCUS = (1, 2, 3)  # pixels: widths of lines
 _STAR = 36  # spokes
 _OVERLAP, _EVEN = (255, 128, 0), (48, 112, 192)
+_NAMES = (150,) * 3  # the numbers of steps: legible, and not so bright that they hide black
+LARGE, SMALL = 2.6, 1.35  # height of type in units: the box's name and PIN; the other words
+LEADING, MOST_WORDS = 1.4, 13.0  # from one line to the next in heights of type; the room for all in units
 _FAINT = 44  # level of the squares' lines, of 255
 
 
 def test_card(
     size: tuple[int, int], lines: Sequence[str], address: str = "", shared: tuple[str, float] | None = None
 ) -> Image:
-    """(height, width, 3), top row first. lines: words in its middle; address: as a QR code, '': none.
+    """(height, width, 3), top row first. lines: words in its middle, the first one, which is the
+    box's name, and the PIN larger; address: as a QR code, '': none.
 
     shared: which part of the picture this projector lights, and the overlap as a fraction of it: the overlap
     is marked, and the words are where only this projector lights.
@@ -47,7 +51,8 @@ def test_card(
     if shared is not None:
         area = _overlap(draw, width, height, unit, *shared)
         lines = [*lines, f"{shared[0]}, overlap {100 * shared[1]:.1f} %"]
-    _lettering(image, lines, address, unit, area)
+    large = [number for number, line in enumerate(lines) if number == 0 or line.startswith("pin ")]
+    _lettering(image, lines, large, address, unit, area)
     return np.asarray(image)
 
 
@@ -90,16 +95,21 @@ def _bars(draw: ImageDraw.ImageDraw, width: int, height: int, unit: float) -> No
     """Colours; grey steps; steps that only just differ from black and from white."""
     left, right = width / 2 - 13.44 * unit, width / 2 + 13.44 * unit
 
-    def row(above: float, tall: float, colours: Sequence[tuple[int, ...] | str]) -> None:
+    def row(above: float, tall: float, colours: Sequence[tuple[int, ...] | str], names: int = 0) -> None:
         step, top = (right - left) / len(colours), height / 2 + above
         for number, colour in enumerate(colours):
             x = left + number * step
             draw.rectangle([round(x), round(top), round(x + step) - 1, round(top + tall) - 1], fill=colour)
+            if names:
+                beyond = top + (-0.3 * unit if names < 0 else tall + 0.3 * unit)
+                font = ImageFont.load_default(max(1, round(1.1 * unit)))
+                place, at = (x + step / 2, beyond), "mb" if names < 0 else "mt"
+                draw.text(place, str(colour[0]), _NAMES, font, anchor=at)
 
     row(-12.8 * unit, 2.6 * unit, _COLOURS)
     row(-10.2 * unit, 2.2 * unit, [(round(255 * step / (GREYS - 1)),) * 3 for step in range(GREYS)])
-    row(8.4 * unit, 1.8 * unit, [(level,) * 3 for level in NEAR])
-    row(10.2 * unit, 1.8 * unit, [(255 - level,) * 3 for level in reversed(NEAR)])
+    row(8.4 * unit, 1.8 * unit, [(level,) * 3 for level in NEAR], names=-1)
+    row(10.2 * unit, 1.8 * unit, [(255 - level,) * 3 for level in reversed(NEAR)], names=1)
 
 
 def _star(draw: ImageDraw.ImageDraw, x: float, y: float, radius: float) -> None:
@@ -151,9 +161,16 @@ def _overlap(
     return (start, 0.0, room, float(height)) if is_across else (0.0, start, float(width), room)
 
 
+def _words(line: str, tall: float, unit: float, limit: int) -> Files.Image:
+    """One line of words, `tall` units high, less where it would be wider than `limit` pixels."""
+    text = Files.fromarray(lettered(line, max(1, round(tall * unit)), (255, 255, 255)))
+    return text if text.width <= limit else text.resize((limit, max(1, text.height * limit // text.width)))
+
+
 def _lettering(
     image: Files.Image,
     lines: Sequence[str],
+    large: Collection[int],
     address: str,
     unit: float,
     area: tuple[float, float, float, float],
@@ -168,12 +185,15 @@ def _lettering(
         times = max(1, round(10.0 * unit / white.width))
         parts.append(white.resize((times * white.width, times * white.height), Files.Resampling.NEAREST))
     if lines:
-        text = Files.fromarray(lettered("\n".join(lines), max(1, round(1.35 * unit)), (255, 255, 255)))
         limit = max(1, round(29.4 * unit - sum(part.width for part in parts) - unit))
-        if text.width > limit:
-            text = text.resize((limit, max(1, text.height * limit // text.width)))
-        ground = Files.new("RGB", text.size, (0, 0, 0))
-        ground.paste(text, (0, 0), text)
+        sizes = [LARGE if number in large else SMALL for number in range(len(lines))]
+        sizes = [one * min(1.0, MOST_WORDS / (LEADING * sum(sizes))) for one in sizes]
+        words = [_words(line, tall, unit, limit) for line, tall in zip(lines, sizes, strict=True)]
+        downs = np.round(LEADING * unit * np.cumsum([0.0, *sizes])).astype(int).tolist()
+        ground = Files.new("RGB", (max(one.width for one in words), downs[-2] + words[-1].height))
+        for one, tall, down in zip(words, sizes, downs, strict=False):
+            middle = round(0.5 * (1.75 * tall * unit - one.height))  # of a line that was too wide
+            ground.paste(one, ((ground.width - one.width) // 2, down + middle), one)
         parts.append(ground)
     gap = round(unit) if len(parts) > 1 else 0
     left = round(area_left + (width - sum(part.width for part in parts) - gap) / 2)
