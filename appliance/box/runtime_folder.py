@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 from weakref import WeakSet
 
+from appliance.pose.correctable_error import CorrectableError
+
 if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
 
@@ -19,7 +21,7 @@ _OTHERS = 0o077
 _CURE = "Give another folder as `runtime:` in the box file."
 
 
-class RuntimeFolderError(Exception):
+class RuntimeFolderError(CorrectableError):
     """A folder in which the processes of a box cannot meet; the message says why and what to do."""
 
 
@@ -190,7 +192,6 @@ class Claim:
         self._descriptor = descriptor
 
     def close(self) -> None:
-        """Give the place back."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
         self._descriptor = -1

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import math
 import secrets
 import time
 from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import NamedTuple
 
 from aiohttp import web
 
@@ -20,12 +23,21 @@ from appliance.console.fallback import PIN_CHANGED
 from appliance.console.guard import COOKIE, Guard, peer
 from appliance.console.happened import Happened
 from appliance.console.metrics import CONTENT_TYPE, metrics
-from appliance.console.page_files import PageFiles, languages
 from appliance.console.stage_view import StageView
 from appliance.console.watchers import Watchers
 from appliance.levers.addresses import FORMS, QUESTIONS
 from appliance.show_control.command import command
 from appliance.show_control.packet import is_readable
+
+FOLDER = Path(__file__).with_name("page")
+_KINDS = {
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".css": "text/css",
+    ".json": "application/json",
+    ".svg": "image/svg+xml",
+    ".webmanifest": "application/manifest+json",
+}
 
 _YEAR_S = 365 * 24 * 3600
 _MOST_ARGUMENTS = 32  # a line over the map
@@ -190,3 +202,42 @@ def _are_plain(arguments: object) -> bool:
     if not isinstance(arguments, list) or len(arguments) > _MOST_ARGUMENTS:
         return False
     return all(isinstance(one, str) or (isinstance(one, int | float) and abs(one) < 1e9) for one in arguments)
+
+
+class _File(NamedTuple):
+    content: bytes
+    kind: str
+    tag: str
+
+
+def read_files(folder: Path = FOLDER) -> dict[str, _File]:
+    """By the path at which browsers ask for them."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.suffix in _KINDS:
+            content = path.read_bytes()
+            tag = f'"{hashlib.sha256(content).hexdigest()[:16]}"'
+            found[f"/{path.relative_to(folder).as_posix()}"] = _File(content, _KINDS[path.suffix], tag)
+    return found | {"/": found["/index.html"], "/phone": found["/phone.html"]}
+
+
+def languages(folder: Path = FOLDER) -> list[str]:
+    """Those that have a table of words."""
+    return sorted(path.stem for path in (folder / "words").glob("*.json"))
+
+
+class PageFiles:
+    """Serves them; a browser that has the newest gets 304."""
+
+    def __init__(self) -> None:
+        self._files = read_files()
+
+    async def serve(self, request: web.Request) -> web.Response:
+        """Raises 404 for a path without a file: no path leads anywhere else."""
+        file = self._files.get(request.path)
+        if file is None:
+            raise web.HTTPNotFound(text="There is nothing at this address.")
+        headers = {"Cache-Control": "no-cache", "ETag": file.tag}
+        if request.headers.get("If-None-Match") == file.tag:
+            return web.Response(status=304, headers=headers)
+        return web.Response(body=file.content, content_type=file.kind, charset="utf-8", headers=headers)

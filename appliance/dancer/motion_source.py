@@ -9,16 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from appliance.dancer.crossfade import Crossfade
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
-from appliance.dancer.phrase import FPS, NUMBER, Phrase, X, Z
+from appliance.dancer.phrase import AT, FPS, LIFT, NUMBER, STANDING, Phrase, X, Z
 from appliance.dancer.reading_head import Reader, ReadingHead
 from appliance.dancer.repertoire import Made, Repertoire
 from appliance.dancer.slerp import FloatArray, Slerp
-from appliance.dancer.stream import Stream
 from appliance.levers.sources import MAIN
+from appliance.pose.ease import ease
 from appliance.pose.recording import Recording
+
+_ROWS = 256  # poses before it moves back to the start of its memory
+
+_HURRY = 25  # ticks that a long crossfade takes at most, once the next change waits for it
 
 MAX_RATE = 4.0
 RATE_CHANGE_PER_TICK = 0.08  # from standing to full speed in a quarter of a second
@@ -341,3 +344,117 @@ def _checked_rate(rate: float) -> float:
     if not -MAX_RATE <= rate <= MAX_RATE:
         raise ValueError(f"The rate is {rate:g}; playback can run from {-MAX_RATE:g} to {MAX_RATE:g} times.")
     return rate
+
+
+class Crossfade:
+    """leaving: the head that is left; None: there is no crossfade."""
+
+    def __init__(self, leaving: ReadingHead | None = None, fade: int = 0) -> None:
+        """fade: ticks; 0: the leaving head is gone at once."""
+        self.leaving = leaving if fade else None
+        self._tick, self._length = 0.0, fade + 1.0
+
+    def advance(self) -> float:
+        """A tick on: how much of the entering head is there, 0 to 1."""
+        self._tick += 1.0
+        return ease(self._tick / self._length)
+
+    def end_if_over(self) -> None:
+        """The leaving head goes with the last tick."""
+        if self._tick > self._length - 1.5:
+            self.leaving = None
+
+    def hurry(self, fade: int) -> None:
+        """End a long crossfade sooner, from its present state: the next change, of `fade` ticks, waits."""
+        soon = max(_HURRY, fade + 1.0)
+        if self._length - self._tick > soon:
+            self._length *= soon / (self._length - self._tick)
+            self._tick = self._length - soon
+
+    @property
+    def times(self) -> list[float]:
+        """For `restored`."""
+        return [self._tick, self._length]
+
+    @staticmethod
+    def restored(leaving: ReadingHead | None, times: list[float]) -> Crossfade:
+        """Go on as another one stood."""
+        crossfade = Crossfade()
+        crossfade.leaving, (crossfade._tick, crossfade._length) = leaving, times
+        return crossfade
+
+
+class Stream:
+    """Poses (J, 4) and tracks (C,) of the next `window` ticks, this tick first."""
+
+    SNAPSHOT = ("poses", "tracks")
+
+    def __init__(self, joints: int, columns: int, window: int) -> None:
+        self._window, self._end = window, 0
+        self._poses = np.zeros((_ROWS, joints, 4), dtype=np.float32)
+        self._poses[..., 0] = 1.0
+        self._tracks = np.zeros((_ROWS, columns), dtype=np.float32)
+
+    def clear(self) -> None:
+        """Empty the stream: append `window` rows before reading."""
+        self._end = 0
+
+    def next_row(self) -> tuple[FloatArray, FloatArray]:
+        """The arrays for the next pose and its track; `append` then makes them the newest row."""
+        if self._end == len(self._poses):
+            self._move_to_start()
+        return self._poses[self._end], self._tracks[self._end]
+
+    def append(self) -> None:
+        """Append what was written into next_row."""
+        self._end += 1
+
+    @property
+    def poses(self) -> FloatArray:
+        """The window's poses (window, J, 4); valid until the next row is appended."""
+        return self._poses[self._end - self._window : self._end]
+
+    @property
+    def tracks(self) -> FloatArray:
+        """The window's tracks (window, C); valid as long."""
+        return self._tracks[self._end - self._window : self._end]
+
+    @property
+    def roots(self) -> FloatArray:
+        """The window's roots (window, 3) in metres."""
+        return self.tracks[:, :3]
+
+    @property
+    def lift(self) -> float:
+        """How far the first pose is above the floor, metres."""
+        return float(self._tracks[self._end - self._window, LIFT])
+
+    @property
+    def rest_heights(self) -> FloatArray:
+        """Heights (S,) in metres of the soles' points at the first pose while they stand; (0,) for none."""
+        heights: FloatArray = self._tracks[self._end - self._window, STANDING:NUMBER]
+        return heights
+
+    @property
+    def number(self) -> int:
+        """Number of the phrase that the first pose comes from."""
+        return round(float(self._tracks[self._end - self._window, NUMBER]))
+
+    @property
+    def position_s(self) -> float:
+        """Second in the phrase that the first pose comes from."""
+        return float(self._tracks[self._end - self._window, AT])
+
+    @property
+    def standing(self) -> tuple[float, float, float]:
+        """The root at the first pose: x, z in metres, heading in radians."""
+        first = self._end - self._window
+        x, z = self._tracks[first, [X, Z]].tolist()
+        w, _, y, _ = self._poses[first, 0].tolist()
+        return x, z, 2 * math.atan2(y, w)
+
+    def _move_to_start(self) -> None:
+        kept = self._window
+        self._poses[:kept] = self._poses[-kept:]
+        self._tracks[:kept] = self._tracks[-kept:]
+        self._end = kept

@@ -10,6 +10,7 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from appliance.dancer.slerp import FloatArray
+from appliance.pose.correctable_error import CorrectableError
 from appliance.pose.foreign_file import content
 from appliance.pose.skeleton import Skeleton, UnknownJointError
 from appliance.show.bundle import LARGEST_FILE
@@ -22,7 +23,7 @@ _CURE = "Export the show again, or copy the bundle again."
 _LENGTH_TOLERANCE = 1e-2
 
 
-class PuppetError(ValueError):
+class PuppetError(CorrectableError, ValueError):
     """A network file that cannot dance this skeleton: which file, what is wrong, what to do."""
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from appliance.pose.correctable_error import CorrectableError
 
-class ExchangeError(ValueError):
+
+class ExchangeError(CorrectableError, ValueError):
     """A file that cannot be read or written: which one, where in it, what is wrong and what to do.
 
     line: 0 where the file has none.

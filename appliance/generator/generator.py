@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from appliance.box.fallback import Fallbacks
 from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionWriter, SavedNamesWriter
 from appliance.box.mounts import disk_of
@@ -32,16 +34,21 @@ from appliance.dancer.material.prompt import end_of, prompt_of
 from appliance.dancer.phrase import FPS, NUMBER, Phrase, PhraseError
 from appliance.dancer.phrase_cache import MEMORY, PhraseCache
 from appliance.generator.fallback import NOT_MADE, NOT_SAVED
-from appliance.generator.pointing import Pointing
 from appliance.generator.request import AGAIN_SEEDS, Request, Requests
 from appliance.generator.saved_motions import SavedMotions
 from appliance.levers.show_state import ShowState
 from appliance.levers.sources import IMPROVISE, KEPT, MAIN
 from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.joint_frame import PuppetFrame
+from appliance.pose import quaternion
 from appliance.pose.bvh import BvhError
+from appliance.pose.skeleton import Skeleton
 from appliance.show.box import BoxConfig
 from appliance.show.puppets import PuppetStart
 from appliance.show.show import Show
+
+HELD = 0.5  # a hand with less weight is ignored
+STEADY = 0.03  # fraction of the map: a limb that trembles by less stays where it pointed
 
 _TAKEN_S = 5.0  # what is to be danced at once and is not taken over until then is made again
 _REST_S = 0.2  # from one motion to the next, at least
@@ -265,3 +272,29 @@ def give_back_memory() -> None:
     """Returns memory freed by numpy and onnxruntime to the system: 20 MB of 130."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
+
+
+class Pointing:
+    """Reads the frames of a puppet. joint: the name of the one that the hand holds."""
+
+    def __init__(self, skeleton: Skeleton, joint: str) -> None:
+        self._joint = skeleton.index(joint)
+        below = [child for child, parent in enumerate(skeleton.parents) if parent == self._joint]
+        limb = np.asarray(skeleton.offsets[below[0]] if below else (0.0, 0.0, 1.0), np.float32)
+        self._limb = limb / max(float(np.linalg.norm(limb)), 1e-6)
+        self._point: list[float] = []
+
+    def point(self, frame: PuppetFrame | None) -> list[float]:
+        """x, y, each 0 to 1, as `/motion/path` takes them; [] while the hand does not hold.
+
+        Depends only on the joint's rotation, seen from the front of the parent joint: ahead is the middle;
+        left and right, up and down are the edges. Angles would leap where a limb hangs.
+        """
+        if frame is None or frame.holds[self._joint] < HELD:
+            self._point = []
+            return self._point
+        x, y, _ = quaternion.rotate(frame.pose[self._joint], self._limb).tolist()
+        found = [round(min(max(0.5 + share / 2, 0.0), 1.0), 2) for share in (x, y)]
+        if not self._point or math.dist(found, self._point) > STEADY:
+            self._point = found
+        return self._point

@@ -5,19 +5,13 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from appliance.box.fallback import Fallbacks
-from appliance.box.log_writer import LogWriter
-from appliance.box.notify import Notifier
 from appliance.box.orders import OrderInbox
-from appliance.box.process_health import ProcessHealthWriter
+from appliance.box.own_process import OwnProcess
 from appliance.box.realtime import give_way
-from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
-from appliance.box.stop_signals import stop_signals
 from appliance.box.watchdog import Patience, end_process, guarded
 from appliance.generator.fallback import OF_THE_GENERATOR
 from appliance.generator.generator import Generator, save_memory
@@ -40,31 +34,18 @@ def run_generator(directory: Path | None, box_file: Path | None) -> None:
     box = load_box(box_file)
     give_way(_NICE)
     save_memory()
-    with stop_signals() as stopped, ExitStack() as opened:
-        speaker = LogWriter()
-        opened.callback(speaker.close)
-        folder = runtime_folder(box)
-        opened.callback(Claim(folder, "generator").close)
-        notifier, stage, show_state = Notifier(), FrameReader(folder), ShowStateReader(folder)
-        for one in (notifier, stage, show_state):
-            opened.callback(one.close)
-        inbox = OrderInbox(folder, "generator")
-        opened.callback(inbox.close)
-        fallbacks = Fallbacks(OF_THE_GENERATOR)
-        health = ProcessHealthWriter(folder, "generator", fallbacks)
-        opened.callback(health.close)
+    with OwnProcess(box, "generator", OF_THE_GENERATOR) as own:
+        folder, stopped = own.folder, own.stopped
+        stage, show_state = own.keep(FrameReader(folder)), own.keep(ShowStateReader(folder))
+        inbox = own.keep(OrderInbox(folder, "generator"))
         patience = Patience(_PATIENCE_S)
-
-        def is_well(now: float) -> None:
-            notifier.ping(now)
-            health.publish_health(now)
 
         def pulse() -> None:
             patience.note_sign(time.monotonic())
 
-        is_well(time.monotonic())
-        opened.enter_context(guarded(patience, lambda: False, _give_up, is_well=is_well))
-        notifier.ready("The generator makes what the stage asks for.")
+        own.pulse(time.monotonic())
+        own.opened.enter_context(guarded(patience, lambda: False, _give_up, is_well=own.pulse))
+        own.notifier.ready("The generator makes what the stage asks for.")
         while not stopped():
             pulse()
             stage.newest(time.monotonic())
@@ -75,15 +56,14 @@ def run_generator(directory: Path | None, box_file: Path | None) -> None:
             try:
                 show = load_show(directory or _facts_folder(stage))
             except ConfigError as error:
-                speaker.say(f"{error}\nNothing is made until the stage dances another show.")
+                own.speaker.say(f"{error}\nNothing is made until the stage dances another show.")
                 while not is_over():
                     pulse()
                     time.sleep(_LOOK_S)
                 continue
-            generator = Generator(show, box, folder, stage, fallbacks)
+            generator = Generator(show, box, folder, stage, own.fallbacks)
             with contextlib.closing(generator):
                 _generate(generator, inbox, show_state, is_over, pulse)
-        health.end(time.monotonic())
 
 
 def _give_up() -> None:

@@ -5,28 +5,23 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from appliance.box.fallback import Fallbacks
-from appliance.box.log_writer import LogWriter
-from appliance.box.notify import Notifier
 from appliance.box.orders import OrderInbox
-from appliance.box.process_health import ProcessHealthWriter
-from appliance.box.runtime_folder import Claim, runtime_folder
+from appliance.box.own_process import OwnProcess
+from appliance.box.runtime_folder import runtime_folder
 from appliance.box.show_state import ShowStateReader
-from appliance.box.stop_signals import stop_signals
-from appliance.lights.active_show import ActiveShow
 from appliance.lights.fallback import DMX_AWAY, OF_THE_LIGHTS, STAGE_UNSEEN
 from appliance.lights.live import LiveRig, OrderedWalk
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
-from appliance.lights.speaking import Speaking
 from appliance.outputs.dmx.open_wire import open_universes
 from appliance.outputs.dmx.pace import Universe
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.joint_frame import JointFrame
+from appliance.pair.part import PartReader
 from appliance.pose.counted import counted
 from appliance.show.asked_for import no_wires
 from appliance.show.box import BoxConfig, load_box
@@ -34,6 +29,8 @@ from appliance.show.config_error import ConfigError, Problem
 from appliance.show.lights import LightsConfig
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import at_venue, misplaced, unwired
+
+_LOOK_S = 0.004  # while silent: how soon after the stage the lights take over
 
 _REPORT_S = 1.0
 _POLL_S = 0.1  # how often the stage is looked for
@@ -200,47 +197,30 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
     """
     box = load_box(box_file)
     require_wires(box)
-    with stop_signals() as stopped, ExitStack() as opened:
-        speaker = LogWriter()  # a terminal that blocks must not block the lights
-        opened.callback(speaker.close)
-        folder = runtime_folder(box)
-        opened.callback(Claim(folder, "lights").close)
-        notifier, stage, show_state = Notifier(), FrameReader(folder), ShowStateReader(folder)
-        opened.callback(notifier.close)
-        fallbacks = Fallbacks(OF_THE_LIGHTS)
-        process_health = ProcessHealthWriter(folder, "lights", fallbacks)
-        opened.callback(process_health.close)
-        opened.callback(stage.close)
-        opened.callback(show_state.close)
-        live, inbox = LiveRig(folder), _open_inbox(folder)
-        opened.callback(live.close)
+    with OwnProcess(box, "lights", OF_THE_LIGHTS) as own:
+        folder, stopped = own.folder, own.stopped
+        stage, show_state = own.keep(FrameReader(folder)), own.keep(ShowStateReader(folder))
+        live, inbox = own.keep(LiveRig(folder)), _open_inbox(folder)
         if inbox is not None:
-            opened.callback(inbox.close)
-        parts = stage, show_state, speaker.say, fallbacks, inbox, live
-
-        def pulse(now: float) -> None:
-            notifier.ping(now)
-            process_health.publish_health(now)
-
+            own.keep(inbox)
+        parts = stage, show_state, own.speaker.say, own.fallbacks, inbox, live
         if directory is not None:
             lights = Lights(load_show(directory), box, *parts)
-            notifier.ready("The lights dance.")
-            _light(lights, stopped, pulse)
-            process_health.end(time.monotonic())
+            own.notifier.ready("The lights dance.")
+            _light(lights, stopped, own.pulse)
             return
-        notifier.ready("The lights follow the stage.")
+        own.notifier.ready("The lights follow the stage.")
         active = ActiveShow(stage)
         while not stopped():
             if active.is_new(time.monotonic()):
                 try:
                     lights = Lights(active.load(), box, *parts)
                 except ConfigError as error:
-                    speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
+                    own.speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:
-                    _light(lights, lambda: stopped() or active.is_new(time.monotonic()), pulse)
-            pulse(time.monotonic())
+                    _light(lights, lambda: stopped() or active.is_new(time.monotonic()), own.pulse)
+            own.pulse(time.monotonic())
             time.sleep(_POLL_S)
-        process_health.end(time.monotonic())
 
 
 def _open_inbox(folder: Path) -> OrderInbox | None:
@@ -271,3 +251,77 @@ def _wait_for(deadline: float, period_s: float) -> float:
     deadline += period_s * max(1, math.ceil((now - deadline) / period_s))
     time.sleep(max(deadline - now, 0.0))
     return deadline
+
+
+class ActiveShow:
+    """The show of the stage, from one to the next."""
+
+    def __init__(self, stage: FrameReader) -> None:
+        self._stage = stage
+        self._generation = stage.generation - 1
+        self._taken: tuple[str, bytes] | None = None
+        self._is_new = False
+
+    def is_new(self, now: float) -> bool:
+        """Whether the stage dances another show than the one loaded last, or an edited one."""
+        self._stage.newest(now)
+        if self._stage.facts is not None and self._stage.generation != self._generation:
+            self._generation = self._stage.generation
+            self._is_new = self._written() != self._taken
+        return self._is_new
+
+    def load(self) -> Show:
+        """The show of the stage. Raises ConfigError when its folder is broken by now."""
+        self._taken, self._is_new = self._written(), False
+        assert self._stage.facts is not None, "only a new show is loaded"
+        return load_show(self._stage.facts.show_directory)
+
+    def _written(self) -> tuple[str, bytes] | None:
+        """The identity of a show: its folder and the text of show.yaml."""
+        if self._stage.facts is None:
+            return None
+        folder = self._stage.facts.show_directory
+        try:
+            return str(folder), (folder / "show.yaml").read_bytes()
+        except OSError:
+            return str(folder), b""
+
+
+class Speaking:
+    """Tells the wires when this box takes over, and when it cedes. A box without a pair always speaks."""
+
+    def __init__(self, box: BoxConfig, universes: Sequence[Universe]) -> None:
+        self._pair, self._universes = box.pair, universes
+        self._reader = None if box.pair is None else PartReader(runtime_folder(box))
+        self._speaks = box.pair is None
+
+    def may_speak(self, now: float) -> bool:
+        """Whether universes may leave; monotonic seconds."""
+        if self._reader is None or self._pair is None:
+            return True
+        part = self._reader.read()
+        speaks = part is not None and part.may_speak(now)
+        if speaks != self._speaks:
+            self._speaks = speaks
+            for universe in self._universes:
+                if part is not None and speaks:
+                    universe.take_over(self._pair.priority * max(0, part.epoch - 1), now)
+                else:
+                    universe.cede(now)
+        return speaks
+
+    def wait(self, deadline: float, period_s: float) -> float | None:
+        """While silent: until the next pass on the grid, or until this box leads. None: it speaks."""
+        if self._speaks:
+            return None
+        now = time.monotonic()
+        deadline += period_s * max(1, math.ceil((now - deadline) / period_s))
+        while (left_s := deadline - time.monotonic()) > 0.0:
+            time.sleep(min(_LOOK_S, left_s))
+            if self.may_speak(time.monotonic()):
+                return time.monotonic()
+        return deadline
+
+    def close(self) -> None:
+        if self._reader is not None:
+            self._reader.close()

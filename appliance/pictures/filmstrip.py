@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pictures.filmstrip_stage import IVORY, MARGIN_PX, SLATE, VERMILION, Row, Stage, straight
+from appliance.pose.correctable_error import CorrectableError
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
@@ -25,7 +26,7 @@ _MORE_SCRIPTS = (
 )
 
 
-class MissingPicturesError(RuntimeError):
+class MissingPicturesError(CorrectableError):
     """The library that draws pictures is not installed."""
 
     def __init__(self) -> None:

@@ -14,6 +14,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.pose.correctable_error import CorrectableError
 from appliance.pose.counted import counted
 from appliance.pose.foreign_file import opened_text
 from appliance.pose.kept_rows import KeptRows
@@ -30,7 +31,7 @@ _USUAL_FPS += (250, 300, 360, 480, 500, 960, 1000, 23.976, 29.97, 59.94, 119.88)
 _CHANNELS = {f"{axis}{kind}" for axis in "XYZ" for kind in ("position", "rotation")}
 
 
-class BvhError(ValueError):
+class BvhError(CorrectableError, ValueError):
     """A BVH file that cannot be read: which file, which line, what is wrong."""
 
     def __init__(self, path: Path, line: int, message: str) -> None:

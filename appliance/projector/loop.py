@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,13 +13,13 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
+from appliance.box.pace import Pace
 from appliance.box.show_state import ShowStateReader
 from appliance.levers.table import CAMERA, LOOK
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.controls import Controls
-from appliance.projector.detail import affordable_detail
 from appliance.projector.final_pass import FinalPass, picture_size
 from appliance.projector.interpolation import Interpolation
 from appliance.projector.moment import Moment
@@ -29,7 +30,6 @@ from appliance.projector.picture.image_file import read_image
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.picture.test_card import Image, test_card
 from appliance.projector.picture.wall import DETAILS, Detail, Wall
-from appliance.projector.presence import STALE_S, Presence
 from appliance.projector.resolution import SHARES
 from appliance.projector.window import Size
 from appliance.show.card import CardConfig, cards_by_name
@@ -37,6 +37,13 @@ from appliance.show.config_error import ConfigError
 from appliance.show.look import LookConfig, looks_by_name
 from appliance.show.projector import ProjectorConfig
 from appliance.show.show import load_show
+
+STALE_S = 0.5
+FADE_S = 0.5
+_LONGEST_S = 0.25  # between two pictures: after a longer pause the fade still takes at least two steps
+
+_SPARE = 0.45  # fraction of the display's period for drawing: cards, masks and other programs need the rest
+_TRIES = 2  # the faster one counts
 
 Looks = Mapping[str, LookConfig]
 PAGE = "page "  # begins the line of the test card that has the page's address
@@ -321,3 +328,56 @@ def _changed_at(path: Path) -> int:
         return path.stat().st_mtime_ns
     except OSError:
         return 0
+
+
+def affordable_detail(
+    draw: Callable[[Detail], None], period_s: float, clock: Callable[[], float] = time.perf_counter
+) -> Detail:
+    """The finest detail for which a drawn picture leaves spare time. draw: draws the dearest look and waits.
+
+    It begins with the coarsest, which every machine draws, and ends with the first that takes too long.
+    """
+    best = DETAILS[0]
+    for detail in DETAILS:
+        draw(detail)  # drivers defer work to the first use
+        took_s = []
+        for _ in range(_TRIES):
+            began = clock()
+            draw(detail)
+            took_s.append(clock() - began)
+        if min(took_s) > _SPARE * period_s:
+            break
+        best = detail
+    return best
+
+
+class Presence:
+    """A level from 0 to 1 that follows whether fresh frames come; it starts in the dark.
+
+    rate: the intended pictures a second. A pause of this process, usually of the whole machine, counts
+    neither for the fade nor against the stage; slow drawing does.
+    """
+
+    def __init__(self, rate: float = USUAL_RATE) -> None:
+        self.level = 0.0
+        self._pace = Pace(_LONGEST_S, rate)
+        self._unseen_s = math.inf  # age of the newest frame, without the pauses of this process
+
+    @property
+    def sees_stage(self) -> bool:
+        """Whether the last picture had a fresh frame."""
+        return self._unseen_s < STALE_S
+
+    def step(self, newest: float | None, now: float) -> float:
+        """The level at `now`; `newest`: when the newest frame was, None without one (monotonic seconds)."""
+        elapsed_s = self._pace.step_s(now)
+        self._unseen_s = math.inf if newest is None else min(self._unseen_s + elapsed_s, now - newest)
+        if self.sees_stage:
+            self.level = min(1.0, self.level + elapsed_s / FADE_S)
+        else:
+            self.level = max(0.0, self.level - elapsed_s / FADE_S)
+        return self.level
+
+    def hide(self) -> None:
+        """Black at once, then a fade-in: another show has begun."""
+        self.level = 0.0

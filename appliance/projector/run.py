@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import socket
 import time
 from collections.abc import Callable
@@ -12,13 +14,15 @@ from pathlib import Path
 
 import moderngl
 
+from appliance.box.durable import write_whole
 from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
 from appliance.box.orders import OrderInbox
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import AlreadyHereError, Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
-from appliance.box.watchdog import Patience, guarded
+from appliance.box.watchdog import Patience, end_process, guarded
+from appliance.levers.show_state import ShowState
 from appliance.levers.table import LOOK
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pair.part import DarkWhileFollowing
@@ -32,7 +36,6 @@ from appliance.projector.fallback import (
     about_resolution,
     about_software,
 )
-from appliance.projector.first_start import FirstStart
 from appliance.projector.info import Figures, Meter
 from appliance.projector.keys import press
 from appliance.projector.pacing import USUAL_RATE, Pacing
@@ -44,9 +47,18 @@ from appliance.projector.seen_wall import SeenWall
 from appliance.projector.stamp import stamp
 from appliance.projector.stream.feed import Feed
 from appliance.projector.stream.keying import keyed
-from appliance.projector.watchdog import PATIENCE_S, give_up
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
+
+SHOWS_FOR_S = 600.0
+MARK = "used"  # in the box's state folder: this box has been used
+
+PATIENCE_S = 5.0
+MESSAGE = (
+    f"The display has taken no picture for {PATIENCE_S:g} s. The audience sees one that stands still, or "
+    "none; the dance goes on. The projector ends so that it can be started again (a supervisor does it by "
+    "itself); if it happens often, look at the cable, the projector and the graphics card's driver."
+)
 
 _ORDERS_A_PICTURE = 8
 _REPORT_S = 1.0
@@ -165,7 +177,6 @@ class Run:
         return self._meter.figures()
 
     def close(self) -> None:
-        """Give display, graphics card and files back."""
         self._closing.close()
 
     def _show_pictures(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
@@ -324,3 +335,36 @@ def _open_inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> 
         return None
     opened.callback(inbox.close)
     return inbox
+
+
+def give_up() -> None:
+    """End this process, and say why."""
+    end_process(MESSAGE, GPU_LOST)
+
+
+class FirstStart:
+    """Shows the test card by itself, once, until a sensor is heard or a command comes.
+
+    folder: the state folder. Where nothing can be kept the card would come back at each power-on, even in the
+    middle of an evening: there it does not come at all, nor where a picture was aligned or a sensor paired.
+    """
+
+    def __init__(self, folder: Path, signs_of_use: tuple[Path | None, ...] = ()) -> None:
+        self._mark = folder / MARK
+        signs = (self._mark, *(one for one in signs_of_use if one is not None))
+        self.is_on = not any(one.exists() for one in signs) and os.access(folder, os.W_OK)
+        self._since: float | None = None
+
+    def is_over(self, now: float, sensor_sequence: int, show_state: ShowState, is_shown: bool = True) -> bool:
+        """Once: when the card goes. now: seconds on the monotonic clock; sensor_sequence: -1 without one;
+        is_shown: False after a person switched the card off."""
+        if not self.is_on:
+            return False
+        self._since = now if self._since is None else self._since
+        is_unused = is_shown and sensor_sequence < 0 and not show_state.settings
+        if is_unused and now - self._since < SHOWS_FOR_S:
+            return False
+        self.is_on = False
+        with contextlib.suppress(OSError):
+            write_whole(self._mark, b"")
+        return True

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from appliance.pose.correctable_error import CorrectableError
 
-class JournalError(Exception):
+
+class JournalError(CorrectableError):
     """A journal that cannot be written, read or danced again; the message says why and what to do."""

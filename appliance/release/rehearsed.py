@@ -16,8 +16,8 @@ from appliance.release.arrivals import SHOW
 from appliance.release.packed_show import pack_show
 from appliance.show.bundle import write_checksums
 from appliance.show.config_error import ConfigError
-from appliance.show.cue_writing import with_cue
 from appliance.show.show import load_show
+from appliance.show.yaml_edit import with_cue
 
 ZIP = "show.zip"
 _OF = "of"  # which show.yaml the copy was made of

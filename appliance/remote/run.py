@@ -7,17 +7,13 @@ import select
 import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from appliance.box.fallback import Fallbacks
-from appliance.box.log_writer import LogWriter
-from appliance.box.notify import Notifier
-from appliance.box.process_health import ProcessHealth, ProcessHealthWriter
-from appliance.box.runtime_folder import Claim, runtime_folder
+from appliance.box.own_process import OwnProcess
+from appliance.box.process_health import ProcessHealth
 from appliance.box.show_state import ShowStateReader
-from appliance.box.stop_signals import stop_signals
 from appliance.levers.addresses import ADDRESSES
 from appliance.levers.show_state import ShowState
 from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
@@ -122,7 +118,6 @@ class Senders:
                 sender.send_datagrams((art_net_timecode.packed(label),), now)
 
     def close(self) -> None:
-        """Send no more."""
         for _, sender in self._receivers:
             sender.close()
 
@@ -213,7 +208,6 @@ class Midi:
                     self._network.send(one.device, message, now)
 
     def close(self) -> None:
-        """Let go of all devices and ports."""
         if self._raw is not None:
             self._raw.close()
         if self._network is not None:
@@ -330,7 +324,6 @@ class Remote:
             self._fallbacks.set(CLOCK_NOT_SET.name, not self.caretaker.knows_the_time)
 
     def close(self) -> None:
-        """Let go of everything."""
         parts = (self._port, self._ltc, self.midi, self.caretaker, self._senders)
         for one in (*parts, self._processes, self._stage, self._state, self._desk):
             if one is not None:
@@ -380,27 +373,16 @@ class Remote:
 def run_remote(box_file: Path | None) -> None:
     """Hear timecode and MIDI until a signal comes. Raises ConfigError, RuntimeFolderError."""
     box = load_box(box_file)
-    with stop_signals() as stopped, ExitStack() as opened:
-        speaker = LogWriter()
-        opened.callback(speaker.close)
-        folder = runtime_folder(box)
-        opened.callback(Claim(folder, "remote").close)
-        notifier, fallbacks = Notifier(), Fallbacks(OF_THE_REMOTE)
-        opened.callback(notifier.close)
-        process_health = ProcessHealthWriter(folder, "remote", fallbacks)
-        opened.callback(process_health.close)
-        remote = Remote(box, folder, speaker.say, fallbacks)
-        opened.callback(remote.close)
-        notifier.ready("Timecode and MIDI are heard.")
+    with OwnProcess(box, "remote", OF_THE_REMOTE) as own:
+        remote = own.keep(Remote(box, own.folder, own.speaker.say, own.fallbacks))
+        own.notifier.ready("Timecode and MIDI are heard.")
         report_at = 0.0
-        while not stopped():
+        while not own.stopped():
             with contextlib.suppress(OSError, ValueError):  # a device that was unplugged meanwhile
                 select.select(remote.descriptors(), (), (), _TURN_S)
             now = time.monotonic()
             remote.turn(now)
-            notifier.ping(now)
             if now >= report_at:
                 report_at = now + _LOOK_S
-                process_health.reported = remote.report(now)
-            process_health.publish_health(now)
-        process_health.end(time.monotonic())
+                own.health.reported = remote.report(now)
+            own.pulse(now)

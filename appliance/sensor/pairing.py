@@ -12,13 +12,47 @@ import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import blake2s
+from itertools import islice
 from math import inf
+from typing import Generic, TypeVar
 
 from appliance.sensor import wire
-from appliance.sensor.answer_queue import REMEMBERED_BOOTS, AnswerQueue
 from appliance.sensor.sensor_key import SensorKey
-from appliance.sensor.sequence import REMEMBERED, SequenceWindow
 from appliance.sensor.transports.transport import Route
+
+A_TICK = 8  # answers: more than sensors need, and little work whatever is replayed
+MOST_WAITING = 1024
+REMEMBERED_BOOTS = 4096  # more than the power-ons of a sensor in the years that it keeps its key
+
+Asked = TypeVar("Asked")
+
+REMEMBERED = 64
+
+
+class SequenceWindow:
+    """The newest number, and which of the 64 up to it have come (RFC 4303, section 3.4.3)."""
+
+    def __init__(self) -> None:
+        self.newest = -1
+        self._seen = 0  # bit n: the number n before the newest has come
+
+    def staleness(self, sequence: int) -> str | None:
+        """Why this number is not newer than all before: duplicate, reordered or old; None when it is."""
+        age = self.newest - sequence
+        if age < 0:
+            return None
+        if age >= REMEMBERED:
+            return "old"
+        return "duplicate" if self._seen >> age & 1 else "reordered"
+
+    def advance(self, sequence: int) -> int:
+        """Take a number as the newest. Returns how many before it are missing."""
+        step = sequence - self.newest
+        lost = step - 1 if self._seen else 0
+        self._seen = (self._seen << step | 1) & (1 << REMEMBERED) - 1 if step < REMEMBERED else 1
+        self.newest = sequence
+        return lost
+
 
 USUAL_RATE_HZ = 50
 HEARTBEAT_S = 1.0
@@ -213,3 +247,53 @@ class Pairing:
     def _head(self, kind: type[wire.Packet], boot_nonce: int, number: int) -> tuple[int, int, int, int]:
         sequence = self._sent[kind] = self._sent.get(kind, 0) + 1
         return self._device_id, boot_nonce, number, sequence
+
+
+class AnswerQueue(Generic[Asked]):
+    """Questions by boot nonce; a power-on is answered at most once in `interval_s`.
+
+    Power-ons that were never answered come first, so replayed ones wait behind a new one.
+    """
+
+    def __init__(self, interval_s: float) -> None:
+        self._interval_s = interval_s
+        self._new: dict[int, Asked] = {}  # never answered, longest wait first
+        self._waiting: dict[int, Asked] = {}  # answered before, longest wait first
+        self._answered_at: dict[int, float] = {}  # the newest answer is the last
+
+    def has_turn(self, boot_nonce: int, now: float) -> bool:
+        """Whether a question of this power-on would be answered: none waits, none was just answered."""
+        answered_at = self._answered_at.get(boot_nonce, -inf)
+        if boot_nonce in self._new or boot_nonce in self._waiting or now - answered_at < self._interval_s:
+            return False
+        has_room = len(self._new) + len(self._waiting) < MOST_WAITING
+        return has_room or (answered_at == -inf and bool(self._waiting))
+
+    def put(self, boot_nonce: int, asked: Asked) -> None:
+        """Queue a question; it replaces one of this power-on that still waits."""
+        queue = self._waiting if boot_nonce in self._answered_at else self._new
+        queue[boot_nonce] = asked
+        if len(self._new) + len(self._waiting) > MOST_WAITING:
+            queue = self._waiting or self._new
+            del queue[next(iter(queue))]
+
+    def clear(self) -> None:
+        """Owe nothing."""
+        self._new.clear()
+        self._waiting.clear()
+
+    def take_due(self, now: float) -> Iterator[tuple[int, Asked]]:
+        """Remove and give the questions to answer now, each with its boot nonce."""
+        turns = [(boot_nonce, self._new) for boot_nonce in islice(self._new, A_TICK)]
+        rested = (
+            boot_nonce
+            for boot_nonce in self._waiting
+            if now - self._answered_at.get(boot_nonce, -inf) >= self._interval_s
+        )
+        turns += [(boot_nonce, self._waiting) for boot_nonce in islice(rested, A_TICK - len(turns))]
+        for boot_nonce, queue in turns:
+            self._answered_at.pop(boot_nonce, None)
+            self._answered_at[boot_nonce] = now
+            if len(self._answered_at) > REMEMBERED_BOOTS:
+                del self._answered_at[next(iter(self._answered_at))]
+            yield boot_nonce, queue.pop(boot_nonce)

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+from appliance.pose.correctable_error import CorrectableError
+
 MOST_PROBLEMS = 30  # in one error: nobody reads more, and a file may have twenty thousand
 _LONGEST = 2000  # characters of a message
 _LONGEST_WORD = 60
@@ -38,7 +40,7 @@ class Problem:
 AnyProblem = TypeVar("AnyProblem", bound=Problem)
 
 
-class ConfigError(ValueError):
+class ConfigError(CorrectableError, ValueError):
     """A file that the box refuses: its problems in the order of their lines, the first MOST_PROBLEMS of them.
 
     `file`, `line` and `message` are those of the first one. more: problems that were not even looked at.

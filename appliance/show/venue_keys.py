@@ -48,9 +48,7 @@ def venue_keys(box: BoxConfig) -> list[VenueKey]:
 
 def _written(box: BoxConfig, name: Location) -> list[dict[str, Any]]:
     """The entries of a list as written in the file; none where it has no such list."""
-    values: Any = box.file.values
-    for step in name:
-        values = values.get(step) if isinstance(values, dict) else None
+    values = box.file.at(*name)
     return [entry for entry in values if isinstance(entry, dict)] if isinstance(values, list) else []
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import yaml
 
 from appliance.pose.foreign_yaml import composed, is_shallow
 from appliance.show.yaml_file import Location
+
+_INDENT = "  "
 
 
 def with_value(text: str, location: Location, value: Any) -> str:
@@ -70,3 +73,28 @@ def _nested(location: Location, value: Any) -> Any:
 def _flow(value: Any) -> str:
     said = yaml.safe_dump(value, default_flow_style=True, width=1 << 20, allow_unicode=True, sort_keys=False)
     return said.removesuffix("\n").removesuffix("\n...")
+
+
+def with_cue(text: str, cue: Mapping[str, Any]) -> str:
+    """The text with this cue as the last one. Raises yaml.YAMLError or ValueError for no show.yaml."""
+    text = text if text.endswith("\n") else f"{text}\n"
+    written = yaml.safe_dump(
+        dict(cue), default_flow_style=True, sort_keys=False, width=float("inf"), allow_unicode=True
+    ).strip()
+    root = composed(text)
+    if not isinstance(root, yaml.MappingNode) or root.flow_style:
+        raise ValueError("this is no show.yaml")
+    found = next((value for key, value in root.value if key.value == "cues"), None)
+    if found is None:
+        return f"{text}\ncues:\n{_INDENT}- {written}\n"
+    if not isinstance(found, yaml.SequenceNode):
+        raise ValueError("its cues are no list")
+    if found.flow_style:
+        end = found.end_mark.index - 1  # the closing bracket
+        return f"{text[:end]}{', ' if found.value else ''}{written}{text[end:]}"
+    lines = text.splitlines(keepends=True)
+    place = found.end_mark.line
+    while not lines[place - 1].strip() or lines[place - 1].lstrip().startswith("#"):
+        place -= 1  # comments after the last cue belong to the next section
+    lines.insert(place, f"{' ' * found.start_mark.column}- {written}\n")
+    return "".join(lines)

@@ -40,6 +40,13 @@ class YamlFile:
                 return self.lines[location[:end]]
         return 1
 
+    def at(self, *location: str | int) -> Any:
+        """The plain value there; None: there is none."""
+        values: Any = self.values
+        for step in location:
+            values = values.get(step) if isinstance(values, dict) else None
+        return values
+
     def problem(self, location: Location, message: str, cure: str) -> Problem:
         """The fault of the value there."""
         return Problem(self.path, self.line(location), message, cure)

@@ -39,7 +39,7 @@ from appliance.show_control.sensor_roster import SENSOR, roster_messages
 from appliance.show_control.show_state_commands import declare, in_cue, let_go, of_this_show
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import END, answer_to, status
-from appliance.show_control.trackers import TRACKERS, Trackers
+from appliance.show_control.vmc_input import TRACKERS, Trackers
 
 if TYPE_CHECKING:
     from appliance.outputs.shared_frame import Facts

@@ -6,8 +6,11 @@ import contextlib
 import socket
 from collections.abc import Sequence
 
+from appliance.levers.status import Status
 from appliance.show_control.packet import Message, datagram
 from appliance.show_control.settings import Listener
+
+EVERY_S = 1.0
 
 
 class Listeners:
@@ -29,6 +32,21 @@ class Listeners:
                         sender.sendto(packed, listener)
 
     def close(self) -> None:
-        """Send no more."""
         for one in self._listeners.values():
             one.close()
+
+
+class Heartbeat:
+    """Beats on its own grid, whatever the stage does; a listener that is away delays no other."""
+
+    def __init__(self, listeners: Sequence[Listener], now: float) -> None:
+        self._listeners = Listeners(listeners)
+        self.due = now if listeners else float("inf")  # monotonic seconds
+
+    def beat(self, status: Status, now: float) -> None:
+        """Send it; after a stall the grid starts over, and nothing is sent twice."""
+        self.due = self.due + EVERY_S if self.due + EVERY_S > now else now + EVERY_S
+        self._listeners.send(*status.messages())
+
+    def close(self) -> None:
+        self._listeners.close()

@@ -17,23 +17,24 @@ from appliance.box.process_health import COMMANDS_DROPPED, ProcessHealthWriter
 from appliance.box.show_state import ShowStateReader, ShowStateWriter
 from appliance.box.stop_signals import stop_signals
 from appliance.levers.show_state import ShowState
+from appliance.levers.table import MASTER
 from appliance.pair.part import PartReader
 from appliance.show_control.command_handler import CommandHandler
-from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.fallback import LIVE_DROPPED, SENDER_NOT_LISTED
 from appliance.show_control.feedback import Feedback
 from appliance.show_control.foreign_sensors import ForeignSensors
 from appliance.show_control.gestures import Gestures
-from appliance.show_control.heartbeat import Heartbeat
 from appliance.show_control.intake import Intake
 from appliance.show_control.key_file import KeyFile
-from appliance.show_control.listeners import Listeners
+from appliance.show_control.listeners import Heartbeat, Listeners
 from appliance.show_control.live_input import LiveInput
 from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.packet import Message
 from appliance.show_control.port import Address, Port
 from appliance.show_control.settings import Settings
 from appliance.show_control.stage_observer import StageObserver
+
+_PAUSE_S = 0.5  # a fader that moves all the time never floods the terminal
 
 _LONGEST_SLEEP_S = 0.25  # a restarted stage is found within this
 _FOLLOWING_SLEEP_S = 0.04  # what the leader declares is in force here within this
@@ -189,7 +190,6 @@ class ControlProcess:
         return f"Commands: {refused} refused, the last one: {self.handler.reason}" if refused else ""
 
     def close(self) -> None:
-        """Free the port and the show state, which stays in force."""
         self._closing.close()
 
     def _sleep_s(self, now: float) -> float:
@@ -232,3 +232,37 @@ def _waking_stop_signals() -> Iterator[tuple[Callable[[], bool], int]]:
             yield came, reading.fileno()
         finally:
             signal.set_wakeup_fd(wake_before)
+
+
+def held_back(show_state: ShowState) -> str:
+    """Why the audience sees nothing, and what lifts it; empty where nothing is held back."""
+    if show_state.panic:
+        return "Panic is in force: black, lights safe. /go lifts it."
+    if not show_state.going:
+        return "The show is stopped: dark. /go lets it go on."
+    if show_state.blackout:
+        return "Blackout is in force. /blackout 0 lifts it."
+    return (
+        ""
+        if show_state[MASTER].value > 0.0
+        else "Master is at 0 %: dark. /master 1 brings picture and lights back."
+    )
+
+
+class ConsoleMessages:
+    """Tells each change once; of several within half a second the last."""
+
+    def __init__(self, show_state: ShowState) -> None:
+        self._said_at = float("-inf")
+        self._held_back, self._cue = held_back(show_state), show_state.cue
+
+    def look(self, show_state: ShowState, now: float) -> str:
+        """A sentence when something is new; call it often."""
+        held, cue = held_back(show_state), show_state.cue
+        if (held, cue) == (self._held_back, self._cue) or now - self._said_at < _PAUSE_S:
+            return ""
+        messages = [f"Cue {cue}."] if cue and cue != self._cue else []
+        if held != self._held_back:
+            messages.append(held or "Picture and lights are back.")
+        self._said_at, self._held_back, self._cue = now, held, cue
+        return " ".join(messages)

@@ -1,16 +1,22 @@
-"""A dancer by the Virtual Motion Capture protocol (protocol.vmc.info), bone by bone, for this figure."""
+"""The Virtual Motion Capture protocol (protocol.vmc.info): a dancer, bone by bone, and trackers of hands."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
+from appliance.box.orders import Order
+from appliance.outputs.shared_frame import Facts
 from appliance.pose.possible import FARTHEST_M
 from appliance.pose.turns import UNTURNED, Quaternion, Vector, multiplied, rotated
+from appliance.show_control.command import require_read
 from appliance.show_control.figure_pose import BONES, HIPS, FigurePose, in_room
 
 PREFIX = "/VMC/Ext/"
 BONE, ROOT = f"{PREFIX}Bone/Pos", f"{PREFIX}Root/Pos"
+TRACKERS = frozenset(f"{PREFIX}{kind}/Pos" for kind in ("Tra", "Con", "Hmd"))  # tracker, controller, headset
+EVERY_S = 0.018  # a tracker may send 250 times a second: one place a tick is enough
+SILENT_S = 0.5  # after which its joints are given back
 _UNIT = 0.1  # a rotation this far from unit length is invalid
 
 
@@ -89,3 +95,24 @@ def parsed(address: str, arguments: Sequence[object]) -> tuple[str, Vector, Quat
         raise ValueError(f"{address} takes a name and seven numbers: x, y, z, and a rotation as x, y, z, w.")
     x, y, z, turn_x, turn_y, turn_z, w = values
     return name[:1].upper() + name[1:], (-x, y, z), (w, turn_x, -turn_y, -turn_z)
+
+
+class Trackers:
+    """Makes orders of what trackers send; those that no hand names are passed over."""
+
+    def __init__(self) -> None:
+        self._sent_at: dict[str, float] = {}
+
+    def orders(
+        self, address: str, arguments: Sequence[object], facts: Facts | None, now: float
+    ) -> list[Order]:
+        """The places of one message of TRACKERS. Raises ValueError with one clear sentence."""
+        name = arguments[0] if arguments else None
+        if facts is None or not isinstance(name, str) or name not in facts.trackers:
+            return []
+        require_read(address, arguments)
+        _, place, _ = parsed(address, arguments)
+        if now - self._sent_at.get(name, -EVERY_S) < EVERY_S:
+            return []
+        self._sent_at[name] = now
+        return [Order("place", (*place, SILENT_S), joint, quiet=True) for joint in facts.trackers[name]]

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.box.fallback import Fallbacks
-from appliance.box.log_writer import LogWriter
-from appliance.box.notify import Notifier
-from appliance.box.process_health import ProcessHealthWriter
+from appliance.box.own_process import OwnProcess
 from appliance.box.realtime import share_the_interpreter, thread_priority
-from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
-from appliance.box.stop_signals import stop_signals
 from appliance.levers.fade import part_of_fade
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import STRINGS
@@ -198,18 +193,10 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
     """
     box = load_box(box_file)
     config = SoundConfig() if by_hand and box_file is None else require_sound(box)
-    with stop_signals() as stopped, ExitStack() as opened:
-        speaker = LogWriter()
-        opened.callback(speaker.close)
-        folder = runtime_folder(box)
-        opened.callback(Claim(folder, "sound").close)
-        notifier, stage, danced = Notifier(), FrameReader(folder), FrameReader(folder)
-        show_state, for_the_card = ShowStateReader(folder), ShowStateReader(folder)
-        fallbacks = Fallbacks(OF_THE_SOUND)
-        process_health = ProcessHealthWriter(folder, "sound", fallbacks)
-        for one in (notifier, stage, danced, show_state, for_the_card, process_health):
-            opened.callback(one.close)
-        sound = Sound(config, stage, show_state, speaker.say, fallbacks)
+    with OwnProcess(box, "sound", OF_THE_SOUND) as own:
+        stage, danced = own.keep(FrameReader(own.folder)), own.keep(FrameReader(own.folder))
+        show_state, for_the_card = (own.keep(ShowStateReader(own.folder)) for _ in range(2))
+        sound = Sound(config, stage, show_state, own.speaker.say, own.fallbacks)
         priority = (
             max(box.realtime.priority // 2, 1) if box.realtime.enabled else None
         )  # the dance goes first
@@ -218,22 +205,19 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
             sound.dance(danced, time.monotonic())
             return sound.render(frames, for_the_card.read())
 
-        card = Card(config, render, priority)
-        opened.callback(card.close)
+        card = own.keep(Card(config, render, priority))
         share_the_interpreter()
         if priority is not None:
             thread_priority(1)  # this thread, held up with the interpreter in hand, would hold up the card's
-        notifier.ready("The strings follow the stage.")
+        own.notifier.ready("The strings follow the stage.")
         report_at = 0.0
-        while not stopped():
+        while not own.stopped():
             now = time.monotonic()
             sound.look(now)
             if sound.instrument is not None:
                 card.look(now)
-            notifier.ping(now)
-            process_health.publish_health(now)
+            own.pulse(now)
             if now >= report_at:
                 report_at = now + _REPORT_S
                 sound.report(card, now)
             time.sleep(LOOK_S)
-        process_health.end(time.monotonic())

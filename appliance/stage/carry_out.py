@@ -38,7 +38,7 @@ SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
 STROBE_S = 10.0
 
 Outcome = tuple[bool, str]
-Effect = Callable[[Order, StageParts], str]  # a sentence, or nothing; raises ValueError
+Effect = Callable[[Order, StageParts], str | None]  # a sentence, or nothing; raises ValueError
 
 
 def carry_out(order: Order, parts: StageParts, wearing: SensorFit, now: float) -> Outcome:
@@ -54,7 +54,7 @@ def obey(order: Order, parts: StageParts) -> Outcome:
     if effect is None:
         return False, f"The stage knows no order '{order.name}'."
     try:
-        return True, effect(order, parts)
+        return True, effect(order, parts) or ""
     except ValueError as error:
         return False, str(error)
 
@@ -114,47 +114,41 @@ def _iterate(order: Order, parts: StageParts) -> str:
     return message
 
 
-def _allow(order: Order, parts: StageParts) -> str:
+def _allow(order: Order, parts: StageParts) -> None:
     for puppet in parts.puppets:
         puppet.iterations.allow(int(order.values[0]))
-    return ""
 
 
-def _enliven(order: Order, parts: StageParts) -> str:
+def _enliven(order: Order, parts: StageParts) -> None:
     parts.liveliness.ask(*LIVELINESS.given(order.text, order.values))
-    return ""
 
 
-def _change_seed(order: Order, parts: StageParts) -> str:
+def _change_seed(order: Order, parts: StageParts) -> None:
     parts.liveliness.change_seed(SEED.given(order.text, order.values)[0])
-    return ""
 
 
 def _play(order: Order, parts: StageParts) -> str:
     return parts.led.play(order.text, *order.values)  # without a fade: the show's
 
 
-def _set_rate(order: Order, parts: StageParts) -> str:
+def _set_rate(order: Order, parts: StageParts) -> None:
     for puppet in parts.puppets:
         puppet.motion.rate = order.values[0]
-    return ""
 
 
-def _jump(order: Order, parts: StageParts) -> str:
+def _jump(order: Order, parts: StageParts) -> None:
     parts.led.motion.jump(order.values[0])
-    return ""
 
 
-def _excerpt(order: Order, parts: StageParts) -> str:
+def _excerpt(order: Order, parts: StageParts) -> None:
     parts.led.motion.excerpt(*order.values)
-    return ""
 
 
-def _note(order: Order, parts: StageParts) -> str:
-    return ""  # each part of a cue is an order; the journal notes its name
+def _note(order: Order, parts: StageParts) -> None:
+    """Each part of a cue is an order; the journal notes its name."""
 
 
-def _enable(order: Order, parts: StageParts) -> str:
+def _enable(order: Order, parts: StageParts) -> None:
     """Let a hand hold or let go; one by OSC that was told nothing yet holds its joint where it is."""
     holds, _ = HAND.given(order.text, order.values)
     for puppeteer in parts.led.hands.puppeteers:
@@ -164,14 +158,12 @@ def _enable(order: Order, parts: StageParts) -> str:
                 puppeteer.hold_here(_orientation(puppeteer.joint, parts).tolist())
             if puppeteer.enabled and isinstance(puppeteer, RemotePlace):
                 puppeteer.hold_here(parts.led.frame.positions[puppeteer.number].tolist())
-    return ""
 
 
-def _dance_made(order: Order, parts: StageParts) -> str:
+def _dance_made(order: Order, parts: StageParts) -> None:
     """Let the puppet with the number that follows the fade go over to what the generator made for it."""
     fade_s, number = order.values
     parts.puppets[int(number)].play_made(order.text, fade_s)
-    return ""
 
 
 def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
@@ -190,49 +182,43 @@ def _go_on(lever: Lever[Any]) -> Effect:
     """A number of what goes on by itself, called as the lever is."""
     attribute = {DELAY.name: "delay_s"}.get(lever.name, lever.name)
 
-    def go_on(order: Order, parts: StageParts) -> str:
+    def go_on(order: Order, parts: StageParts) -> None:
         if parts.continuing is None:
             raise ValueError("No puppet of this show goes on by itself, and none has a partner.")
         setattr(parts.continuing, attribute, lever.given(order.text, order.values)[0])
-        return ""
 
     return go_on
 
 
-def _gate(order: Order, parts: StageParts) -> str:
+def _gate(order: Order, parts: StageParts) -> None:
     """Whether the strings of all puppets drive their joints."""
     opened, seconds = order.values
     for springs in parts.springs:
         springs.turn("gate", (opened,), seconds)
-    return ""
 
 
-def _call_springs(order: Order, parts: StageParts) -> str:
+def _call_springs(order: Order, parts: StageParts) -> None:
     springs = _springs(parts)
     setting, seconds = SPRINGS.given(order.text, order.values)
     if setting not in springs.settings:
         raise ValueError(f"There is no setting of springs '{setting}' in this show.")
     springs.call(setting, seconds)
-    return ""
 
 
 def _turn(knob: Lever[float]) -> Effect:
-    def turn(order: Order, parts: StageParts) -> str:
+    def turn(order: Order, parts: StageParts) -> None:
         value, seconds = knob.given(order.text, order.values)
         _springs(parts).turn(knob.name, (value,), seconds)
-        return ""
 
     return turn
 
 
-def _blow(order: Order, parts: StageParts) -> str:
+def _blow(order: Order, parts: StageParts) -> None:
     _springs(parts).turn(WIND.name, WIND.given(order.text, order.values)[0])
-    return ""
 
 
-def _kick(order: Order, parts: StageParts) -> str:
+def _kick(order: Order, parts: StageParts) -> None:
     _springs(parts).kick(order.values)
-    return ""
 
 
 def _springs(parts: StageParts) -> Springs:
@@ -242,7 +228,7 @@ def _springs(parts: StageParts) -> Springs:
     return parts.led.springs
 
 
-def _lead(order: Order, parts: StageParts) -> str:
+def _lead(order: Order, parts: StageParts) -> None:
     """Give a joint that is held by OSC its orientation or place, or back: of each puppet with such a hand."""
     puppeteers = [one for puppet in parts.puppets for one in puppet.hands.puppeteers]
     led = [one for one in puppeteers if isinstance(one, Remote | RemotePlace) and one.joint == order.text]
@@ -254,7 +240,7 @@ def _lead(order: Order, parts: StageParts) -> str:
     if order.name == "release":
         for puppeteer in led:
             puppeteer.release()
-        return ""
+        return
     wanted = RemotePlace if order.name == "place" else Remote
     led = [one for one in led if isinstance(one, wanted)]
     if not led:
@@ -270,7 +256,6 @@ def _lead(order: Order, parts: StageParts) -> str:
         else:
             x, y, z, angle = order.values
             puppeteer.hold_axis_angle((x, y, z), angle)
-    return ""
 
 
 EFFECTS: dict[str, Effect] = {

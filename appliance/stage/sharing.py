@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from appliance.box.runtime_folder import Claim, RuntimeFolderError, runtime_folder
+from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.outputs.puppet_facts import HandFacts, PuppetFacts
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show.box import BoxConfig
@@ -18,9 +18,9 @@ from appliance.show.springs import springs_by_name
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
-from appliance.stage.stage_error import StageError
 from appliance.stage.stage_parts import StageParts
-from appliance.stage.thermometer import Thermometer
+
+_ZONE = Path("/sys/class/thermal/thermal_zone0/temp")
 
 
 def facts_of(
@@ -82,11 +82,8 @@ class Sharing:
     """
 
     def __init__(self, box: BoxConfig, rehearsal: bool = False) -> None:
-        try:
-            self.folder = self.noted = runtime_folder(box)
-            self._claim = Claim(self.folder, "stage")
-        except RuntimeFolderError as error:
-            raise StageError(str(error)) from error
+        self.folder = self.noted = runtime_folder(box)
+        self._claim = Claim(self.folder, "stage")
         self._rehearsed = self.folder / "rehearsal" if rehearsal else None
         if self._rehearsed is not None:
             self.noted = self._rehearsed
@@ -173,7 +170,6 @@ class Sharing:
         parts.outputs.publish_health(reported)
 
     def close(self) -> None:
-        """Give the place back, after the outputs were closed."""
         self._forget_rehearsal()
         self._thermometer.close()
         self._claim.close()
@@ -181,3 +177,27 @@ class Sharing:
     def _forget_rehearsal(self) -> None:
         if self._rehearsed is not None:
             shutil.rmtree(self._rehearsed, ignore_errors=True)
+
+
+class Thermometer:
+    """Reads what Linux calls the first thermal zone: on a Raspberry Pi that is the processor."""
+
+    def __init__(self, zone: Path = _ZONE) -> None:
+        try:
+            self._descriptor = os.open(zone, os.O_RDONLY | os.O_CLOEXEC)
+        except OSError:
+            self._descriptor = -1
+
+    def celsius(self) -> float | None:
+        """None on machines without one."""
+        if self._descriptor < 0:
+            return None
+        try:
+            return int(os.pread(self._descriptor, 32, 0)) / 1000.0
+        except (OSError, ValueError):
+            return None
+
+    def close(self) -> None:
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+        self._descriptor = -1

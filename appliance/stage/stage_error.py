@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from appliance.pose.correctable_error import CorrectableError
 
-class StageError(Exception):
+
+class StageError(CorrectableError):
     """The stage cannot start; the message says what happened, what the audience sees and what to do."""

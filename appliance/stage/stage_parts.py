@@ -24,14 +24,13 @@ from appliance.dancer.material.partner_network import PartnerNetwork
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.phrase_cache import PhraseCache
-from appliance.dancer.puppet import Puppet, PuppetError, PuppetNetwork
+from appliance.dancer.puppet import Puppet, PuppetNetwork
 from appliance.dancer.puppeteers import WornSensor
 from appliance.dancer.slerp import FloatArray
 from appliance.dancer.springs import Springs
 from appliance.levers.sources import LIVE, MAIN
 from appliance.outputs.joint_frame import PuppetFrame
 from appliance.outputs.outputs import Outputs
-from appliance.pose.bvh import BvhError
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.sensor.link import SensorLink, SensorReading
@@ -157,7 +156,6 @@ class StageParts:
         self.newest_primary = restored_reading(self.newest_primary)
 
     def close(self) -> None:
-        """Free ports and sockets."""
         self.link.close()
         self.outputs.close()
         if self.live_inbox is not None:
@@ -176,20 +174,17 @@ def assemble(
     `memory`: a folder where phrases that were made ready are kept for the next start; `network_of`: another
     network in place of the show's own, from its file, the skeleton and the number of puppets.
 
-    Raises StageError or ConfigError before anything dances. Keys that are missing are no reason not to dance:
+    Raises a CorrectableError before anything dances. Keys that are missing are no reason not to dance:
     see `complaints`.
     """
     config, cast = show.config, show.config.cast
-    try:
-        network = network_of(show.network, show.skeleton, len(cast))
-        show.require_moving(network.joints)
-        motion, floor = _playback(show, network.window, PhraseCache(show.directory, memory))
-        puppets = [
-            _stage_puppet(show, start, puppet, _motion_of(start, motion), floor)
-            for start, puppet in zip(cast, network.puppets, strict=True)
-        ]
-    except PuppetError as error:
-        raise StageError(str(error)) from error
+    network = network_of(show.network, show.skeleton, len(cast))
+    show.require_moving(network.joints)
+    motion, floor = _playback(show, network.window, PhraseCache(show.directory, memory))
+    puppets = [
+        _stage_puppet(show, start, puppet, _motion_of(start, motion), floor)
+        for start, puppet in zip(cast, network.puppets, strict=True)
+    ]
     worn: dict[str, list[WornSensor]] = {}
     mountings: dict[str, list[Mounting]] = {}
     for start, made in zip(cast, puppets, strict=True):
@@ -276,8 +271,6 @@ def _playback(show: Show, window: int, preparations: PhraseCache) -> tuple[Playb
         )
         for name, path in zip(motion.phrases, others, strict=True):
             playback.add(name, *_phrase(show, path, preparations))
-    except BvhError as error:
-        raise StageError(str(error)) from error
     except (PhraseError, GroundingError) as error:
         raise StageError(f"{path}: {error}") from error
     preparations.forget_others()

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from appliance.console.page_files import FOLDER, languages
+from appliance.console.server import FOLDER, languages
 from appliance.console.verdict import verdict
 from appliance.levers.status import Status
 from hw_sim.figures import verdict as verdict_of_measure

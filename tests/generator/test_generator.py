@@ -16,7 +16,7 @@ from appliance.box.made_motion import MadeMotion, MadeMotionReader
 from appliance.box.orders import Order
 from appliance.generator import request as requests
 from appliance.generator.fallback import NOT_MADE, NOT_SAVED
-from appliance.generator.pointing import Pointing
+from appliance.generator.generator import Pointing
 from appliance.levers.show_state import ShowState
 from appliance.outputs.joint_frame import PuppetFrame
 from appliance.pose import quaternion

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.lights.audience import dazzling, meets_eyes
 from appliance.lights.beams import HEAD_DEGREES, LAMP_DEGREES, ZOOM_DEGREES, Beam, beams_of
 from appliance.lights.patch import Patch
 from appliance.lights.phrase_run import passes
 from appliance.lights.plan import draw_plan
+from appliance.lights.rig_sheet import dazzling, meets_eyes
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from tests.lights.rigs import SKELETON, lights

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import LIGHTS
-from appliance.lights.curve import bent, eased, share
 from appliance.lights.dance import lean, turn
+from appliance.lights.mapping import bent, eased, share
 from appliance.lights.patch import Patch
 from appliance.lights.rig import Rig
 from appliance.pose import quaternion

@@ -8,7 +8,7 @@ from pathlib import Path
 from appliance.box.show_state import ShowStateWriter
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import MASTER
-from appliance.lights.speaking import Speaking
+from appliance.lights.run import Speaking
 from appliance.outputs.dmx.art_net import cancel_merge
 from appliance.outputs.dmx.open_wire import open_universes
 from appliance.pair.part import STALE_S, BoxPart, DarkWhileFollowing, PartReader, PartWriter, forget_part

@@ -12,8 +12,7 @@ import pytest
 from appliance.cli.app import parser
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import CUE
-from appliance.projector.first_start import MARK, SHOWS_FOR_S, FirstStart
-from appliance.projector.run import Options, Run
+from appliance.projector.run import MARK, SHOWS_FOR_S, FirstStart, Options, Run
 from appliance.release.choice import Choice, Pair
 from appliance.show.box import BoxConfig
 from tests.bundles import write_show

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from appliance.pose.recording import Recording
-from appliance.projector.detail import affordable_detail
+from appliance.projector.loop import affordable_detail
 from appliance.projector.moment import Moment
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.picture.wall import DETAILS, FLAT, Detail, Wall

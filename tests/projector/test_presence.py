@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from appliance.projector.presence import FADE_S, STALE_S, Presence
+from appliance.projector.loop import FADE_S, STALE_S, Presence
 
 RATE = 60
 

@@ -14,7 +14,7 @@ import pytest
 from appliance.box import watchdog
 from appliance.box.watchdog import Patience, guarded
 from appliance.projector.projector_error import GPU_LOST
-from appliance.projector.watchdog import PATIENCE_S
+from appliance.projector.run import PATIENCE_S
 
 HANGS = """
 import ctypes, sys, time

@@ -15,8 +15,7 @@ import pytest
 
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import CUE, GOING, STRINGS
-from appliance.remote.caretaker import Caretaker
-from appliance.remote.opening_hours import OpeningHours
+from appliance.remote.caretaker import Caretaker, OpeningHours
 from appliance.remote.pjlink import PjLinkError, ProjectorPower, Seen, ask
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError

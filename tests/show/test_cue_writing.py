@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from appliance.show.bundle import default_show_path
-from appliance.show.cue_writing import with_cue
+from appliance.show.yaml_edit import with_cue
 
 CUE = {
     "name": "anna: 'still'",

@@ -16,8 +16,7 @@ from appliance.show.box import load_box
 from appliance.show.bundle import CHECKSUMS, write_checksums
 from appliance.show.check import verify_bundle
 from appliance.show.config_error import MOST_PROBLEMS, ConfigError
-from appliance.show.cue_writing import with_cue
-from appliance.show.yaml_edit import with_value
+from appliance.show.yaml_edit import with_cue, with_value
 from appliance.show.yaml_file import MAX_BYTES
 
 DEEP = ["a: " + "[" * 100_000, "a: " + "{b: " * 60_000, "- " * 100_000, "? " * 100_000]

@@ -6,7 +6,7 @@ import pytest
 
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import CUE, GOING, LOOK, MASTER
-from appliance.show_control.console_messages import ConsoleMessages, held_back
+from appliance.show_control.run import ConsoleMessages, held_back
 
 
 def test_nothing_is_said_where_nothing_changes() -> None:

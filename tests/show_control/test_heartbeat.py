@@ -13,7 +13,7 @@ from pythonosc.osc_message import OscMessage
 from appliance.levers.show_state import ShowState
 from appliance.levers.status import STATUS, Status
 from appliance.levers.table import GOING
-from appliance.show_control.heartbeat import Heartbeat
+from appliance.show_control.listeners import Heartbeat
 from appliance.show_control.packet import datagram
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import status
@@ -87,7 +87,7 @@ def test_every_state_of_the_stage_and_the_house(folder: Path) -> None:
 def test_it_goes_on_while_the_stage_hangs_and_when_it_is_gone(
     folder: Path, listener: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("appliance.show_control.heartbeat.EVERY_S", 0.1)
+    monkeypatch.setattr("appliance.show_control.listeners.EVERY_S", 0.1)
     control = ControlInThread(folder, heartbeat=[listener.getsockname()])
     with StageDouble(folder) as stage:
         stage.tell(late=3, temperature_c=61.5, sensor_age_s=None)

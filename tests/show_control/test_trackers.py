@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from appliance.box.orders import Order
-from appliance.show_control.trackers import EVERY_S, SILENT_S, TRACKERS, Trackers
+from appliance.show_control.vmc_input import EVERY_S, SILENT_S, TRACKERS, Trackers
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts
 from tests.system.processes import wait_until
 

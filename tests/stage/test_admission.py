@@ -12,8 +12,9 @@ import yaml
 
 from appliance.show.box import BoxConfig, LimitsConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage import admission as module
-from appliance.stage.admission import PACED, Admission, SecondLook, admission_record, admit, admitted
+from appliance.stage import admission_cache as module
+from appliance.stage.admission import PACED, Admission, SecondLook, admit
+from appliance.stage.admission_cache import admission_record, admitted
 from appliance.stage.stage_parts import StageParts, assemble
 from tests.bundles import write_show
 from tests.fake_clock import FakeTime

@@ -20,7 +20,7 @@ from appliance.box.checkpoint import Checkpoint, Standing, packed, read_checkpoi
 from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.dancer.phrase_cache import FOLDER, LARGEST, SUFFIX, PhraseCache, prepare
 from appliance.fixture_library.convert import convert_file
-from appliance.outputs.dmx.identity import component_identifier
+from appliance.outputs.dmx.sacn import component_identifier
 from appliance.pose.bvh import BvhError, read_bvh, write_bvh
 from appliance.projector.alignment import AlignmentFile
 from appliance.release.choice import Choice

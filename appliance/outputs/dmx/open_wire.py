@@ -9,10 +9,9 @@ from typing import Any
 from appliance.outputs.datagram_sender import DatagramPath
 from appliance.outputs.dmx import sacn_packet
 from appliance.outputs.dmx.art_net import ArtNetWire
-from appliance.outputs.dmx.identity import component_identifier
 from appliance.outputs.dmx.open_dmx import open_dmx_wire
 from appliance.outputs.dmx.pace import Universe
-from appliance.outputs.dmx.sacn import LOOPBACK, SacnSource, SacnWire
+from appliance.outputs.dmx.sacn import LOOPBACK, SacnSource, SacnWire, component_identifier
 from appliance.outputs.dmx.udmx import udmx_wire
 from appliance.outputs.dmx.usb_pro import usb_pro_wire
 from appliance.outputs.dmx.wire import Wire

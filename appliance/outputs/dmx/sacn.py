@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 from math import inf
-from uuid import UUID
+from pathlib import Path
+from uuid import UUID, uuid4
 
+from appliance.box.durable import write_whole
 from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
 from appliance.outputs.dmx import sacn_packet
 from appliance.outputs.dmx.network_wire import NetworkWire
+from appliance.pose.foreign_file import content
 from appliance.show.dmx import DmxConfig
+
+FILE = "sacn-cid"
+_LARGEST = 100
 
 DISCOVERY_EACH_S = 10.0  # E1.31 appendix A, E131_UNIVERSE_DISCOVERY_INTERVAL
 TERMINATIONS = 3  # section 6.2.6
@@ -57,7 +64,6 @@ class SacnWire(NetworkWire):
         source.universes.append(number)
 
     def send_universe(self, levels: bytes | bytearray, now: float) -> None:
-        """Send one universe, 512 levels."""
         self.send_datagrams((self._packets.pack(levels),), now)
         self._source.announce_universes(now)
 
@@ -77,3 +83,27 @@ class SacnWire(NetworkWire):
         self._source.universes.remove(self._number)
         if not self._source.universes:
             self._source.close()
+
+
+def component_identifier(state: Path | None) -> UUID:
+    """The one in the state folder, made where there is none (E1.31 section 5.6).
+
+    Without a folder, or where it cannot be written, a new one each time: receivers then see a new source.
+    """
+    fresh = uuid4()
+    if state is None:
+        return fresh
+    saved = _read(state / FILE)
+    if saved is not None:
+        return saved
+    with contextlib.suppress(OSError):
+        state.mkdir(parents=True, exist_ok=True)
+        write_whole(state / FILE, f"{fresh}\n".encode())
+    return fresh
+
+
+def _read(file: Path) -> UUID | None:
+    try:
+        return UUID(content(file, _LARGEST).decode("ascii").strip())
+    except (OSError, ValueError):
+        return None

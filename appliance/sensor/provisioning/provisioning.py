@@ -10,6 +10,7 @@ from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from appliance.pose.correctable_error import CorrectableError
 from appliance.sensor import wire
 from appliance.sensor.key_editing import KeyEditing, editing
 from appliance.sensor.keys import SensorKey, fresh_key, name_fault
@@ -26,7 +27,7 @@ DEFAULT_PORT = 9750
 _AGAIN = "Plug it in, switch it off and on, and run this again."
 
 
-class ProvisioningError(Exception):
+class ProvisioningError(CorrectableError):
     """The wearable is not provisioned: what happened, how both sides stand, what to do. Holds no secret."""
 
 

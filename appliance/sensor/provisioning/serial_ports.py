@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from serial.tools import list_ports
 
+from appliance.pose.correctable_error import CorrectableError
+
 # USB vendor and product of the boards, from the Arduino cores' boards.txt: running, and in their bootloader.
 # An ESP32-S3's own USB unit has the last ids, on a XIAO and on many other boards.
 BOARDS = {
@@ -19,7 +21,7 @@ BOARDS = {
 _BOOTLOADERS = {(0x2341, 0x004E): "MKR1000", (0x2341, 0x024E): "MKR1000", (0x2341, 0x0054): "MKR WiFi 1010"}
 
 
-class NoWearableError(Exception):
+class NoWearableError(CorrectableError):
     """No wearable was found, or several: which ports there are and what to do."""
 
 

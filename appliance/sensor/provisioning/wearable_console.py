@@ -16,6 +16,7 @@ from hmac import compare_digest
 
 import serial
 
+from appliance.pose.correctable_error import CorrectableError
 from appliance.sensor.provisioning.serial_ports import found_ports, ports_sentence
 from appliance.sensor.wire import TAG_BYTES
 
@@ -36,7 +37,7 @@ _IDENTITY = re.compile(
 )
 
 
-class ConsoleError(Exception):
+class ConsoleError(CorrectableError):
     """The wearable's console failed: what happened and what to do."""
 
 

@@ -11,10 +11,9 @@ import pytest
 import sacn as library
 
 from appliance.outputs.dmx import sacn_packet
-from appliance.outputs.dmx.identity import FILE, component_identifier
 from appliance.outputs.dmx.open_wire import open_universes
 from appliance.outputs.dmx.pace import Universe
-from appliance.outputs.dmx.sacn import DISCOVERY_EACH_S
+from appliance.outputs.dmx.sacn import DISCOVERY_EACH_S, FILE, component_identifier
 from hw_sim.dmx.sacn import Data, Discovery, MalformedSacnError, decode
 from hw_sim.dmx.sacn_node import SacnNode, SacnReceiver
 from hw_sim.peers import free_ports
