@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from uuid import UUID
 
 import numpy as np
 import pypsn
 import pytest
 from pythonosc.osc_message_builder import OscMessageBuilder
+from sacn.messages.data_packet import DataPacket
 
 from appliance.dancer.forward_kinematics import Figure
+from appliance.levers.show_state import ShowState
+from appliance.levers.table import LIGHTS
+from appliance.lights.patch import Patch
+from appliance.lights.rig import Rig
+from appliance.outputs.dmx.art_net import ArtDmx
+from appliance.outputs.dmx.open_wire import open_universes
+from appliance.outputs.dmx.sacn_packet import DataPackets
 from appliance.outputs.frame_reader import FrameReader
-from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.joint_frame import JointFrame, PuppetFrame
 from appliance.outputs.osc.dialects import DIALECTS, Addressed
 from appliance.outputs.outputs import Outputs
 from appliance.outputs.posistagenet import PosiStageNet
@@ -23,12 +33,15 @@ from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 from appliance.show.box import OutputsConfig
 from appliance.show.bundle import default_show_path
+from appliance.show.lights import LightsConfig
 from appliance.show.osc import OscConfig
 from appliance.show.posistagenet import PosiStageNetConfig
 from appliance.show.show import load_show
+from hw_sim.dmx.artnet import ArtNetReceiver
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST
 from hw_sim.posistagenet import PsnReceiver
+from tests.outputs.dmx.conftest import config, universe
 from tests.outputs.small_stage import encoded, facts_of, one_puppet
 from tests.studio.tiny import skeleton, swaying
 
@@ -218,3 +231,133 @@ def test_all_outputs_of_one_tick(
     """Three receivers by OSC, 8 trackers by PosiStageNet, the shared frame: 0.3 ms is the limit."""
     measured("OSC to three, PosiStageNet, shared frame", OUTPUTS_GROUP)(everybody.publish_frame, full_frame)
     assert all(receiver.sent and not receiver.dropped for receiver in everybody.receivers)
+
+
+SACN_GROUP = "one universe packed into sACN"
+ART_NET_GROUP = "one universe packed into Art-Net"
+SENT_GROUP = "two universes to two sockets"
+CID = UUID("00112233-4455-6677-8899-aabbccddeeff")
+
+
+def test_sacn_library(measured: Callable[..., Any]) -> None:
+    packet = DataPacket(tuple(CID.bytes), "A box", 7, tuple(universe()))
+
+    def pack() -> bytes:
+        packet.dmxData = tuple(universe_now)
+        packet.sequence_increase()
+        return bytes(packet.getBytes())
+
+    universe_now = universe(1)
+    theirs = measured("the sacn library", SACN_GROUP, reference=True)(pack)
+    ours = bytearray(DataPackets(CID, "A box", 7, 512).pack(universe_now))
+    ours[111] = theirs[111]  # the sequence: the benchmark has packed many
+    assert theirs == bytes(ours)
+
+
+def test_sacn(measured: Callable[..., Any]) -> None:
+    packets, data = DataPackets(CID, "A box", 7, 512), universe(1)
+    assert len(measured("ours", SACN_GROUP)(packets.pack, data)) == 638
+
+
+def pack_as_textbooks_do(port_address: int, sequence: int, levels: bytes) -> bytes:
+    """ArtDmx field by field, each level checked, as packers in plain Python write it."""
+    packet = b"Art-Net\0" + struct.pack("<H", 0x5000) + struct.pack(">H", 14)
+    packet += (
+        struct.pack("BB", sequence, 0) + struct.pack("<H", port_address) + struct.pack(">H", len(levels))
+    )
+    for level in levels:
+        packet += struct.pack("B", min(max(int(level), 0), 255))
+    return packet
+
+
+def test_art_net_in_plain_python(measured: Callable[..., Any]) -> None:
+    benchmark = measured("plain Python, level by level", ART_NET_GROUP, reference=True)
+    theirs = benchmark(pack_as_textbooks_do, 7, 1, universe(1))
+    assert theirs == bytes(ArtDmx(7, 512).pack(universe(1)))
+
+
+def test_art_net(measured: Callable[..., Any]) -> None:
+    packets, data = ArtDmx(7, 512), universe(1)
+    assert len(measured("ours", ART_NET_GROUP)(packets.pack, data)) == 530
+
+
+@pytest.fixture
+def nodes() -> Iterator[tuple[ArtNetReceiver, ArtNetReceiver]]:
+    with ArtNetReceiver() as one, ArtNetReceiver() as other:
+        yield one, other
+
+
+def test_two_universes_sent(
+    measured: Callable[..., Any], nodes: tuple[ArtNetReceiver, ArtNetReceiver]
+) -> None:
+    wires = [config("artnet", universe=number, port=node.port) for number, node in enumerate(nodes)]
+    universes = open_universes(wires)
+    levels = bytearray(universe(1))
+    clock = iter(range(1 << 40))
+
+    def send() -> None:
+        now = float(next(clock))  # a second apart: each of them leaves
+        levels[0] ^= 1
+        for one in universes:
+            one.offer(levels, now)
+
+    measured("Art-Net over loopback", SENT_GROUP)(send)
+    assert all(one.wire.dropped == 0 and one.wire.sent > 0 for one in universes)
+    assert all(node.poll(1.0) for node in nodes)
+
+
+GROUP = "lights, one pass: 48 moving heads, 60 LED PARs and 14 RGB lamps on two universes"
+RULES = [
+    {"reads": "place", "joint": "lHand", "drives": "aim"},
+    {"reads": "speed", "joint": "lHand", "drives": "dimmer", "attack_s": 0.1, "release_s": 1.0},
+    {"reads": "speed", "drives": "dimmer", "mix": "highest"},
+    {"reads": "height", "joint": "head", "drives": "colour", "colours": [[1, 0, 0], [0, 0, 1]]},
+    {"reads": "turn", "drives": "zoom"},
+]
+
+
+def full_universe(universe: int) -> list[dict[str, Any]]:
+    """24 heads of 12 channels, 30 lamps of 6, 7 of 3: 489 of 512."""
+    kinds = [("moving-wash", None, 12, 24), ("led-par", "RGBW", 6, 30), ("rgb", None, 3, 7)]
+    fixtures: list[dict[str, Any]] = []
+    address = 1
+    for profile, mode, width, count in kinds:
+        for number in range(count):
+            place = [number / 4 - 3, 4, universe]
+            one = {"name": f"{profile} {universe} {number}", "profile": profile, "universe": universe}
+            fixtures.append({**one, "mode": mode, "address": address, "place": place})
+            address += width
+    return fixtures
+
+
+@pytest.mark.parametrize("fading", [False, True], ids=["one mapping", "fading into another"])
+def test_pass(measured: Callable[..., Any], fading: bool, request: pytest.FixtureRequest) -> None:
+    skeleton = load_show(default_show_path()).skeleton
+    values = {
+        "fixtures": [*full_universe(1), *full_universe(2)],
+        "mappings": [{"name": name, "rules": RULES} for name in ("one", "other")],
+    }
+    config = LightsConfig.model_validate(values)
+    rig = Rig(config, Patch(config.fixtures, None), skeleton)
+    rig.safety = 0.0
+    show_state = ShowState().to(LIGHTS, "one").to(LIGHTS, "other", 0.0, 1e9) if fading else ShowState()
+    frames = itertools.cycle(range(200))
+    dance = [_frame(skeleton, number) for number in range(200)]
+    clock = itertools.count()
+
+    def one_pass() -> dict[int, bytes]:
+        return rig.render(dance[next(frames)], 1, show_state, next(clock) * 0.025)
+
+    levels = measured(request.node.callspec.id, GROUP)(one_pass)
+    assert set(levels) == {1, 2}
+
+
+def _frame(skeleton: Skeleton, number: int) -> JointFrame:
+    """A figure that wanders."""
+    pose = np.tile(np.array([1, 0, 0, 0], np.float32), (len(skeleton), 1))
+    root = np.array([np.sin(number / 30), 0.9, np.cos(number / 30)], np.float32)
+    positions, world = skeleton.forward_kinematics(pose, root)
+    seconds = number * 0.02
+    holds = np.zeros(len(positions), np.float32)
+    puppet = PuppetFrame(root, pose, pose, world, positions, holds)
+    return JointFrame((puppet,), number, seconds, left=seconds)
