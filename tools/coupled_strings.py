@@ -1,8 +1,8 @@
 """Measures the strings that couplings play: `python -m tools.coupled_strings RECORDINGS [OUT.png]`.
 
 RECORDINGS: as for `bunraku duet`. Each couple's dance is played by `strings: {of: couplings}`, 20 s of it.
-Null products: each dancer beside one of another couple, beside a figure that stands still, and the body's own
-strings, which hear nothing of the other one.
+Null products: each dancer beside one of another couple, beside its own partner ten seconds later, beside a
+figure that stands still, and the body's own strings, which hear nothing of the other one.
 """
 
 from __future__ import annotations
@@ -36,8 +36,12 @@ def trail(take: Take) -> Floats:
     return np.asarray(positions, np.float32)
 
 
-def played(skeleton: Skeleton, first: Floats, second: Floats, of: str) -> tuple[Floats, float, int]:
-    """Samples (N,), the mean share of the joints that have a string, and how many strings were struck."""
+def played(
+    skeleton: Skeleton, first: Floats, second: Floats, of: str, is_heard: bool
+) -> tuple[Floats, float, int]:
+    """Samples (N,), none where it is not heard; the mean share of the joints that have a string; and how many
+    strings were struck.
+    """
     strings = StringsConfig.model_validate({"of": of})
     made, couplings = Instrument(skeleton, strings, SOUND), Couplings(skeleton)
     made.level, sound, shares, strikes = 1.0, [], [], 0
@@ -51,8 +55,10 @@ def played(skeleton: Skeleton, first: Floats, second: Floats, of: str) -> tuple[
             made.dance(first[tick], tick / FPS)
         strikes += int((made._strikes > 0).sum())
         shares.append(float(couplings.shares[made.strings.bones[:, 1]].mean()))
-        sound.append(made.render(SOUND.block)[:, 0])
-    return np.concatenate(sound), float(np.mean(shares)), strikes
+        if is_heard:
+            sound.append(made.render(SOUND.block)[:, 0])
+        made._strikes[:] = 0.0
+    return np.concatenate(sound or [np.zeros(0)]), float(np.mean(shares)), strikes
 
 
 def pairs(couples: Sequence[tuple[Floats, Floats]]) -> Iterator[tuple[str, list[tuple[Floats, Floats]], str]]:
@@ -61,6 +67,8 @@ def pairs(couples: Sequence[tuple[Floats, Floats]]) -> Iterator[tuple[str, list[
     others = [*couples[1:], couples[0]]
     strangers = [(one, two) for (one, _), (_, two) in zip(couples, others, strict=True)]
     yield "null: dancers of different couples", strangers, "couplings"
+    later = [(one, np.roll(two, len(two) // 2, axis=0)) for one, two in couples]
+    yield "null: couples, one of them ten seconds later", later, "couplings"
     still = [(one, np.repeat(one[:1], len(one), axis=0)) for one, _ in couples]
     yield "null: beside one who stands still", still, "couplings"
     yield "null: the body's own strings, couples", list(couples), "body"
@@ -73,17 +81,16 @@ def main() -> None:
     couples = [
         (trail(one), trail(two)) for one, two in couples_of([*dataset.held_out, *dataset.training]).values()
     ]
-    print("| who | level, dB | joint coupled, mean | strings struck a minute |")
-    print("|---|---|---|---|")
+    print("| who | joint coupled, mean | strings struck a minute |")
+    print("|---|---|---|")
     heard = {}
     for name, who, of in pairs(couples):
-        found = [played(dataset.skeleton, one, two, of) for one, two in who]
-        seconds = sum(len(sound) for sound, _, _ in found) / SOUND.rate
-        power = sum(float((sound**2).sum()) for sound, _, _ in found) / (seconds * SOUND.rate)
-        struck = 60 * sum(strikes for *_, strikes in found) / seconds
+        heard[name], *_ = played(dataset.skeleton, *who[0], of, True) if len(sys.argv) > 2 else (np.zeros(0),)
+        found = [played(dataset.skeleton, one, two, of, False) for one, two in who]
+        minutes = sum(min(len(one), len(two)) for one, two in who) / FPS / 60
+        struck = sum(strikes for *_, strikes in found) / minutes
         share = np.mean([share for _, share, _ in found])
-        print(f"| {name} | {10 * np.log10(power + 1e-12):.1f} | {share:.3f} | {struck:.0f} |", flush=True)
-        heard[name] = found[0][0]
+        print(f"| {name} | {share:.3f} | {struck:.0f} |", flush=True)
     if len(sys.argv) > 2:
         draw(heard, Path(sys.argv[2]))
 

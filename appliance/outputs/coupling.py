@@ -11,8 +11,9 @@ ROWS = 48  # a trail: row 0 is now, row i was ROW_S * i seconds ago
 ROW_S = 0.025  # 48 of them reach 1.175 s back
 LAGS = 8  # rows by which a limb may follow: 0.2 s
 LIVELY = 0.55  # figure heights a second (root mean square) of a limb that fully takes part
-COUPLED_LAGS = 20  # rows by which a partner may be late: half a second
-BY_CHANCE = 0.7  # likeness that unrelated dances reach in a second
+LATE_S, LATE_STEP_S = 0.5, 0.05  # by how much a partner may be late, and the lags that are tried
+BY_CHANCE = 0.75  # likeness that strangers reach in one of twenty looks at a second, one of fifty at 2.4 s
+FULLY = 0.85  # likeness that counts as full: a couple seldom has more
 HELD = 0.05  # how firmly a joint is held at least, to lead
 
 _WINDOW = np.hanning(2 * ROWS)[ROWS:-1].astype(np.float32)  # the past fades, so that nothing jumps
@@ -30,29 +31,35 @@ def led_by(positions: Floats, holds: Floats | None) -> tuple[int | None, Floats]
         return None, np.zeros(count, np.float32)
     leader = int(np.argmax(holds))
     speeds = _speeds(positions)
-    likeness = _likeness(speeds, speeds[:, leader, None], LAGS)
+    likeness = _likeness(speeds[..., None], speeds[:, leader, None, None], range(LAGS))
     led = likeness * _moves(speeds) * float(holds[leader])
     led[leader] = holds[leader]
     return leader, led.astype(np.float32)
 
 
-def coupled(first: Floats, second: Floats) -> Floats:
-    """How alike each joint (J,) of two figures moves, whichever of them is later, 0 to 1.
+def coupled(first: Floats, second: Floats, row_s: float = ROW_S) -> Floats:
+    """How alike each joint (J,) of two figures moves through the room, whichever is later, 0 to 1.
 
-    Trails and likeness as in led_by, at lags up to COUPLED_LAGS both ways; likeness that two unrelated dances
-    reach as well is left out.
+    Trails as in led_by, their rows row_s apart. Velocities count, not speeds, and the root's are in them: the
+    dancers of a couple travel together, while speeds are alike in all dances to such music. Likeness that
+    strangers reach as well is left out (docs/notebook.md).
     """
-    ours, theirs = _speeds(first), _speeds(second)
-    likeness = np.maximum(_likeness(ours, theirs, COUPLED_LAGS), _likeness(theirs, ours, COUPLED_LAGS))
-    beyond = np.clip((likeness - BY_CHANCE) / (1.0 - BY_CHANCE), 0.0, 1.0)
-    return (beyond * np.minimum(_moves(ours), _moves(theirs))).astype(np.float32)
+    ours, theirs = _velocities(first, row_s), _velocities(second, row_s)
+    step = max(round(LATE_STEP_S / row_s), 1)
+    lags = range(0, round(LATE_S / row_s), step)
+    likeness = np.maximum(_likeness(ours, theirs, lags), _likeness(theirs, ours, lags))
+    beyond = np.clip((likeness - BY_CHANCE) / (FULLY - BY_CHANCE), 0.0, 1.0)
+    moves = np.minimum(*(_moves(np.linalg.norm(one, axis=2)) for one in (ours, theirs)))
+    return (beyond * moves).astype(np.float32)
 
 
-def rows_between(times: NDArray[np.float64], now: float) -> tuple[NDArray[np.intp], Floats]:
+def rows_between(
+    times: NDArray[np.float64], now: float, row_s: float = ROW_S
+) -> tuple[NDArray[np.intp], Floats]:
     """For each row of a trail at `now`: which of the times (N,), at least two, in order, comes after it; and
     how far it is there from the one before (ROWS,), 0 to 1. Rows before the first time are at the first.
     """
-    at = np.clip(now - ROW_S * np.arange(ROWS), times[0], times[-1])
+    at = np.clip(now - row_s * np.arange(ROWS), times[0], times[-1])
     after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
     step = np.maximum(times[after] - times[after - 1], 1e-9)
     return after, np.clip((at - times[after - 1]) / step, 0.0, 1.0).astype(np.float32)
@@ -60,28 +67,33 @@ def rows_between(times: NDArray[np.float64], now: float) -> tuple[NDArray[np.int
 
 def _speeds(positions: Floats) -> Floats:
     """Speeds of the joints about the root, (ROWS - 1, J) figure heights a second, newest first."""
-    relative = positions - positions[:, :1]
-    found: Floats = np.linalg.norm(np.diff(relative, axis=0), axis=2) / ROW_S
+    found: Floats = np.linalg.norm(_velocities(positions - positions[:, :1], ROW_S), axis=2)
     return found
 
 
-def _likeness(late: Floats, early: Floats, lags: int) -> NDArray[np.float64]:
-    """The largest correlation (J,), 0 to 1, of speeds with others, which they follow within so many rows."""
-    late, early = late.astype(float), early.astype(float)
-    rows = np.arange(len(late))
-    inside = rows < len(rows) - np.arange(lags)[:, None]
-    weights = np.where(inside, _WINDOW[: len(rows)], 0.0)  # (lags, rows) of the late ones
-    shifted = np.zeros((lags, 2 * len(rows)))  # and of the early ones, which begin a lag later
-    for lag in range(lags):
-        shifted[lag, lag : lag + len(rows)] = weights[lag]
-    padded = np.concatenate([early, np.zeros((lags, early.shape[1]))])
-    windows = np.lib.stride_tricks.sliding_window_view(padded, len(rows), axis=0)[:lags]  # (lags, J, rows)
-    total = weights.sum(axis=1, keepdims=True)
-    ours, theirs = weights @ late, shifted[:, : len(rows)] @ early
-    both = np.einsum("ljr,lrj->lj", windows, weights[:, :, None] * late) - ours * theirs / total
-    squares = weights @ late**2 - ours**2 / total, shifted[:, : len(rows)] @ early**2 - theirs**2 / total
-    sizes = np.sqrt(np.maximum(squares[0] * squares[1], 0.0))
-    return np.asarray(np.clip((both / np.maximum(sizes, 1e-6)).max(axis=0), 0.0, 1.0))
+def _velocities(positions: Floats, row_s: float) -> Floats:
+    """(ROWS - 1, J, 3) figure heights a second, newest first."""
+    found: Floats = -np.diff(positions, axis=0) / row_s
+    return found
+
+
+def _likeness(late: Floats, early: Floats, lags: range) -> NDArray[np.float64]:
+    """The largest correlation (J,), 0 to 1, of motion (rows, J, C) with other motion, which it follows within
+    so many rows; the components of a vector are added up.
+    """
+    likeness, parts = np.zeros(late.shape[1]), late.shape[2]
+    late, early = (one.reshape(len(one), -1) for one in (late, early))
+    for lag in lags:
+        weights, ours, theirs = _WINDOW[: len(late) - lag], late[: len(late) - lag], early[lag:]
+        weighted, total = weights[:, None] * ours, weights.sum()
+        mean, beside = weighted.sum(axis=0), weights @ theirs
+        both = np.einsum("rj,rj->j", weighted, theirs) - mean * beside / total
+        own = np.einsum("rj,rj->j", weighted, ours) - mean**2 / total
+        other = weights @ theirs**2 - beside**2 / total
+        both, own, other = (one.reshape(-1, parts).sum(axis=1) for one in (both, own, other))
+        sizes = np.sqrt(np.maximum(own * other, 0.0))
+        likeness = np.maximum(likeness, both / np.maximum(sizes, 1e-6))
+    return np.asarray(np.minimum(likeness, 1.0))
 
 
 def _moves(speeds: Floats) -> NDArray[np.float64]:

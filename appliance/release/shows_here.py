@@ -32,7 +32,7 @@ def shows_here(chosen: Path | None, danced: Path | None, learned: Path | None) -
             others.append({"id": str(folder), "name": name, "since": since, "danced": folder == danced})
     seen: set[bytes | str] = set()
     found = []
-    # Of two with the same content, the one on the stage is listed.
+    # Where two have the same content, the one on the stage is listed.
     for one in sorted(others, key=lambda one: not one["danced"]):
         if (mark := _mark(Path(one["id"]))) not in seen:
             seen.add(mark)

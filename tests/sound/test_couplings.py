@@ -28,7 +28,7 @@ TICK_S, BLOCK = 0.02, 960
 Fill = Callable[[JointFrame, int], None]
 
 
-def wandering(seed: int, ticks: int = 150) -> np.ndarray:
+def wandering(seed: int, ticks: int = 220) -> np.ndarray:
     """Joints (N, J, 3) that wander in bursts, each by itself and in its own rhythm, about a still root."""
     random = np.random.default_rng(seed)
     joints = len(FIGURE)
@@ -50,8 +50,8 @@ def coupled_shares(first: np.ndarray, second: np.ndarray, holds: Any = 0.0) -> n
         puppets[0].holds[:] = holds
         couplings.look(JointFrame(puppets, tick, tick * TICK_S))
         shares.append(couplings.shares)
-    assert not np.any(shares[:50]), "before a trail is long enough, chance looks like a coupling"
-    return np.asarray(np.mean(shares[60:], axis=0))
+    assert not np.any(shares[:110]), "before a trail is long enough, chance looks like a coupling"
+    return np.asarray(np.mean(shares[125:], axis=0))
 
 
 def test_figures_that_move_alike_are_coupled_and_strangers_and_one_who_stands_are_not() -> None:
@@ -63,6 +63,14 @@ def test_figures_that_move_alike_are_coupled_and_strangers_and_one_who_stands_ar
     strangers = np.mean([coupled_shares(wandering(seed), wandering(seed + 50))[1:] for seed in seeds])
     assert alike > 0.4 and strangers < 0.4 * alike
     assert not coupled_shares(wandering(1), np.zeros_like(wandering(1))).any()
+
+
+def test_two_who_travel_together_are_coupled_and_two_with_only_the_rhythm_of_speeds_are_not() -> None:
+    dance = wandering(2)
+    path = np.repeat(dance[:, 3:4], len(FIGURE), axis=1)
+    together = coupled_shares(path, path + np.float32([1.0, 0.0, 0.0]))
+    assert together.min() > 0.4, "nothing moves about the root"
+    assert coupled_shares(dance, -dance).max() < 0.1 * together.min(), "as fast at each moment, the other way"
 
 
 def test_a_limb_that_follows_the_hand_is_coupled_and_the_hand_by_itself_is_not() -> None:
