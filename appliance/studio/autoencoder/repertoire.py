@@ -34,7 +34,7 @@ class Nearness:
     `hand_degrees`, halved, and the squared chord between their changes times `hand_change`.
     """
 
-    searched: int = 12_000  # windows at most, evenly spaced: always the same ones, for one answer
+    searched: int = 6_000  # windows at most, evenly spaced: always the same ones, for one answer
     change: float = 1.5
     bandwidth: float = 0.35  # smaller: nearer to single recorded windows, and rougher
     hand_degrees: float = 12.0
@@ -64,17 +64,17 @@ class Repertoire:
     def _answer(self, windows: Tensor, hands: Tensor, held: Tensor, takes: Tensor) -> Tensor:
         answer = windows
         for _ in range(self._nearness.steps):
-            there = self._mean(answer, hands, held, takes)
-            here = self._mean(answer, answer, held, takes)
+            free = self._distance_of_the_free(answer, held) / self._nearness.bandwidth
+            there = self._mean(free, hands, held, takes)
+            here = self._mean(free, answer, held, takes)
             own = rotation.multiply(rotation.inverse(here), answer)
             answer = rotation.normalize(rotation.multiply(there, own))
         is_held = (held > 0).to(answer.dtype)[:, None, :, None].expand_as(answer[..., :1])
         return slerp_towards(answer, hands, is_held)
 
-    def _mean(self, windows: Tensor, hands: Tensor, held: Tensor, takes: Tensor) -> Tensor:
-        """(L, T, M, 4): mean of the recorded windows near windows, with the joints held as in hands."""
-        near = self._nearness
-        cost = self._distance_of_the_free(windows, held) / near.bandwidth
+    def _mean(self, free: Tensor, hands: Tensor, held: Tensor, takes: Tensor) -> Tensor:
+        """(L, T, M, 4): mean of the recorded windows near by `free` (L, N), with joints held as in hands."""
+        cost = free.clone()
         self._add_distance_of_the_held(cost, hands, held)
         cost.masked_fill_(takes[:, None] == self._takes, _FAR)
         share = torch.softmax(cost.amin(dim=1, keepdim=True) - cost, dim=-1)
