@@ -19,6 +19,8 @@ from appliance.studio.autoencoder.training import Report, Training
 from appliance.studio.data.dataset import window_starts
 from appliance.studio.evaluation.coders import TorchCoder
 from appliance.studio.evaluation.pictures import draw_losses, draw_reconstruction
+from appliance.studio.training_loop import Report as AnyReport
+from appliance.studio.training_loop import TrainingLoop
 
 LOSSES_PICTURE = Path("pictures") / "losses.png"
 REPORT_S = 30.0  # measuring on held-out takes costs a large LSTM seconds
@@ -32,49 +34,20 @@ class TrainingRun:
         self.training, self.folder, self.console = training, folder, console
         self.checkpoint = folder / "checkpoint.pt"
         self._strip_at: float | None = None
-        self._line = ""
 
     def run(self) -> bool:
         """Train until done or stopped (Ctrl-C, SIGTERM). True if done; always writes the checkpoint."""
-        with stop_signals() as stop_asked, self._progress() as progress:
-            self.console.print("Ctrl-C stops without losing anything.")
-            bar = progress.add_task("training", total=1.0, message="")
-            steps_at_start, began = self.training.step, time.monotonic()
-
-            def stop() -> bool:
-                done = self.training.step - steps_at_start
-                if done % 10 == 0:
-                    message = self._message(done / max(time.monotonic() - began, 1e-6))
-                    progress.update(bar, completed=self.training.fraction, message=message)
-                return stop_asked()
-
-            self.training.run(self._report, self._save, REPORT_S, stop=stop)
-            progress.update(bar, completed=self.training.fraction)
-        return self.training.fraction >= 1.0
-
-    def _progress(self) -> Progress:
-        message = TextColumn("{task.fields[message]}")
-        columns = [SpinnerColumn(), TextColumn("training"), BarColumn(), TaskProgressColumn(), message]
-        return Progress(*columns, console=self.console, disable=not self.console.is_terminal)
-
-    def _message(self, steps_a_second: float) -> str:
-        left = time_left_s(self.training.seconds, self.training.fraction)
-        return f"{steps_a_second:.1f} steps/s, {_clock(left)} left. {self._line}"
-
-    def _report(self, report: Report) -> None:
-        """Print and store a line of history; draw a filmstrip if one is due."""
-        held = (
-            ""
-            if report.held_out_degrees is None
-            else f"{report.held_out_degrees:.2f} degrees on held-out takes, "
+        return run_shown(
+            self.training, "training", self.console, self._line, self._save, self._keep, REPORT_S
         )
-        parts = [f"{name} {value:.3g}" for name, value in report.losses.items()]
-        self._line = held + ", ".join(parts[:3])
-        if not self.console.is_terminal:
-            self.console.print(
-                f"{100 * report.fraction:5.1f} %  step {report.step}  {held}{', '.join(parts)}",
-                soft_wrap=True,
-            )
+
+    def _line(self, report: Report) -> str:
+        held = report.held_out_degrees
+        off = [] if held is None else [f"{held:.2f} degrees on held-out takes"]
+        return ", ".join([*off, *(f"{name} {value:.3g}" for name, value in report.losses.items())])
+
+    def _keep(self, report: Report) -> None:
+        """Store a line of history; draw a filmstrip if one is due."""
         self._write_history()
         if self._strip_is_due(report):
             self._strip_at = report.fraction
@@ -110,6 +83,49 @@ class TrainingRun:
         partial = self.folder / ".training.json"
         partial.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
         partial.replace(self.folder / "training.json")
+
+
+def run_shown(
+    training: TrainingLoop[AnyReport],
+    name: str,
+    console: Console,
+    line: Callable[[AnyReport], str],
+    save: Callable[[], None],
+    keep: Callable[[AnyReport], None] = lambda report: None,
+    report_every_s: float = 15.0,
+) -> bool:
+    """Train until done or stopped (Ctrl-C, SIGTERM), with a progress bar, or with lines without a terminal.
+
+    line: a report in words; keep: what else is done with it. True if done; `save` is called in any case.
+    """
+    columns = [SpinnerColumn(), TextColumn(name), BarColumn(), TaskProgressColumn()]
+    message = TextColumn("{task.fields[message]}")
+    shown = Progress(*columns, message, console=console, disable=not console.is_terminal)
+    with stop_signals() as stop_asked, shown as progress:
+        console.print("Ctrl-C stops without losing anything.")
+        bar = progress.add_task(name, total=1.0, message="")
+        steps_at_start, began, newest = training.step, time.monotonic(), ""
+
+        def stop() -> bool:
+            done = training.step - steps_at_start
+            if done % 10 == 0:
+                pace = done / max(time.monotonic() - began, 1e-6)
+                left = _clock(time_left_s(training.seconds, training.fraction))
+                said = f"{pace:.1f} steps/s, {left} left. {newest}"
+                progress.update(bar, completed=training.fraction, message=said)
+            return stop_asked()
+
+        def report(one: AnyReport) -> None:
+            nonlocal newest
+            newest = ", ".join(line(one).split(", ")[:4])
+            if not console.is_terminal:
+                said = f"{100 * training.fraction:5.1f} %  step {training.step}  {line(one)}"
+                console.print(said, highlight=False, soft_wrap=True)
+            keep(one)
+
+        training.run(report, save, report_every_s, stop=stop)
+        progress.update(bar, completed=training.fraction)
+    return training.fraction >= 1.0
 
 
 def parameters(network: nn.Module) -> int:

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import torch
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from appliance.dancer.material.improvising import BEFORE, MOVE
 from appliance.dancer.material.steps import ROOT, Steps
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.autoencoder.training_run import stop_signals
+from appliance.studio.autoencoder.training_run import run_shown
 from appliance.studio.data.dataset import Dataset
 from appliance.studio.evaluation.coders import load_puppet
 from appliance.studio.evaluation.pictures import draw_learning
@@ -101,35 +100,15 @@ def train_until_done(training: AnyTraining, file: Path, picture: Path, console: 
         return True
     file.parent.mkdir(parents=True, exist_ok=True)
 
-    with stop_signals() as stop_asked, _progress(console) as progress:
-        bar = progress.add_task("improviser", total=1.0, message="")
+    def save() -> None:
+        training.save_checkpoint(file)
+        if training.history:
+            draw_learning(picture, [asdict(line) for line in training.history])
 
-        def stop() -> bool:
-            progress.update(bar, completed=training.fraction)
-            return stop_asked()
-
-        def report(line: ImproviserReport) -> None:
-            message = _history_line(line)
-            progress.update(bar, completed=line.fraction, message=message)
-            if not console.is_terminal:
-                console.print(f"{100 * line.fraction:5.1f} %  {message}", highlight=False, soft_wrap=True)
-
-        def save() -> None:
-            training.save_checkpoint(file)
-            if training.history:
-                draw_learning(picture, [asdict(line) for line in training.history])
-
-        training.run(report, save, save_every_s=60.0, stop=stop)
-    return training.fraction >= 1.0
-
-
-def _progress(console: Console) -> Progress:
-    columns = [TextColumn("learning to improvise"), BarColumn(), TaskProgressColumn()]
-    message = TextColumn("{task.fields[message]}")
-    return Progress(*columns, message, console=console, disable=not console.is_terminal)
+    return run_shown(training, "learning to improvise", console, _history_line, save)
 
 
 def _history_line(line: ImproviserReport) -> str:
     parts = ", ".join(f"{name} {value:.3g}" for name, value in line.parts.items())
     held = ", ".join(f"{name} {value:.3g}" for name, value in line.held_out.items())
-    return f"step {line.step}  {parts}" + (f"; held-out takes: {held}" if held else "")
+    return parts + (f"; held-out takes: {held}" if held else "")
