@@ -6,10 +6,13 @@ import contextlib
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from typing import IO
 
 from appliance.box.parent_death import PARENT
+
+BUNRAKU = (sys.executable, "-m", "appliance.cli")
 
 _KILLED_WITHIN_S = 1.0
 
@@ -17,6 +20,23 @@ _KILLED_WITHIN_S = 1.0
 def environment(base: Mapping[str, str] = os.environ, **more: str) -> dict[str, str]:
     """The environment of a child that ends when this process does."""
     return {**base, PARENT: str(os.getpid()), **more}
+
+
+def finished(
+    command: Sequence[str], within_s: float | None = None, env: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """A command that has ended, with its output. One that cannot be run or takes longer has a status other
+    than 0, and the reason as its errors.
+    """
+    try:
+        return subprocess.run(
+            command, capture_output=True, text=True, errors="replace", timeout=within_s, env=env, check=False
+        )
+    except subprocess.TimeoutExpired:
+        status, why = os.EX_TEMPFAIL, f"{command[0]}: it took longer than {within_s:g} s"
+    except OSError as error:
+        status, why = os.EX_UNAVAILABLE, f"{command[0]}: {error.strerror}"
+    return subprocess.CompletedProcess(command, status, "", why)
 
 
 def start_child(

@@ -25,6 +25,7 @@ from appliance.cli.examples import ORDER, SYNONYMS  # noqa: E402
 from appliance.cli.help_page import complete_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
 from appliance.options.idle_options import refuse_idle  # noqa: E402
+from appliance.pose.correctable_error import CorrectableError  # noqa: E402
 from appliance.pose.file_trouble import sentence  # noqa: E402
 from appliance.show.config_error import ConfigError, Problem, nearest  # noqa: E402
 
@@ -236,7 +237,7 @@ def _require_known(given: Sequence[str], commands: Sequence[str]) -> None:
 
 def refuse(error: Exception) -> NoReturn:
     """Exit with one clear line for an error that the user can correct; raise any other."""
-    message = str(error) if _is_correctable(error) else None
+    message = str(error) if isinstance(error, CorrectableError) else None
     if isinstance(error, OSError):
         message = sentence(error)
     if message is None:
@@ -258,18 +259,6 @@ def plug_ins(found: Iterable[EntryPoint]) -> list[typer.Typer]:
             message = f"bunraku: the commands of '{point.name}' are not available here ({error})."
             print(message, file=sys.stderr)
     return loaded
-
-
-def _is_correctable(error: Exception) -> bool:
-    if isinstance(error, ConfigError):  # what a power-on ends with where nothing is asked for: at once
-        return True
-    from appliance.box.runtime_folder import RuntimeFolderError
-    from appliance.exchange.exchange_error import ExchangeError
-    from appliance.pose.bvh import BvhError
-    from appliance.recorder.journal_error import JournalError
-    from appliance.stage.stage_error import StageError
-
-    return isinstance(error, BvhError | ExchangeError | JournalError | RuntimeFolderError | StageError)
 
 
 if __name__ == "__main__":

@@ -67,17 +67,11 @@ def reported(box: Path | None, chosen: Path | None) -> dict[str, Any]:
 
 def _receivers(config: BoxConfig) -> dict[str, Any]:
     """OSC receivers as the file has them; those built in where it lists none."""
-    written = _at(config.file.values, "outputs", "osc")
+    written = config.file.at("outputs", "osc")
     if isinstance(written, list):
         return {"receivers": [one for one in written if isinstance(one, dict)], "receivers_written": True}
     reported = [{"host": one.host, "port": one.port} for one in config.outputs.osc]
     return {"receivers": reported, "receivers_written": False}
-
-
-def _at(values: Any, *steps: str) -> Any:
-    for step in steps:
-        values = values.get(step) if isinstance(values, dict) else None
-    return values
 
 
 def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, Any]:

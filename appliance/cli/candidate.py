@@ -10,13 +10,10 @@ from appliance.box.realtime import prepare_environment
 
 prepare_environment()
 
-from appliance.box.runtime_folder import RuntimeFolderError  # noqa: E402
 from appliance.cli.check import verified_parts  # noqa: E402  (numpy must find the environment prepared)
 from appliance.cli.prepare_show import prepare_show  # noqa: E402
 from appliance.cli.run_with_timeout import limit_memory  # noqa: E402
-from appliance.pose.bvh import BvhError  # noqa: E402
-from appliance.show.config_error import ConfigError  # noqa: E402
-from appliance.stage.stage_error import StageError  # noqa: E402
+from appliance.pose.correctable_error import CorrectableError  # noqa: E402
 
 
 def main(show: str, box: str) -> int:
@@ -29,7 +26,7 @@ def main(show: str, box: str) -> int:
     limit_memory()
     try:
         _, verdict = verified_parts(Path(show), Path(box))
-    except (BvhError, ConfigError, RuntimeFolderError, StageError) as error:
+    except CorrectableError as error:
         print(error, file=sys.stderr)
         return 1
     except MemoryError:

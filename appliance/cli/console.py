@@ -99,8 +99,8 @@ def _void_phones(box: Path | None) -> None:
     from appliance.release.installed_box import box_here
     from appliance.show.box import load_box
 
-    with contextlib.suppress(OSError, StageError):  # no box runs here: its phones are gone with it
-        folder = runtime_of(load_box(box_here(box)))
+    with contextlib.suppress(OSError, RuntimeFolderError):  # no box runs here: its phones are gone with it
+        folder = runtime_folder(load_box(box_here(box)))
         if (folder / FILE).is_file():
             JoinCodes(folder).void()
 
@@ -137,7 +137,7 @@ def phone(
     from appliance.release.installed_box import box_here
     from appliance.show.box import load_box
 
-    folder = runtime_of(load_box(box_here(box)))
+    folder = runtime_folder(load_box(box_here(box)))
     codes = JoinCodes(folder)
     names = codes.names
     chosen = names[0] if name is None and len(names) == 1 else name
@@ -161,14 +161,14 @@ def card_lines(box: BoxConfig) -> tuple[str, ...]:
     """For the projector's test card: the page's address and PIN, the box's own Wi-Fi, a fault of it."""
     wifi = _network_lines(box) + wifi_lines(box)
     try:
-        devices, host, port, https = (runtime_of(box) / WHERE).read_text().splitlines()
-        code = pending_code(runtime_of(box))
+        devices, host, port, https = (runtime_folder(box) / WHERE).read_text().splitlines()
+        code = pending_code(runtime_folder(box))
         update = (f"update code {code}",) if code else ()
         at = address(host, int(port), bool(https))
         name = "" if is_loopback(host) else name_in_network()
         named = (f"or {address(name, int(port), bool(https))}",) if name else ()
         return f"page {at}", *named, f"pin {Devices(Path(devices)).pin}", *update, *wifi
-    except (OSError, ValueError, StageError):
+    except (OSError, ValueError, RuntimeFolderError):
         return wifi
 
 
@@ -189,8 +189,8 @@ def _network_lines(box: BoxConfig) -> tuple[str, ...]:
 
 def _left(box: BoxConfig, name: str) -> str:
     try:
-        return (runtime_of(box) / name).read_text("utf-8", "replace")
-    except (OSError, StageError):
+        return (runtime_folder(box) / name).read_text("utf-8", "replace")
+    except (OSError, RuntimeFolderError):
         return ""
 
 
@@ -205,7 +205,7 @@ def console_command(
     """How to start the page of a box whose port is open. control: where commands arrive in fact; journal:
     where one is kept in fact; chosen: what the preflight chose, on an installed box.
 
-    Raises StageError.
+    Raises RuntimeFolderError.
     """
     from appliance.show.console import ConsoleConfig
 
@@ -214,7 +214,7 @@ def console_command(
         control = own.host, own.port
     if control is not None and control[0] == "0.0.0.0":
         control = "127.0.0.1", control[1]
-    folder = runtime_of(box)
+    folder = runtime_folder(box)
     with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as opened:
         host, port = opened.getsockname()[:2]
         (folder / WHERE).write_text(f"{devices}\n{host}\n{port}\n{'https' * console.https}\n")
@@ -260,7 +260,7 @@ def page_companion(
     rehearsal: PIN and devices are not the venue's; they stay until the machine is off.
     """
     heard_on = None if control is None else control.getsockname()
-    devices = runtime_of(box) / _DEVICES if rehearsal else devices_file(box)
+    devices = runtime_folder(box) / _DEVICES if rehearsal else devices_file(box)
     command = console_command(box, page.fileno(), devices, heard_on, journal)
     try:
         https = box.console is not None and box.console.https
@@ -271,7 +271,7 @@ def page_companion(
     else:
         if names := phone_names(box):
             option = "" if box.path is None else f" --box {box.path}"
-            offer_phones(runtime_of(box), origin, names, option, say)
+            offer_phones(runtime_folder(box), origin, names, option, say)
             for line in out_of_phones_reach(box):
                 say(line)
     return Companion(
@@ -285,7 +285,7 @@ def page_companion(
 
 def devices_file(box: BoxConfig) -> Path:
     """The file with PIN and devices: where the box keeps what it learns, else until the machine is off."""
-    return (box.state_folder or runtime_of(box)) / _DEVICES
+    return (box.state_folder or runtime_folder(box)) / _DEVICES
 
 
 def _named(box: BoxConfig, chosen: Path | None) -> dict[str, str]:
@@ -312,15 +312,7 @@ def _devices(box: Path | None) -> Devices:
 def devices_file_made(box: BoxConfig) -> Path:
     """The same as the page that runs here says: in a rehearsal it keeps them elsewhere."""
     path = devices_file(box)
-    with contextlib.suppress(OSError, StageError):  # root does not meet the box's processes
-        reported = Path((runtime_of(box) / WHERE).read_text().partition("\n")[0])
+    with contextlib.suppress(OSError, RuntimeFolderError):  # root does not meet the box's processes
+        reported = Path((runtime_folder(box) / WHERE).read_text().partition("\n")[0])
         path = reported if reported.is_file() else path
     return path
-
-
-def runtime_of(box: BoxConfig) -> Path:
-    """Where the box's processes meet. Raises StageError."""
-    try:
-        return runtime_folder(box)
-    except RuntimeFolderError as error:
-        raise StageError(str(error)) from error

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
+from appliance.box.runtime_folder import runtime_folder
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
 from appliance.sensor.foreign.sources import SourceSettings
@@ -94,14 +94,13 @@ def begin_in(cue: str, show: Show, control: socket.socket | None) -> None:
 
 
 def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
-    """How to start show control for a box whose port is open; `box.control` is there. Raises StageError."""
+    """How to start show control for a box whose port is open; `box.control` is there.
+
+    Raises RuntimeFolderError.
+    """
     control = box.control or ControlConfig()
-    try:
-        folder = runtime_folder(box)
-    except RuntimeFolderError as error:
-        raise StageError(str(error)) from error
     settings = Settings(
-        folder=str(folder),
+        folder=str(runtime_folder(box)),
         descriptor=descriptor,
         senders=tuple(control.senders),
         heartbeat=tuple((one.host, one.port) for one in control.heartbeat),

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from appliance.box.child import end_child, start_child
-from appliance.box.own_command import BUNRAKU
+from appliance.box.child import BUNRAKU, end_child, start_child
 from appliance.cli.distributions import absent_commands
 from appliance.sensor.keys import create_keys
 from appliance.show.box import BoxConfig, UdpConfig

@@ -66,39 +66,32 @@ def _sensors(box: BoxConfig) -> Iterator[str]:
     if udp is not None and udp.port and not is_loopback(udp.host):
         yield f'{_to(udp.host)}udp dport {udp.port} accept comment "sensors"'
     for one in box.sensors.foreign:
-        if one.program is not None and not is_loopback(one.host):
-            where = f"{_to(one.host)}ip saddr {{ {', '.join(one.senders)} }}"
-            yield f'{where} udp dport {one.usual_port} accept comment "{one.name}"'
+        if one.program is not None:
+            yield from _from_senders(one.host, one.senders, one.usual_port, one.name)
 
 
 def _commands(box: BoxConfig) -> Iterator[str]:
     """From the listed senders; with none listed, only from this machine, which needs no rule."""
     control = box.control
-    if control is None or is_loopback(control.host):
-        return
-    if senders := ", ".join(control.senders):
-        yield (
-            f'{_to(control.host)}ip saddr {{ {senders} }} udp dport {control.port} accept comment "commands"'
-        )
+    if control is not None and control.senders:
+        yield from _from_senders(control.host, control.senders, control.port, "commands")
 
 
 def _remote(box: BoxConfig) -> Iterator[str]:
     """Timecode and MIDI, from the listed senders."""
     timecode, network = box.timecode, box.midi and box.midi.network
-    if timecode is not None and timecode.source == "art-net" and not is_loopback(timecode.host):
-        where = f"{_to(timecode.host)}ip saddr {{ {', '.join(timecode.senders)} }}"
-        yield f'{where} udp dport {timecode.port} accept comment "timecode"'
-    if network and not is_loopback(network.host):
-        where = f"{_to(network.host)}ip saddr {{ {', '.join(network.senders)} }}"
-        yield f'{where} udp dport {network.port}-{network.port + 1} accept comment "MIDI"'
+    if timecode is not None and timecode.source == "art-net":
+        yield from _from_senders(timecode.host, timecode.senders, timecode.port, "timecode")
+    if network:
+        ports = f"{network.port}-{network.port + 1}"
+        yield from _from_senders(network.host, network.senders, ports, "MIDI")
 
 
 def _pair(box: BoxConfig) -> Iterator[str]:
     """The other box of a pair, and boxes in step."""
     pair = box.pair
-    if pair is not None and not is_loopback(pair.host):
-        where = f"{_to(pair.host)}ip saddr {{ {', '.join(pair.peer)} }}"
-        yield f'{where} udp dport {pair.port} accept comment "the other box"'
+    if pair is not None:
+        yield from _from_senders(pair.host, pair.peer, pair.port, "the other box")
     locked = box.locked
     if locked is not None and not is_loopback(locked.host):
         for host, port in locked.ends:
@@ -124,6 +117,13 @@ def _own_network(access_points: Sequence[str]) -> Iterator[str]:
     for card in access_points:
         yield f'iifname "{card}" udp dport 67 accept comment "addresses for sensors"'
         yield f'iifname "{card}" udp dport 53 accept comment "names for sensors"'
+
+
+def _from_senders(host: str, senders: Sequence[str], ports: int | str, what: str) -> Iterator[str]:
+    """Datagrams of these senders to this address; nothing where it is inside this machine."""
+    if not is_loopback(host):
+        where = f"{_to(host)}ip saddr {{ {', '.join(senders)} }}"
+        yield f'{where} udp dport {ports} accept comment "{what}"'
 
 
 def _to(host: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 import tempfile
 import time
 import zipfile
@@ -14,8 +13,7 @@ from typing import Any
 
 import yaml
 
-from appliance.box.child import environment
-from appliance.box.own_command import BUNRAKU
+from appliance.box.child import BUNRAKU, environment, finished
 from appliance.recorder.export import export_stretch
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import read_journal
@@ -99,17 +97,8 @@ def _hidden(value: Any) -> Any:
 
 def _doctor(box: Path | None) -> str:
     named = () if box is None else ("--box", str(box))
-    try:
-        done = subprocess.run(
-            [*BUNRAKU, "doctor", *named],
-            capture_output=True,
-            text=True,
-            timeout=_DOCTOR_WITHIN_S,
-            env=environment(COLUMNS="120", NO_COLOR="1"),
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return f"The doctor gave no report: {type(error).__name__}.\n"
+    env = environment(COLUMNS="120", NO_COLOR="1")
+    done = finished((*BUNRAKU, "doctor", *named), _DOCTOR_WITHIN_S, env)
     return without_secrets(done.stdout + done.stderr)
 
 

@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from appliance.box.child import finished
 from appliance.box.durable import write_whole
 from appliance.release.choice import RUN
 from appliance.release.wifi import NAME, PROFILE, WifiFile, is_filled_in, profile, read_wifi, unescaped
@@ -42,7 +43,7 @@ class Places(NamedTuple):
     cards: Path = Path("/sys/class/net")
 
 
-Run = Callable[[Sequence[str]], "subprocess.CompletedProcess[str]"]
+Run = Callable[[Sequence[str]], subprocess.CompletedProcess[str]]
 Wait = Callable[[float], None]
 NameBox = Callable[[str], None]
 
@@ -154,22 +155,15 @@ def _made(places: Places, wifi: WifiFile, card: str, is_new: bool, run: Run) -> 
     return "" if done.returncode == 0 else done.stderr.strip() or "The access point did not start."
 
 
-def _run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    try:
-        return subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
-    except OSError as error:
-        return subprocess.CompletedProcess(command, 1, "", f"{command[0]}: {error.strerror}")
-
-
 def main() -> int:
     """For the unit; the exit status."""
-    return join_wifi(Places(), _run, time.sleep, _name_box)
+    return join_wifi(Places(), finished, time.sleep, _name_box)
 
 
 def _name_box(name: str) -> None:
     with contextlib.suppress(OSError):
         socket.sethostname(name)
-        _run(("busctl", "call", *_AVAHI, "SetHostName", "s", name))
+        finished(("busctl", "call", *_AVAHI, "SetHostName", "s", name))
 
 
 if __name__ == "__main__":

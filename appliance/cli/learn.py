@@ -20,10 +20,10 @@ from typing import Annotated, Any
 
 import typer
 
-from appliance.box.child import end_child, start_child
-from appliance.box.own_command import BUNRAKU
+from appliance.box.child import BUNRAKU, end_child, start_child
 from appliance.box.parent_death import end_with_parent
 from appliance.box.realtime import give_way
+from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.learned import figures_of, sentence_of
 from appliance.cli.options import BoxFile
@@ -68,8 +68,6 @@ def learn(
     ] = None,
 ) -> int:
     """Make a checked show from recordings, unattended: learn tonight, dance tomorrow."""
-    from appliance.cli.console import runtime_of
-
     give_way(nice)
     learning = Learning(out)
     wanted = Wanted(str(recordings.resolve()), minutes)
@@ -77,15 +75,15 @@ def learn(
         raise StageError(f"{out}: other recordings are being learned there. Give another --out.")
     if learning.wanted() is None:
         learning.begin(wanted)
-    with contextlib.suppress(StageError):
-        proving = Proving(runtime_of(load_box(box)))
+    with contextlib.suppress(RuntimeFolderError):
+        proving = Proving(runtime_folder(load_box(box)))
         return Learner(learning, proving.show_goes, box, train or (), _print).run()
     return Learner(learning, lambda: False, box, train or (), _print).run()
 
 
 def main(given: Sequence[str]) -> int:
     """Learn what the page of a box wants; the arguments name the box: `--box FILE` or `--chosen FILE`."""
-    from appliance.cli.console import devices_file_made, runtime_of
+    from appliance.cli.console import devices_file_made
 
     end_with_parent()
     give_way(NICE)
@@ -96,7 +94,7 @@ def main(given: Sequence[str]) -> int:
     if learning.wanted() is None:
         return 0
     try:
-        return Learner(learning, Proving(runtime_of(config)).show_goes, path).run()
+        return Learner(learning, Proving(runtime_folder(config)).show_goes, path).run()
     except Exception as error:
         from appliance.cli.app import refuse
 

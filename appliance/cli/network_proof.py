@@ -10,17 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from appliance.box.runtime_folder import RuntimeFolderError
 from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, limit_memory, run_with_timeout
-from appliance.dancer.puppet import PuppetError, PuppetNetwork
-from appliance.pose.bvh import BvhError
+from appliance.dancer.puppet import PuppetNetwork
+from appliance.pose.correctable_error import CorrectableError
 from appliance.show.check import Finding, not_as_packed, verify_bundle
-from appliance.show.config_error import ConfigError
 from appliance.show.show import Show
 from appliance.stage.stage_error import StageError
 
 ONE_RUN_S = 20.0
-_FOR_PEOPLE = (BvhError, ConfigError, PuppetError, RuntimeFolderError, StageError)
 
 
 def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> str:
@@ -32,7 +29,7 @@ def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> s
         with contextlib.redirect_stdout(io.StringIO()) as output:
             try:
                 do()
-            except _FOR_PEOPLE as found:
+            except CorrectableError as found:
                 error = str(found)
             except MemoryError:
                 error = f"{network}: the show takes more memory than this box has for one. Export it again."

@@ -12,12 +12,11 @@ import typer
 from appliance.box.clock import TICK_S
 from appliance.options.idle_options import refuse_idle
 from appliance.options.reading import OPTIONS, reading_options
-from appliance.pictures.filmstrip import COLUMNS, MissingPicturesError, Strip, draw_filmstrip, draw_strips
+from appliance.pictures.filmstrip import COLUMNS, Strip, draw_filmstrip, draw_strips
 from appliance.pose.file_trouble import sentence
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, read_upright
 from appliance.pose.recording import Recording
-from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
 from appliance.recorder.record import holds_of
 from appliance.show.bundle import named_show
@@ -134,8 +133,6 @@ def draw_dance(dance: RecordedDance, out: Path) -> Path:
             for one, name, held in zip(dance.recordings, dance.names, holds, strict=True)
         ]
         return draw_strips(out, first.skeleton, strips, first.fps, dance.title, COLUMNS, start_s)
-    except MissingPicturesError as error:
-        raise StageError(str(error)) from error
     except OSError as error:
         raise _unwritable(out, error) from error
 
@@ -152,8 +149,6 @@ def render_dance(dance: RecordedDance, out: Path, look: str, show: Path | None) 
         from appliance.projector.strip import render_strip
 
         return render_strip(out, dance.recordings, looks, look, dance.holds)
-    except ProjectorError as error:
-        raise StageError(str(error)) from error
     except OSError as error:
         raise _unwritable(out, error) from error
 

@@ -7,15 +7,17 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from appliance.box.leftovers import forget_run
+from appliance.box.child import BUNRAKU
+from appliance.box.live_pose import forget_live_pose
 from appliance.box.log_writer import SAID, LogWriter
-from appliance.box.own_command import BUNRAKU
+from appliance.box.made_motion import forget_made_motion
 from appliance.box.runtime_folder import restored_file
+from appliance.box.show_state import forget_show_state
 from appliance.box.stop_signals import stop_signals
-from appliance.cli.readings import readings_line
 from appliance.sensor.memory import forget_memory
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path, named_show
@@ -29,6 +31,18 @@ from appliance.stage.stage_error import StageError
 if TYPE_CHECKING:
     from appliance.cli.companions import Companion
     from appliance.outputs.datagram_sender import DatagramSender
+
+_NO_REFUSAL = ("accepted", "hello", "profile", "lost", "reboot", "drain_limit")
+# In a technician's words; a reason that is missing here keeps its name from docs/wire.md.
+_REFUSALS = {
+    "no packets of ours": ("length", "magic", "version", "kind"),
+    "from sensors without a key": ("device",),
+    "forged or damaged": ("tag",),
+    "from an earlier link": ("old_session", "old_hello"),
+    "doubled or too late": ("duplicate", "reordered", "old"),
+    "without an orientation": ("norm",),
+    "damaged on the cable": ("frame_length", "frame_stuffing", "frame_crc"),
+}
 
 PICTURED_MINUTES = 0.5  # a journal for the picture at the end keeps little more than is drawn
 _REHEARSAL = (
@@ -87,7 +101,11 @@ def play_show(
         opened.callback(speaker.close)
         if chosen is not None:
             opened.enter_context(restored_file(chosen))
-        shown = rehearse is not None and _has_display()
+        shown = False
+        if rehearse is not None:
+            from appliance.cli.rehearsal import has_display
+
+            shown = has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
         if cue is not None:
             from appliance.cli.control import begin_in
@@ -168,12 +186,6 @@ def _rehearsal_box(stage: Stage, scratch: Path) -> Path:
     return path
 
 
-def _has_display() -> bool:
-    from appliance.cli.rehearsal import has_display
-
-    return has_display()
-
-
 def _opened(control: ControlConfig, opened: ExitStack) -> socket.socket:
     from appliance.cli.control import open_control_port
 
@@ -209,65 +221,47 @@ def _companions(
             descriptors=(control.fileno(),),
             watchdog_s=WATCHDOG_S["control"],
         )
-    named = () if box.path is None else ("--box", str(box.path))
     if show.motion.made_sources:
-        yield Companion(
-            "The generator",
-            (*BUNRAKU, "generate", *named),
-            "The last phrase plays on.",
-            watchdog_s=WATCHDOG_S["generator"],
-        )
+        yield _companion("generator", "The generator", "The last phrase plays on.", box.path, "generate")
     if box.outputs.dmx and show.lights.fixtures:
-        yield Companion(
-            "The process for the lights",
-            (*BUNRAKU, "lights", *named),
-            "The lights stay as they are for a moment.",
-            watchdog_s=WATCHDOG_S["lights"],
-        )
+        meanwhile = "The lights stay as they are for a moment."
+        yield _companion("lights", "The process for the lights", meanwhile, box.path, "lights")
     if window and show.strings and (box.path is None or box.sound):
-        yield Companion(
-            "The process for the sound",
-            (*BUNRAKU, "sound", *named),
-            "The strings are silent for a moment.",
-            watchdog_s=WATCHDOG_S["sound"],
-        )
+        meanwhile = "The strings are silent for a moment."
+        yield _companion("sound", "The process for the sound", meanwhile, box.path, "sound")
     if box.timecode is not None or box.midi is not None or box.hours is not None:
-        yield Companion(
-            "The process for timecode and MIDI",
-            (*BUNRAKU, "remote", *named),
-            "Cues wait for a GO by hand.",
-            watchdog_s=WATCHDOG_S["remote"],
-        )
+        meanwhile = "Cues wait for a GO by hand."
+        yield _companion("remote", "The process for timecode and MIDI", meanwhile, box.path, "remote")
     if window:
-        yield Companion(
-            "The projector",
-            (*BUNRAKU, "project", *named, "--window"),
-            "The picture is black for a moment.",
-            may_close=True,
-            watchdog_s=WATCHDOG_S["projector"],
-        )
+        meanwhile = "The picture is black for a moment."
+        projector = _companion("projector", "The projector", meanwhile, box.path, "project", "--window")
+        yield replace(projector, may_close=True)
+
+
+def _companion(process: str, name: str, meanwhile: str, box: Path | None, *command: str) -> Companion:
+    """A command of `bunraku` beside the stage."""
+    from appliance.box.notify import WATCHDOG_S
+    from appliance.cli.companions import Companion
+
+    named = () if box is None else ("--box", str(box))
+    return Companion(name, (*BUNRAKU, *command, *named), meanwhile, watchdog_s=WATCHDOG_S[process])
 
 
 def _forget_run(stage: Stage) -> None:
     """After a clean end the next show starts from its beginning."""
-    forget_run(stage.sharing.folder)
+    folder = stage.sharing.folder
+    forget_show_state(folder)
+    forget_live_pose(folder)
+    forget_made_motion(folder)
     if stage.box.state_folder is not None:
         forget_memory(stage.sharing.noted, stage.box.state_folder)
 
 
 def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Companion:
     """The process that writes the journal, the checkpoint and the sensors' memory to the disk."""
-    from appliance.box.notify import WATCHDOG_S
-    from appliance.cli.companions import Companion
-
-    named = () if box_file is None else ("--box", str(box_file))
     recording = () if journal is None else ("--journal", str(journal), "--minutes", str(minutes))
-    return Companion(
-        "The keeper",
-        (*BUNRAKU, "keep", *named, *recording),
-        "Meanwhile the journal waits in memory.",
-        watchdog_s=WATCHDOG_S["keeper"],
-    )
+    meanwhile = "Meanwhile the journal waits in memory."
+    return _companion("keeper", "The keeper", meanwhile, box_file, "keep", *recording)
 
 
 def _new_folder(journal: Path) -> Path:
@@ -326,3 +320,16 @@ def _conclusion(stage: Stage) -> list[str]:
     if stage.parts.worn:
         lines.append(readings_line(stage.parts.link.counts))
     return lines
+
+
+def readings_line(counts: dict[str, int]) -> str:
+    """Counts of the sensors' packets: accepted, lost, refused by reason."""
+    meanings = {reason: meaning for meaning, reasons in _REFUSALS.items() for reason in reasons}
+    refused: dict[str, int] = {}
+    for reason, count in counts.items():
+        if count and reason not in _NO_REFUSAL:
+            said = meanings.get(reason, reason)
+            refused[said] = refused.get(said, 0) + count
+    lost = f", {counts['lost']} lost on the way" if counts["lost"] else ""
+    reasons = ", ".join(f"{count} {said}" for said, count in refused.items())
+    return f"Readings: {counts['accepted']} accepted{lost}" + (f"; refused: {reasons}." if refused else ".")

@@ -18,9 +18,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from appliance.box.child import end_child, start_child
-from appliance.box.own_command import BUNRAKU
+from appliance.box.child import BUNRAKU, end_child, start_child
 from appliance.box.parent_death import end_with_parent
+from appliance.box.runtime_folder import runtime_folder
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.doctor.finding import for_phone
 from appliance.console.proofs import FOLDER, Proofs
@@ -39,7 +39,7 @@ _ENDED = "It was ended before its end. Nothing was kept."
 
 def main(given: Sequence[str]) -> int:
     """Prove what the page of a box wants; the arguments name the box: `--box FILE` or `--chosen FILE`."""
-    from appliance.cli.console import devices_file_made, runtime_of
+    from appliance.cli.console import devices_file_made
 
     end_with_parent()
     named = {name: Path(path) for name, path in zip(given[::2], given[1::2], strict=True)}
@@ -47,7 +47,7 @@ def main(given: Sequence[str]) -> int:
     try:
         path = box_of(named.get("--box"), chosen)
         config = load_box(path)
-        return prove(runtime_of(config), Proofs(devices_file_made(config).parent / FOLDER), path, chosen)
+        return prove(runtime_folder(config), Proofs(devices_file_made(config).parent / FOLDER), path, chosen)
     except Exception as error:
         from appliance.cli.app import refuse
 

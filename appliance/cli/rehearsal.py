@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from appliance.box.own_command import BUNRAKU
+from appliance.box.child import BUNRAKU, finished
 from appliance.show.look import looks_by_name
 from appliance.show.show import Show
 
@@ -63,12 +62,7 @@ def _render(journal: Path, out: Path, show: Path, look: str, start_s: float) -> 
         *(*BUNRAKU, "filmstrip", str(journal), "--out", str(out)),
         *("--start", str(start_s), "--seconds", str(PICTURED_S), "--look", look, "--show", str(show)),
     ]
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_RENDERED_WITHIN_S, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return f"it took longer than {_RENDERED_WITHIN_S:g} s."
+    done = finished(command, _RENDERED_WITHIN_S)
     if done.returncode == 0:
         return None
     said = done.stderr.strip().splitlines()

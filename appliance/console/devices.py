@@ -73,13 +73,12 @@ class Devices:
         """Remember one more device; its token. A disk that does not take it shuts nobody out."""
         token = secrets.token_hex(32)
         others = self.devices[-(MOST_DEVICES - 1) :]
-        self._keep(self._pin, (*others, Device(secrets.token_hex(4), name, _digest(token), time.time())))
+        self._keep(self._pin, (*others, Device(secrets.token_hex(4), name, digest(token), time.time())))
         return token
 
     def known(self, token: str) -> Device | None:
-        """The device with this token."""
-        digest = _digest(token)
-        return next((one for one in self.devices if secrets.compare_digest(one.digest, digest)), None)
+        given = digest(token)
+        return next((one for one in self.devices if secrets.compare_digest(one.digest, given)), None)
 
     def revoke(self, device_id: str) -> bool:
         """Whether there was such a device; it needs the PIN again."""
@@ -177,5 +176,6 @@ def new_pin(digits: int = DIGITS) -> str:
     return f"{secrets.randbelow(10**digits):0{digits}}"
 
 
-def _digest(token: str) -> str:
+def digest(token: str) -> str:
+    """A secret is kept as this: it opens nothing."""
     return hashlib.sha256(token.encode(errors="replace")).hexdigest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import secrets
 from collections.abc import Iterable
@@ -10,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from appliance.box.record import WholeFile
+from appliance.console.devices import digest
 from appliance.pose.foreign_file import plain_json
 
 FILE = "console.phones"  # in the runtime folder: a phone joins anew after the machine was off
@@ -72,14 +72,14 @@ class JoinCodes:
         if not secrets.compare_digest(code.encode(errors="replace"), found.code.encode()):
             return ""
         token = secrets.token_hex(16)
-        self._write(self._of | {name: _Admission(name, digest=_digest(token))})
+        self._write(self._of | {name: _Admission(name, digest=digest(token))})
         return token
 
     def is_pass(self, name: str, token: str) -> bool:
         """Whether a phone used this sensor's last code and got this pass."""
         self._look()
         found = self._of.get(name)
-        return found is not None and secrets.compare_digest(found.digest, _digest(token))
+        return found is not None and secrets.compare_digest(found.digest, digest(token))
 
     def _look(self) -> None:
         """Read the file again where it has changed; a spoilt one counts as empty."""
@@ -95,7 +95,3 @@ class JoinCodes:
     def _write(self, found: dict[str, _Admission]) -> None:
         self._file.write(json.dumps([asdict(one) for one in found.values()]).encode())
         self._of, self._changed = found, self._path.stat().st_mtime_ns
-
-
-def _digest(token: str) -> str:
-    return hashlib.sha256(token.encode(errors="replace")).hexdigest()

@@ -10,7 +10,7 @@ from typing import Any
 
 from aiohttp import web
 
-from appliance.box.own_command import BUNRAKU
+from appliance.box.child import BUNRAKU
 from appliance.console.body import said
 from appliance.console.stage_view import StageView
 
@@ -28,7 +28,6 @@ class SensorChanges:
         self._changing = asyncio.Lock()
 
     def routes(self) -> list[web.RouteDef]:
-        """Where browsers ask."""
         return [web.post("/api/sensors", self.change)]
 
     async def change(self, request: web.Request) -> web.StreamResponse:

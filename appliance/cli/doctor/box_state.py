@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import datetime
-import shutil
-import subprocess
 from collections.abc import Iterator
 
+from appliance.box.child import finished
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
 from appliance.cli.doctor.host_view import HostView
 from appliance.release.choice import CHOSEN, RUN
@@ -86,19 +85,8 @@ def units(host: HostView) -> Iterator[Finding]:
 
 
 def _systemd_properties(*patterns: str) -> list[dict[str, str]]:
-    if shutil.which("systemctl") is None:
-        return []
     properties = "--property=Id,ActiveState,SubState,NRestarts,Result"
-    try:
-        done = subprocess.run(
-            ["systemctl", "show", properties, *patterns],
-            capture_output=True,
-            text=True,
-            timeout=_ASK_S,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return []
+    done = finished(("systemctl", "show", properties, *patterns), _ASK_S)
     blocks = [block for block in done.stdout.split("\n\n") if block.strip()]
     return [dict(line.split("=", 1) for line in block.splitlines() if "=" in line) for block in blocks]
 

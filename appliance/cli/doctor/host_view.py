@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
-import subprocess
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from appliance.box.child import finished
 from appliance.box.fallback import Fallen, fallen
 from appliance.box.mounts import Mount, mounts
 from appliance.box.process_health import Member, ProcessHealth
@@ -116,10 +115,4 @@ def running_stage(box: BoxConfig) -> RunningStage | None:
 
 def output_of(*command: str) -> str:
     """The output of a program on this machine; "" if it is missing or does not answer."""
-    if shutil.which(command[0]) is None:
-        return ""
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_ASK_S, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return done.stdout
+    return finished(command, _ASK_S).stdout

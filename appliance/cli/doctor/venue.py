@@ -86,7 +86,7 @@ def _links(folder: Path) -> Iterator[str]:
 def network(host: HostView) -> Iterator[Finding]:
     """Is any network there?"""
     names = [card.parent.name for card in host.found("/sys/class/net/*/carrier")]
-    cards = [name for name in names if name != "lo" and _is_card(host, name)]
+    cards = [name for name in names if host.at(f"/sys/class/net/{name}/device").exists()]  # hardware
     connected = [name for name in cards if host.text(f"/sys/class/net/{name}/carrier") == "1"]
     if connected:
         yield ok("network", f"{', '.join(connected)}: connected.")
@@ -96,11 +96,6 @@ def network(host: HostView) -> Iterator[Finding]:
             f"{', '.join(cards)}: nothing is connected. Sensors by Wi-Fi and receivers miss the box.",
             "Plug in the router, and look at the lamps of both sockets.",
         )
-
-
-def _is_card(host: HostView, name: str) -> bool:
-    """Whether it is hardware, not made by a program."""
-    return host.at(f"/sys/class/net/{name}/device").exists()
 
 
 def radios(host: HostView) -> Iterator[Finding]:

@@ -23,12 +23,11 @@ from appliance.cli.sensors.worn import worn_sensors
 from appliance.sensor.provisioning.provisioning import (
     DEFAULT_PORT,
     Provisioned,
-    ProvisioningError,
     Settings,
     provision,
 )
-from appliance.sensor.provisioning.serial_ports import NoWearableError, found_ports, only_wearable
-from appliance.sensor.provisioning.wearable_console import ConsoleError, WearableConsole
+from appliance.sensor.provisioning.serial_ports import found_ports, only_wearable
+from appliance.sensor.provisioning.wearable_console import WearableConsole
 from appliance.show.box import out_of_reach
 from appliance.stage.stage_error import StageError
 
@@ -69,8 +68,6 @@ def provision_sensor(
                 settings = replace(settings, password=_ask_password(settings.network))
             with console.status(f"Asking {escape(device)}"):
                 done = provision(cable, box_keys.keys, settings, say, takes_over, () if anyway else worn)
-    except (ConsoleError, NoWearableError, ProvisioningError) as error:
-        raise StageError(str(error)) from None
     except KeyboardInterrupt:
         raise StageError(
             f"Stopped half-way: {box_keys.keys} was not changed, and the wearable may have its new key. "
