@@ -58,7 +58,7 @@ def played(
         if is_heard:
             sound.append(made.render(SOUND.block)[:, 0])
         made._strikes[:] = 0.0
-    return np.concatenate(sound or [np.zeros(0)]), float(np.mean(shares)), strikes
+    return np.concatenate(sound or [np.zeros(0, np.float32)]), float(np.mean(shares)), strikes
 
 
 def pairs(couples: Sequence[tuple[Floats, Floats]]) -> Iterator[tuple[str, list[tuple[Floats, Floats]], str]]:
@@ -85,7 +85,8 @@ def main() -> None:
     print("|---|---|---|")
     heard = {}
     for name, who, of in pairs(couples):
-        heard[name], *_ = played(dataset.skeleton, *who[0], of, True) if len(sys.argv) > 2 else (np.zeros(0),)
+        if len(sys.argv) > 2:
+            heard[name], *_ = played(dataset.skeleton, *who[0], of, True)
         found = [played(dataset.skeleton, one, two, of, False) for one, two in who]
         minutes = sum(min(len(one), len(two)) for one, two in who) / FPS / 60
         struck = sum(strikes for *_, strikes in found) / minutes
