@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
+import importlib
 import itertools
 import os
 import random
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +48,7 @@ def pytest_configure(config: pytest.Config) -> None:
     report = figures_report.FiguresReport(ROOT / "build" / "boot")
     config.pluginmanager.register(report, figures_report.NAME)
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process compiles all modules
+    sys.dont_write_bytecode = False  # this process too: rewriting assertions is most of a collection's time
     worker = os.environ.get("PYTEST_XDIST_WORKER")
     if worker:
         gc.disable()  # until all tests are collected: what is loaded by then stays
@@ -52,6 +56,19 @@ def pytest_configure(config: pytest.Config) -> None:
         first, step = int(worker.removeprefix("gw")), int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
         hw_sim.peers.PORTS = hw_sim.peers.PORTS[first::step]
         os.environ["BUNRAKU_PORTS"] = f"{first}:{step}"  # for the processes that it starts
+        if [Path(one).resolve() for one in config.args] == [ROOT / "tests"]:
+            load_share(first, step)
+
+
+def load_share(first: int, step: int) -> None:
+    """Load a worker's share of the test modules before it collects all of them.
+
+    Most of that time in a fresh checkout is the rewriting of assertions, which is saved for whoever loads the
+    module next. Without shares each worker would rewrite all of them at the same time.
+    """
+    for path in sorted((ROOT / "tests").rglob("test_*.py"))[first::step]:
+        with contextlib.suppress(Exception, pytest.skip.Exception):  # the collection reports it
+            importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -91,6 +91,7 @@ def test_recordings_from_the_browser_are_learned_from_another_show(
     wait_until(lambda: learning.wanted() is not None)
     assert learning.wanted() == Wanted(str(folder), 60.0, "martial")
     press(tab, "#learn-end")
+    wait_until(lambda: learning.wanted() is None, "it goes on in the next test")
 
 
 def test_what_is_uploaded_is_bounded_and_a_recording(venue: tuple[Box, Page], kept: Path) -> None:
