@@ -33,6 +33,7 @@ BENDS: dict[str, dict[str, tuple[tuple[int, int, int], float]]] = {  # joint: ax
     "arm up": {"lShldr": ((0, 0, 1), 62), "lCollar": ((0, 0, 1), 22)},
     "arm down": {"lShldr": ((0, 0, 1), -72)},
     "thigh up, knee bent by 120": {"lThigh": ((1, 0, 0), -95), "lShin": ((1, 0, 0), 120)},
+    "thigh to the side by 60": {"lThigh": ((0, 0, 1), 60)},
     "head back": {"head": ((1, 0, 0), -38), "neck": ((1, 0, 0), -22)},
     "trunk twisted by 60": {"abdomen": ((0, 1, 0), 25), "chest": ((0, 1, 0), 35)},
 }

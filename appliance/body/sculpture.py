@@ -216,8 +216,8 @@ def _limb(anatomy: Anatomy, trunk: int, first: int) -> tuple[Group, list[Step]]:
 
 
 def _hip(anatomy: Anatomy, thigh: int, shank: int) -> Slab:
-    """What moves the skin with a thigh, instead of its flesh: behind and above the joint, so that the skin
-    stretched by a bend is as far from the joint as the skin that the bend folds, and volume is kept."""
+    """The volume that moves the skin with a thigh, instead of the flesh: behind and above the joint. A bend
+    then stretches skin as far from the joint as the skin that it folds, and volume is kept."""
     height = anatomy.height
     start = anatomy.positions[thigh] + height * (0.030 * _UP - 0.028 * anatomy.forward)
     return cone(anatomy, thigh, start, anatomy.positions[shank], (0.05 * height, 0.04 * height), 0.0)

@@ -134,7 +134,7 @@ def sunk(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> tuple[
         for _ in range(SINKINGS):
             values[moves] = values[around[:, moves]].mean(axis=0)
     away, calm = np.zeros_like(positions), normals.copy()
-    alike = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)  # of the normals: small around a finger
+    alike = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)  # the length is small around a finger
     whole = np.clip((alike - THIN) / (FLAT - THIN), 0.0, 1.0)
     away[chosen] = whole * (values[:, :3] - positions[chosen])
     mixed = (1.0 - whole) * normals[chosen] + whole * values[:, 3:] / np.maximum(alike, 1e-6)

@@ -192,7 +192,7 @@ def _lettering(
         downs = np.round(LEADING * unit * np.cumsum([0.0, *sizes])).astype(int).tolist()
         ground = Files.new("RGB", (max(one.width for one in words), downs[-2] + words[-1].height))
         for one, tall, down in zip(words, sizes, downs, strict=False):
-            middle = round(0.5 * (1.75 * tall * unit - one.height))  # of a line that was too wide
+            middle = round(0.5 * (1.75 * tall * unit - one.height))  # a line that was too wide is lower
             ground.paste(one, ((ground.width - one.width) // 2, down + middle), one)
         parts.append(ground)
     gap = round(unit) if len(parts) > 1 else 0
