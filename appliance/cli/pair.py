@@ -20,7 +20,8 @@ from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import NotAskedForError, Problem
 
 pair = typer.Typer(
-    help="Two boxes for one show: the second follows the first, and takes over when it is silent.",
+    help="Two boxes for one show: the second follows the first, and takes over when it is silent. "
+    "`status` also says whether boxes in step are so.",
     no_args_is_help=True,
 )
 _ROLES = {"waits": "waits for the other one", "follows": "follows", "leads": "leads", "yields": "gives back"}
@@ -28,14 +29,17 @@ _ROLES = {"waits": "waits for the other one", "follows": "follows", "leads": "le
 
 @pair.command()
 def status(box: ThisBoxFile = None) -> None:
-    """Tell which box leads, and whether the other one could take over; status 1 when it could not."""
-    config = _paired(box)
+    """Tell which box leads, and whether the other one could take over; status 1 when it could not.
+
+    On boxes in step: which one leads, and which follow it; status 1 when one does not.
+    """
+    config = _paired(box, or_locked=True)
     reported = reported_pair(config)
     if reported is None:
         print("No stage dances on this box, so nothing is known of its pair. Start it: bunraku play.")
         raise typer.Exit(1)
     print(sentence(reported))
-    raise typer.Exit(0 if reported["peer"] and reported["ready"] else 1)
+    raise typer.Exit(0 if is_well(reported) else 1)
 
 
 @pair.command()
@@ -66,18 +70,28 @@ def secret(
 
 
 def reported_pair(config: BoxConfig) -> dict[str, Any] | None:
-    """The stage's report about its pair; None where no stage dances."""
+    """The stage's report about its pair, or about the boxes in step with it; None where no stage dances."""
     reader = FrameReader(runtime_folder(config))
     try:
         if not reader.is_alive(time.monotonic()):
             return None
-        reported: dict[str, Any] | None = (reader.health() or {}).get("pair")
+        health = reader.health() or {}
+        reported: dict[str, Any] | None = health.get("pair") or health.get("in_step")
     finally:
         reader.close()
     return reported
 
 
+def is_well(reported: dict[str, Any]) -> bool:
+    """Whether the other box could take over; or whether all boxes are in step."""
+    if "boxes" in reported:
+        return all(one["in_step"] for one in reported["boxes"])
+    return bool(reported["peer"] and reported["ready"])
+
+
 def sentence(reported: dict[str, Any]) -> str:
+    if "boxes" in reported:
+        return _in_step(reported)
     role = _ROLES.get(str(reported["role"]), str(reported["role"]))
     other = "second" if reported["box"] == "first" else "first"
     if not reported["peer"]:
@@ -94,9 +108,31 @@ def sentence(reported: dict[str, Any]) -> str:
     return f"This is the {reported['box']} box of the pair, and it {role}. {state} {changes}"
 
 
-def _paired(box: Path | None) -> BoxConfig:
+def _in_step(reported: dict[str, Any]) -> str:
+    behind, boxes = reported["behind"], reported["boxes"]
+    if behind is None:
+        sentences = [
+            f"This box leads. In step with it: {sum(one['in_step'] for one in boxes)} of {len(boxes)}."
+        ]
+    elif boxes[0]["in_step"]:
+        sentences = [f"This box dances in step with {boxes[0]['at']}, {behind} ticks behind it."]
+    else:
+        sentences = ["This box dances by itself."]
+    for one in (one for one in boxes if not one["in_step"]):
+        if not one["same_show"]:
+            sentences.append(f"{one['at']} has another show, release or secret.")
+        elif one["silent_s"] is None:
+            sentences.append(f"{one['at']} has not been heard.")
+        elif one["silent_s"] > 1.0:
+            sentences.append(f"{one['at']} has been silent for {one['silent_s']:.0f} s.")
+        else:
+            sentences.append(f"{one['at']} is heard, and not in step yet.")
+    return " ".join(sentences)
+
+
+def _paired(box: Path | None, or_locked: bool = False) -> BoxConfig:
     config = load_box(box_here(box, None))
-    if config.pair is None:
+    if config.pair is None and not (or_locked and config.locked):
         cure = "Write it: docs/pair.md has an example."
         raise NotAskedForError([Problem(config.file.path, 0, "This box file has no `pair:`.", cure)])
     return config

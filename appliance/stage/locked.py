@@ -44,10 +44,33 @@ class LockedStage(PairedStage):
         """Once a second: which other boxes are not in step."""
         fallbacks.set(OUT_OF_STEP.name, self.complaint(now))
 
+    def reported(self, now: float) -> dict[str, Any]:
+        """For status: of each other box its address, since when it is silent, and whether it is in step."""
+        boxes = [
+            {
+                "at": one.settings.peers[0],
+                "silent_s": None if one.roles.heard == float("-inf") else now - one.roles.heard,
+                "in_step": self._is_in_step(one, now),
+                "same_show": one.same_show and not one.has_other_secret,
+            }
+            for one in self._ends
+        ]
+        behind = None if self._settings.is_first else self.pair.behind
+        return {"in_step": {"behind": behind, "resyncs": self.resyncs, "boxes": boxes}}
+
+    def _is_in_step(self, one: Pair, now: float) -> bool:
+        peer = one.roles.peer
+        if not one.same_show or peer is None or not one.roles.peer_lives(now):
+            return False
+        return peer.is_ready if self._settings.is_first else one.roles.role is Role.FOLLOWS and one.is_ready
+
+    @property
+    def _ends(self) -> tuple[Pair, ...]:
+        return self.pair.links if isinstance(self.pair, Followers) else (self.pair,)
+
     def complaint(self, now: float) -> str:
         """Which other boxes are not in step, or ""."""
-        links = self.pair.links if isinstance(self.pair, Followers) else (self.pair,)
-        for one in links:
+        for one in self._ends:
             at = one.settings.peers[0]
             if one.trouble:
                 return f"The port to {at} cannot be opened ({one.trouble}). Free it."

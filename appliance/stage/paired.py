@@ -235,7 +235,7 @@ class PairedStage:
     def reported(self, now: float) -> dict[str, Any]:
         """For status and page."""
         roles, worst = self.pair.roles, self._comparison.worst
-        return {
+        pair = {
             "box": "first" if self._settings.is_first else "second",
             "role": roles.role.name.lower(),
             "peer": roles.peer_lives(now),
@@ -247,6 +247,7 @@ class PairedStage:
             "differs_degrees": 0.0 if worst is None else worst.degrees,
             "resyncs": self.resyncs,
         }
+        return {"pair": pair}
 
     def set_fallbacks(self, fallbacks: Fallbacks, now: float) -> None:
         """Once a second: whether nobody could take over, and how often this box did."""

@@ -1,4 +1,4 @@
-"""What a box shows while it comes back into step: its figures are led from its own dance to the leader's."""
+"""A box that comes back into step: its figures are led from its own dance to the leader's."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Rejoining:
         self._shown = JointFrame(tuple(PuppetFrame.of(len(skeleton)) for _ in puppets))
         self._figure, self._slerp = Figure(skeleton), Slerp(len(skeleton))
         self._apart = np.tile(quaternion.IDENTITY, (len(puppets), len(skeleton), 1))
-        self._away = np.zeros((len(puppets), 3), np.float32)  # of the root, metres
+        self._away = np.zeros((len(puppets), 3), np.float32)  # the root's difference, metres
 
     def begin(self, frame: JointFrame) -> None:
         """The state that this frame came from is about to become the leader's. One that never left: nothing

@@ -329,9 +329,9 @@ class Stage:
         if self.paired is not None:
             self.paired.set_fallbacks(self.watch.fallbacks, now)
         fallbacks = self.watch.fallbacks.happened(now)
-        pair = None if self.paired is None else self.paired.reported(now)
+        paired = {} if self.paired is None else self.paired.reported(now)
         self.sharing.publish_health(
-            *(now, self.health, self.reconciler, age_s, locked, roster, fallbacks, pair)
+            *(now, self.health, self.reconciler, age_s, locked, roster, fallbacks, paired)
         )
 
     def _say_and_note(self, message: str) -> None:

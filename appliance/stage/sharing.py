@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from appliance.box.runtime_folder import Claim, runtime_folder
@@ -113,12 +114,12 @@ class Sharing:
         locked: bool,
         sensors: Sequence[Sequence[Any]],
         fallbacks: Sequence[Sequence[Any]] = (),
-        pair: Mapping[str, Any] | None = None,
+        paired: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         """Publish how the box is, after the frame has left; docs/outputs.md lists the keys.
 
         `sensors`: a line of the roster for each; `fallbacks`: those that ever happened; `sensor_age_s`: None
-        without a sensor, infinite if unheard. `pair`: of a box that is one of two.
+        without a sensor, infinite if unheard. `paired`: of a box that is one of several.
         """
         parts = reconciler.parts
         reported = health.snapshot(now)
@@ -165,9 +166,7 @@ class Sharing:
             "complaints": parts.complaints if parts.not_let_in else (),
             "fallbacks": fallbacks,
         }
-        if pair is not None:
-            reported["pair"] = pair
-        parts.outputs.publish_health(reported)
+        parts.outputs.publish_health({**reported, **paired})
 
     def close(self) -> None:
         self._forget_rehearsal()

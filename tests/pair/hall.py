@@ -319,14 +319,15 @@ class Hall:
         *,
         relayed: bool = True,
         paired: bool = True,
+        locked: bool = False,
         direct: bool = False,
         **more: Any,
     ) -> None:
         """more: of the box file. direct: a cable between the boxes beside the switch. Without `paired` the
-        boxes know nothing of each other.
+        boxes know nothing of each other; locked: they are in step, and both speak.
         """
         self.folder, self.show, self._relayed, self._more = folder, show, relayed, more
-        self._paired, self._direct = paired, direct
+        self._paired, self._locked, self._direct = paired, locked, direct
         self._opened = ExitStack()
         self.boxes: dict[str, PairedBox] = {}
 
@@ -405,8 +406,12 @@ class Hall:
                 "secret": "pair.key",
             },
         }
-        if not self._paired:
+        if self._locked or not self._paired:
             del settings["pair"]
+        if self._locked:
+            end = {"host": peer, "port": PAIR_PORT}
+            role = {"followers": [end]} if is_first else {"leader": peer, "port": PAIR_PORT}
+            settings["locked"] = {"host": "0.0.0.0", "secret": "pair.key"} | role
         for section, values in self._more.items():
             settings[section] = {**settings.get(section, {}), **values}
         for one in settings["outputs"].get("dmx", []):

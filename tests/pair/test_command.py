@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from appliance.cli.pair import sentence
+from appliance.cli.pair import is_well, sentence
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.stage.paired import settings_of
@@ -66,6 +66,34 @@ def test_a_pair_that_could_not_hear_is_refused(tmp_path: Path, keys: dict[str, o
     (tmp_path / "pair.key").write_text("00" * 16)
     with pytest.raises(ConfigError, match=words):
         load_box(box_file(tmp_path, **keys))
+
+
+IN_STEP = {"at": "10.0.0.2", "silent_s": 0.01, "in_step": True, "same_show": True}
+
+
+@pytest.mark.parametrize(
+    ("behind", "other", "words", "well"),
+    [
+        (None, {}, "leads. In step with it: 2 of 2.", True),
+        (1, {}, "in step with 10.0.0.2, 1 ticks behind", True),
+        (None, {"in_step": False, "silent_s": 12.4}, "1 of 2. 10.0.0.3 has been silent for 12 s.", False),
+        (None, {"in_step": False, "silent_s": None}, "10.0.0.3 has not been heard.", False),
+        (None, {"in_step": False, "same_show": False}, "another show, release or secret", False),
+        (None, {"in_step": False}, "not in step yet", False),
+    ],
+)
+def test_boxes_in_step_are_told_in_words(
+    behind: int | None, other: dict[str, object], words: str, well: bool
+) -> None:
+    boxes = [IN_STEP] if behind is not None else [IN_STEP, IN_STEP | {"at": "10.0.0.3"} | other]
+    reported = {"behind": behind, "resyncs": 0, "boxes": boxes}
+    assert words in sentence(reported) and is_well(reported) is well
+
+
+def test_a_box_that_lost_its_leader_says_for_how_long() -> None:
+    lost = IN_STEP | {"in_step": False, "silent_s": 7.0}
+    words = sentence({"behind": 0, "resyncs": 0, "boxes": [lost]})
+    assert words == "This box dances by itself. 10.0.0.2 has been silent for 7 s."
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ import contextlib
 import sys
 import tempfile
 import time
-from collections import Counter
+from bisect import bisect_left
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import pairwise
@@ -26,9 +27,10 @@ from appliance.show.config_error import ConfigError
 from hw_sim.osc_receiver import decode
 from hw_sim.peers import free_ports
 from tests.bundles import write_show
-from tests.pair.hall import KEY, before_others
+from tests.pair.hall import FIRST, HALL, KEY, SECOND, Hall, before_others
 from tests.show_control.doubles import Asker
 from tests.system.box import Box, playing
+from tests.system.namespace import why_not
 from tests.system.processes import run_bunraku, wait_until
 
 FRAME_MS = 20.0
@@ -185,6 +187,74 @@ def test_a_box_that_comes_back_into_step_jumps_nowhere(tmp_path: Path) -> None:
         wait_until(lambda: (again := measured(boxes, 1.0)).ticks > 20 and again.same == again.ticks)
 
 
+def in_step(hall: Hall, since: float, until: float) -> tuple[InStep, int]:
+    """What both boxes of a hall sent between two moments; how many ticks of the first one were in time."""
+    shown: dict[str, dict[int, tuple[float, str]]] = {FIRST: {}, SECOND: {}}
+    poses: dict[tuple[str, float], list[object]] = defaultdict(list)
+    for at, host, address, turn in hall.seen.poses(since, until):
+        poses[host, at].append((address, turn))
+    events = [(at, host, arguments) for at, host, arguments in hall.seen.osc if since <= at <= until]
+    for host, own in shown.items():
+        arrivals = sorted(at for (of, at) in poses if of == host)
+        for at, _, arguments in (one for one in events if one[1] == host and not one[2][3]):
+            if (place := bisect_left(arrivals, at)) < len(arrivals):
+                own[arguments[0]] = at, repr(poses[host, arrivals[place]])
+    first, second = shown.values()
+    both = sorted(first.keys() & second.keys())
+    return InStep(
+        len(both),
+        sum(first[tick][1] == second[tick][1] for tick in both),
+        [1000.0 * abs(first[tick][0] - second[tick][0]) for tick in both],
+    ), len(first)
+
+
+RELAYED: dict[str, dict[str, float]] = {
+    "a whole cable": {},
+    "a fifth lost": {"loss": 0.2, "jitter_s": 0.004},
+    "held up": {"delay_s": 0.004, "jitter_s": 0.012},
+}
+
+
+@contextlib.contextmanager
+def hall_in_step(folder: Path) -> Iterator[Hall]:
+    """Two boxes in networks of their own, with clocks of their own, and what loses datagrams between."""
+    show = write_show(folder / "show", [])
+    with Hall(folder, show, locked=True) as hall:
+        hall.switch_on(FIRST), hall.switch_on(SECOND)
+        hall.await_pair()
+        yield hall
+
+
+def relayed(hall: Hall, way: str, seconds: float) -> tuple[InStep, int]:
+    """With this between the boxes."""
+    hall.relay.set(**RELAYED[way])
+    time.sleep(0.5)
+    since = time.time()
+    time.sleep(seconds)
+    hall.relay.set()
+    return in_step(hall, since, since + seconds)
+
+
+@pytest.mark.skipif(bool(missing := why_not()), reason=str(missing))
+def test_boxes_stay_in_step_where_datagrams_are_lost_and_held_up(tmp_path: Path) -> None:
+    """Each tick comes, and is the same; the way there may take its time."""
+    with hall_in_step(tmp_path) as hall:
+        for way in RELAYED:
+            found, ticks = relayed(hall, way, 4.0)
+            assert ticks > 120 and found.ticks > 0.98 * ticks - 3, (way, ticks, found.reported())
+            assert found.same == found.ticks, (way, found.reported())
+            assert found.within_a_frame > 0.9, (way, found.reported())
+        assert "dances by itself" not in hall.boxes[SECOND].output
+        assert hall.boxes[FIRST].ask("pair", "status") == (0, "This box leads. In step with it: 1 of 1.\n")
+        code, said = hall.boxes[SECOND].ask("pair", "status")
+        assert code == 0 and f"in step with {HALL}, " in said, said
+        hall.relay.set(cut=True)
+        for box in hall.boxes.values():
+            wait_until(lambda: "been silent for" in box.ask("pair", "status")[1])  # noqa: B023
+            assert box.ask("pair", "status")[0] == 1
+        assert "by itself" in hall.boxes[SECOND].ask("pair", "status")[1]
+
+
 def test_three_boxes_that_know_nothing_of_each_other_are_far_apart(tmp_path: Path) -> None:
     with three_boxes(tmp_path, locked=False) as boxes:
         alone = measured(boxes, 2.0)
@@ -219,3 +289,8 @@ if __name__ == "__main__":
     for is_locked in (True, False):
         with tempfile.TemporaryDirectory() as made, three_boxes(Path(made), is_locked) as running:
             print("in step:" if is_locked else "alone:  ", measured(running, float(sys.argv[1])).reported())
+    with tempfile.TemporaryDirectory() as made, hall_in_step(Path(made)) as in_hall:
+        for between in RELAYED:
+            figures, sent = relayed(in_hall, between, float(sys.argv[1]))
+            print(f"{between}: of {sent} ticks", figures.reported())
+        print([line for line in in_hall.boxes[SECOND].output.splitlines() if "Hz" not in line][-6:])

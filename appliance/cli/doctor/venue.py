@@ -11,7 +11,7 @@ from serial.tools.list_ports_common import ListPortInfo
 
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
 from appliance.cli.doctor.host_view import HostView, output_of
-from appliance.cli.pair import sentence
+from appliance.cli.pair import is_well, sentence
 from appliance.outputs.dmx.adapter_wire import AdapterError
 from appliance.outputs.dmx.serial_port import (
     adapters_here,
@@ -50,17 +50,18 @@ def ports(host: HostView) -> Iterator[Finding]:
 
 
 def pair(host: HostView) -> Iterator[Finding]:
-    """The other box of a pair is there, and could take over."""
-    if host.box.pair is None or host.stage is None:
+    """The other box of a pair is there, and could take over; boxes in step are so."""
+    if (host.box.pair is None and host.box.locked is None) or host.stage is None:
         return
-    reported = host.stage.health.get("pair")
+    name, key = ("in step", "in_step") if host.box.pair is None else ("pair", "pair")
+    reported = host.stage.health.get(key)
     if not reported:
-        yield better("pair", "This stage notes no journal, so no box can follow it.", "Free memory, restart.")
-    elif reported["peer"] and reported["ready"]:
-        yield ok("pair", sentence(reported))
+        yield better(name, "This stage notes no journal, so no box can follow it.", "Free memory, restart.")
+    elif is_well(reported):
+        yield ok(name, sentence(reported))
     else:
         cure = "Switch the other box on; give it the same show, release and secret; look at the cable."
-        yield better("pair", sentence(reported), cure)
+        yield better(name, sentence(reported), cure)
 
 
 def _holders(host: HostView, port: int) -> list[tuple[str, bool]]:
