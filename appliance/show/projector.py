@@ -65,9 +65,9 @@ class ProjectorConfig(Section):
         within=(1, 240),
     )
     prediction_ms: float = key(
-        "How far ahead the limbs that a hand leads are predicted, so that the wall lags less behind the hand; "
-        "the rest of the figure by half of it. 20 makes up for the interpolation between frames, more for the "
-        "display's delay too, but rougher; 0: smoothest.",
+        "How far ahead the limbs that a hand leads are predicted, so that the wall lags less behind the "
+        "hand; the rest of the figure by half of it. 20 makes up for the interpolation between frames, more "
+        "for the display's delay too, but rougher; 0: smoothest.",
         20.0,
         within=(0, 50),
     )
