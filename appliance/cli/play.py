@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from appliance.box.child import BUNRAKU
 from appliance.box.live_pose import forget_live_pose
 from appliance.box.log_writer import SAID, LogWriter
 from appliance.box.made_motion import forget_made_motion
@@ -240,6 +239,7 @@ def _companions(
 
 def _companion(process: str, name: str, meanwhile: str, box: Path | None, *command: str) -> Companion:
     """A command of `bunraku` beside the stage."""
+    from appliance.box.child import BUNRAKU
     from appliance.box.notify import WATCHDOG_S
     from appliance.cli.companions import Companion
 
