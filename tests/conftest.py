@@ -63,8 +63,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def load_share(first: int, step: int) -> None:
     """Load a worker's share of the test modules before it collects all of them.
 
-    Most of that time in a fresh checkout is the rewriting of assertions, which is saved for whoever loads the
-    module next. Without shares each worker would rewrite all of them at the same time.
+    In a fresh checkout, rewriting assertions takes most of that time. The result is saved, and every worker
+    that loads the module later uses it. Without shares each worker would rewrite all of them at once.
     """
     for path in sorted((ROOT / "tests").rglob("test_*.py"))[first::step]:
         with contextlib.suppress(Exception, pytest.skip.Exception):  # the collection reports it

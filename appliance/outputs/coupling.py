@@ -78,8 +78,8 @@ def _velocities(positions: Floats, row_s: float) -> Floats:
 
 
 def _likeness(late: Floats, early: Floats, lags: range) -> NDArray[np.float64]:
-    """The largest correlation (J,), 0 to 1, of motion (rows, J, C) with other motion, which it follows within
-    so many rows; the components of a vector are added up.
+    """The largest correlation (J,), 0 to 1, of `late` with `early`, both motion (rows, J, C), over these lags
+    (rows by which `late` follows). The C components of a joint count as one vector.
     """
     likeness, parts = np.zeros(late.shape[1]), late.shape[2]
     late, early = (one.reshape(len(one), -1) for one in (late, early))

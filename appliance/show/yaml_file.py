@@ -41,7 +41,7 @@ class YamlFile:
         return 1
 
     def at(self, *location: str | int) -> Any:
-        """The plain value there; None: there is none."""
+        """The plain value at this location; None where the file has none."""
         values: Any = self.values
         for step in location:
             values = values.get(step) if isinstance(values, dict) else None

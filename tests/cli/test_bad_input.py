@@ -190,7 +190,7 @@ def disk() -> Iterator[Callable[[int, Path], None]]:
 
 DEADLINE_S = 120.0  # far more than the check's own limit, on a busy machine
 SOUND = b"It is sound."
-ROUNDS, MOST_ROUNDS = 3, 10  # of each kind; MOST_ROUNDS with --long
+ROUNDS, MOST_ROUNDS = 3, 10  # each kind is tried so often; MOST_ROUNDS with --long
 FILES = ("show.yaml", "skeleton.bvh", "phrase.bvh", "puppet.onnx", "report.json", CHECKSUMS)
 SHOW = """\
 name: A test

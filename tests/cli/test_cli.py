@@ -345,7 +345,7 @@ def test_check_says_that_a_map_leads_nowhere(
 ) -> None:
     box = write_box(tmp_path)
     assert "map is dead" not in bunraku("check", "--box", box).out
-    monkeypatch.setattr(map_reach, "DEAD", 100.0)  # of what its poses differ by: no map leads so far
+    monkeypatch.setattr(map_reach, "DEAD", 100.0)  # times its poses' difference: no map gets so far
     assert "pose.onnx: The map is dead: from corner to corner" in bunraku("check", "--box", box).out
 
 

@@ -382,7 +382,7 @@ def test_while_it_is_heard_the_target_is_the_newest_reading_at_once() -> None:
 
 
 def random_matrix(seed: int) -> np.ndarray:
-    """What turns a reading by two rotations and swaps its axes round, as a worn sensor's does."""
+    """(4, 4): turns a reading by two rotations and swaps its axes, as the matrix of a worn sensor does."""
     left, right = random_quaternions(np.random.default_rng(seed), 2)
     axes = np.eye(4, dtype=np.float32)[:, [0, 2, 3, 1]]
     return quaternion.multiply(quaternion.multiply(left, axes), right).T.astype(np.float32)

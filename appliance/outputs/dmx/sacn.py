@@ -86,7 +86,7 @@ class SacnWire(NetworkWire):
 
 
 def component_identifier(state: Path | None) -> UUID:
-    """The one in the state folder, made where there is none (E1.31 section 5.6).
+    """Read the component identifier from the state folder, or make one and save it (E1.31 section 5.6).
 
     Without a folder, or where it cannot be written, a new one each time: receivers then see a new source.
     """
