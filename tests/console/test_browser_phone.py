@@ -32,6 +32,8 @@ LAMPS = """window.lamps = [];
   new MutationObserver(() => { lamps.push(document.body.dataset.lamp); })
     .observe(document, { attributes: true, subtree: true, attributeFilter: ["data-lamp"] });
 """
+# A phone in a hand measures motion all the time; the page says of one that does not that it lies still.
+IN_A_HAND = """setInterval(() => dispatchEvent(new Event("devicemotion")), 50);"""
 NO_SOCKETS = """WebSocket = class {
   static OPEN = 1;
   readyState = 3;
@@ -56,13 +58,15 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 class Phone:
     """A browser with motion sensors, at an address of the box."""
 
-    def __init__(self, context: BrowserContext, address: str, script: str = "") -> None:
+    def __init__(
+        self, context: BrowserContext, address: str, script: str = "", motion: str = IN_A_HAND
+    ) -> None:
         expect.set_options(timeout=PATIENCE_MS)
         self.errors: list[str] = []
         context.grant_permissions(["accelerometer", "gyroscope"])
         self.tab: Tab = context.new_page()
         self.tab.on("pageerror", lambda error: self.errors.append(str(error)))
-        for one in filter(None, (LAMPS, script)):
+        for one in filter(None, (LAMPS, motion, script)):
             self.tab.add_init_script(one)
         self._sensors: CDPSession = context.new_cdp_session(self.tab)
         self.turn(**UPRIGHT)
@@ -149,6 +153,20 @@ def test_a_phone_holds_a_joint_until_its_page_is_closed(
     phone.tab.close(run_before_unload=True)
     wait_until(lambda: not stage[1].get("/api/phones").value[0]["taken"])
     wait_until(lambda: held(stage) < 1.0)
+    wait_until(lambda: held(stage) == 0.0)
+
+
+def test_a_phone_without_motion_says_so_and_gives_its_joint_back(
+    context: BrowserContext, stage: Stage
+) -> None:
+    phone = Phone(context, invited(stage[1]), motion="")
+    phone.begin()
+    wait_until(lambda: held(stage) > 0.0)
+    phone.await_lamp("still")
+    wait_until(lambda: held(stage) == 0.0)
+    phone.turn(**UPRIGHT | {"alpha": UPRIGHT["alpha"] + TURN_DEGREES})
+    wait_until(lambda: held(stage) > 0.0)
+    phone.tab.close(run_before_unload=True)
     wait_until(lambda: held(stage) == 0.0)
 
 
