@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import importlib
 import itertools
 import os
 import random
 import sys
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LONGEST_FIRST = ("tests/boot/", "tests/test_readme.py", "tests/system/", "tests/studio/")
 PAGES = "tests/test_readme.py::test_every_command_of_a_page_works"
 _folders = itertools.count()
+_unloaded: dict[str, BaseException] = {}  # by module: what the collection reports, or it has gone away
 
 # As the commands have it: threads of numerical libraries would only wait for each other. Set here: other
 # conftest.py load the libraries, which read this once, before any hook is called.
@@ -67,8 +68,11 @@ def load_share(first: int, step: int) -> None:
     that loads the module later uses it. Without shares each worker would rewrite all of them at once.
     """
     for path in sorted((ROOT / "tests").rglob("test_*.py"))[first::step]:
-        with contextlib.suppress(Exception, pytest.skip.Exception):  # the collection reports it
-            importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+        name = path.relative_to(ROOT)
+        try:
+            importlib.import_module(".".join(name.with_suffix("").parts))
+        except (Exception, pytest.skip.Exception) as error:
+            _unloaded[name.as_posix()] = error
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -95,6 +99,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             len(LONGEST_FIRST),
         )
     )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    report = yield
+    if report.passed and (error := _unloaded.get(report.nodeid)):
+        report.outcome, report.longrepr = "failed", f"Loaded the second time only: {error!r}"
+    return report
 
 
 def pytest_collection_finish() -> None:
