@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import ipaddress
 import socket
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -100,7 +101,7 @@ class DatagramSender:
         self.dropped = 0  # datagrams that were not
         self.last_error = ""  # why the last one was dropped; stays when all is well again
         self.is_open = False  # whether the newest datagram left
-        self.is_muted = False  # a box that follows another one encodes, and sends nothing
+        self.speaks_until = float("inf")  # monotonic seconds; a box that follows another one sends nothing
         self.is_gone = False  # whether some of the last second did not; the stage's watch sets it
         self._path = path
         self._socket: socket.socket | None = None
@@ -113,7 +114,7 @@ class DatagramSender:
 
         `now`: monotonic seconds.
         """
-        if self.is_muted:
+        if time.monotonic() >= self.speaks_until:  # also one that was stopped after it was allowed to
             return
         left = 0
         if now >= self._retry_at:

@@ -31,7 +31,7 @@ class Outputs:
         self._posistagenet = tuple(PosiStageNet(one, skeleton, puppets) for one in config.posistagenet)
         self.receivers: tuple[DatagramSender, ...] = (*self._osc.receivers, *self._posistagenet)
         self._shared: FrameWriter | None = None
-        self.may_speak: Callable[[], bool] | None = None  # asked before each frame, on a box with a pair
+        self.speaks_until: Callable[[], float] | None = None  # asked before each frame, on a box with a pair
         self.altered_by: Callable[[JointFrame], JointFrame] | None = None  # what receivers get instead
         self.shift_s = 0.0  # frames have times of a clock that is so much behind this machine's
 
@@ -42,15 +42,15 @@ class Outputs:
     def publish_frame(self, frame: JointFrame) -> None:
         """Send a frame to every receiver and share it. Never waits, never raises.
 
-        A box that may not speak encodes and shares it nonetheless: its receivers' state goes on.
+        A box that follows another one encodes and shares it nonetheless: its receivers' state goes on.
         """
         if self.altered_by is not None:
             frame = self.altered_by(frame)
         shift_s = self.shift_s  # a box that learns now that it leads no longer has another one after that
-        if self.may_speak is not None:
-            is_muted = not self.may_speak()
+        if self.speaks_until is not None:
+            until = self.speaks_until()
             for one in self.receivers:
-                one.is_muted = is_muted
+                one.speaks_until = until
         times = frame.frame_time, frame.sensor_arrival
         frame.frame_time, frame.sensor_arrival = (seconds + shift_s for seconds in times)
         self._osc.send_frame(frame)

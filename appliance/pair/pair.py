@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from appliance.box.clock import TICK_S
 from appliance.pair import wire
 from appliance.pair.clock_offset import ClockOffset
 from appliance.pair.roles import Heard, Role, Roles
@@ -57,8 +56,8 @@ class PairSettings:
 class Pair:
     """Nothing here waits (but `await_datagram`), raises or logs.
 
-    is_ready: this box could take over; reaches: see Roles.look; the stage sets both. wants_keyframe: the
-    other box asked for one.
+    is_ready: this box could take over; reaches: see Roles.look; newest_frame: deadline of the newest frame
+    that this box has sent. The stage sets these. wants_keyframe: the other box asked for one.
     same_show: whether the other box has the same show and software, as far as it was heard.
     heard_from: when each of its addresses was last heard.
     """
@@ -77,6 +76,7 @@ class Pair:
         self.offset = ClockOffset()
         self.is_ready = self.wants_keyframe = False
         self.reaches = True
+        self.newest_frame = float("-inf")
         self.same_show = True
         self.heard_from = dict.fromkeys(settings.peers, float("-inf"))
         self.trouble = ""  # why nothing can be heard or sent
@@ -114,7 +114,10 @@ class Pair:
         return self._incoming.newest - self._incoming.next + 1
 
     def await_datagram(self, seconds: float) -> None:
-        """Wait until a datagram is there, at most so long."""
+        """Wait until a datagram is there, at most so long, and not beyond a takeover that is due."""
+        left_s = self.roles.takes_over_at(self.is_ready) - self._monotonic()
+        if left_s > -seconds:
+            seconds = min(seconds, left_s)
         if self._socket is None:
             time.sleep(max(0.0, seconds))
         elif seconds > 0.0:
@@ -136,11 +139,6 @@ class Pair:
         """That this box is there, and what it does."""
         for _ in range(BEATS):
             self._send(wire.BEAT, now)
-
-    def begin_tick(self, now: float) -> None:
-        """The leader, before a frame that may wait for a reading: that it is there, and leads."""
-        for _ in range(BEATS):
-            self._send(wire.BEGINS, now)
 
     def publish(self, message: bytes, now: float) -> None:
         """The leader, once a frame has left: the next message, and those before once more.
@@ -277,9 +275,8 @@ class Pair:
             self.offset.restart()
         self.offset.hear(found.sent, now)
         if now - found.sent - self.offset.seconds < _STALE_S + waited_s:
-            # The frame may still fail to come: a tick that begins counts as much as the frame before it.
-            since = now - TICK_S if found.kind == wire.BEGINS else now
-            self.roles.hear(found.heard, since, self.is_ready)
+            as_of = found.heard.as_of + self.offset.seconds
+            self.roles.hear(found.heard._replace(as_of=as_of), now, self.is_ready)
         if (
             found.heard.role is Role.LEADS
             and not self.leads
@@ -319,6 +316,8 @@ class Pair:
         if self._socket is None:
             return  # it could not take over: it hears nothing
         heard = Heard(self.roles.role, self.roles.epoch, self.is_ready and self.same_show)
+        if self.leads:
+            heard = heard._replace(as_of=max(self.newest_frame, self.roles.since))
         data = self._codec.pack(kind, heard, now, body, to)
         for link, peer in self._links:
             with contextlib.suppress(OSError):  # no network there at this moment

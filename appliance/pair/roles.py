@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
+
+from appliance.box.clock import TICK_S
 
 FIRST_WAITS_S = 0.4  # at the start, for a box that leads already; the second leaves the first time to start
 SECOND_WAITS_S = 6.0
 UNREADY_WAITS_S = 2.0  # a follower that knows no dance yet gives the first's stage time to restart
 YIELDS_S = 0.15  # a leader that gave back and hears nobody leads again
-SHORT_S = 2.0  # a box that lost the lead so soon after it had taken it waits longer before it takes it again
+SHORT_S = 2.0  # a box that lost the lead so soon after it took it waits a tick longer to take it again
 MOST_PATIENCE_S = 0.3
 PATIENCE_FOR_S = 10.0
 CABLE_S = 3.0  # a card says that its cable is out within that time
@@ -28,11 +31,16 @@ class Role(IntEnum):
 
 
 class Heard(NamedTuple):
-    """The part of the other box, as its datagram says. is_ready: it could take over at any moment."""
+    """The part of the other box, as its datagram says. is_ready: it could take over at any moment.
+
+    as_of: deadline of a leader's newest frame, in seconds. It is as good as its frames: however late one
+    hears of them, one takes over at the same moment. Others: inf, which means when it is heard.
+    """
 
     role: Role
     epoch: int
     is_ready: bool
+    as_of: float = math.inf
 
 
 @dataclass
@@ -40,8 +48,9 @@ class Roles:
     """The part of one box. Times are this machine's monotonic seconds.
 
     epoch: a number that grows with each change of the leader: of two leaders the one with the lower epoch
-    is silent, and where both are equal the second box. patience_s: silence of the leader after which a
-    follower takes over. takeovers: since the start. why: of the newest change, in a word.
+    is silent, and where both are equal the second box. patience_s: a follower takes over so long after the
+    deadline of the leader's newest frame. takeovers: since the start. why, since: of the newest change, in a
+    word and in seconds.
     """
 
     is_first: bool
@@ -54,7 +63,7 @@ class Roles:
 
     def __post_init__(self) -> None:
         self.patience_s = self.silent_s
-        self._since = self.now
+        self.since = self.now
         self._heard_leader = self._heard = float("-inf")
         self._deposed_at = float("-inf")
         self._peer: Heard | None = None
@@ -80,16 +89,16 @@ class Roles:
 
     def hear(self, heard: Heard, now: float, is_ready: bool) -> None:
         """A datagram of the other box, authentic and new. is_ready: this box could take over."""
-        self._heard, self._peer = max(self._heard, now), heard
+        self._heard, self._peer = now, heard
         if heard.role is Role.LEADS:
-            self._heard_leader = max(self._heard_leader, now)
+            self._heard_leader = max(self._heard_leader, min(heard.as_of, now))
             if self.role is not Role.LEADS:
                 if self.role is not Role.FOLLOWS:
                     self._become(Role.FOLLOWS, now, "that one leads")
                 self.epoch = max(self.epoch, heard.epoch)
             elif (heard.epoch, not self.is_first) > (self.epoch, self.is_first):
-                if now - self._since < SHORT_S:
-                    self.patience_s = min(2.0 * self.patience_s, MOST_PATIENCE_S)
+                if now - self.since < SHORT_S:
+                    self.patience_s = min(self.patience_s + TICK_S, MOST_PATIENCE_S)
                     self._deposed_at = now
                 self._become(Role.FOLLOWS, now, "that one took over")
                 self.epoch = heard.epoch
@@ -103,7 +112,7 @@ class Roles:
 
     def begin(self, now: float) -> None:
         """The box is ready to hear: from now on it waits."""
-        self._since = now
+        self.since = now
 
     def look(self, now: float, is_ready: bool, reaches: bool = True) -> None:
         """Changes that are due by time; call it at least once a tick.
@@ -115,18 +124,22 @@ class Roles:
         if now - self._deposed_at > PATIENCE_FOR_S:
             self.patience_s = self.silent_s
         if self.role is Role.WAITS:
-            if now - self._since >= (FIRST_WAITS_S if self.is_first else SECOND_WAITS_S):
+            if now - self.since >= (FIRST_WAITS_S if self.is_first else SECOND_WAITS_S):
                 self._lead(now, "no other box leads", int(reaches))
         elif self.role is Role.FOLLOWS and reaches:
-            silent_s = now - max(self._heard_leader, self._since)
-            if silent_s > (self.patience_s if is_ready else max(UNREADY_WAITS_S, self.patience_s)):
+            if now > self.takes_over_at(is_ready):
                 self.takeovers += 1
                 self._lead(now, SILENCE)
-        elif self.role is Role.YIELDS and now - self._since > YIELDS_S:
+        elif self.role is Role.YIELDS and now - self.since > YIELDS_S:
             self._lead(now, "the other one did not take it")
-        elif self.leads and not reaches and self.why == SILENCE and now - self._since < CABLE_S:
+        elif self.leads and not reaches and self.why == SILENCE and now - self.since < CABLE_S:
             self.epoch -= 1
             self._become(Role.FOLLOWS, now, CABLE)
+
+    def takes_over_at(self, is_ready: bool) -> float:
+        """When a follower that hears nothing more of the leader takes over."""
+        patience_s = self.patience_s if is_ready else max(UNREADY_WAITS_S, self.patience_s)
+        return max(self._heard_leader, self.since) + patience_s
 
     def give_back(self, now: float) -> bool:
         """Ask the other box to lead, which could; whether it is asked."""
@@ -141,4 +154,4 @@ class Roles:
         self._become(Role.LEADS, now, why)
 
     def _become(self, role: Role, now: float, why: str) -> None:
-        self.role, self._since, self.why = role, now, why
+        self.role, self.since, self.why = role, now, why

@@ -15,10 +15,10 @@ from appliance.pair.roles import Heard, Role
 from appliance.sensor.wire import TAG_BYTES, Tagger
 
 MAGIC, VERSION = 0xB0A2, 2
-# magic, version, kind; own number, the other's; counter; epoch, role, is ready; fingerprint; time sent
-_HEAD = struct.Struct("<HBBQQQIBB8sd")
-BEAT, MESSAGE, KEYFRAME, ASK, BEGINS = range(1, 6)  # BEGINS: a leader begins a tick
-KINDS = (BEAT, MESSAGE, KEYFRAME, ASK, BEGINS)
+# magic, version, kind; own number, the other's; counter; epoch, role, is ready; fingerprint; sent, as of
+_HEAD = struct.Struct("<HBBQQQIBB8sdd")
+BEAT, MESSAGE, KEYFRAME, ASK = range(1, 5)
+KINDS = (BEAT, MESSAGE, KEYFRAME, ASK)
 MOST_BODY = 1180  # with the heads of UDP and IP below what any Ethernet carries whole
 LARGEST = _HEAD.size + MOST_BODY + TAG_BYTES
 REASONS = ("accepted", "length", "magic", "version", "kind", "tag", "own", "greeting", "ended", "repeat")
@@ -27,7 +27,7 @@ _MOST_ENDED = 1024
 
 
 class Datagram(NamedTuple):
-    """One that was accepted. sent: monotonic seconds of the other box."""
+    """One that was accepted. sent, and `as_of` in heard: monotonic seconds of the other box."""
 
     kind: int
     heard: Heard
@@ -62,7 +62,7 @@ class Codec:
         self._count += 1
         head = _HEAD.pack(
             *(MAGIC, VERSION, kind, self._own, to or self._others, self._count),
-            *(heard.epoch, heard.role, heard.is_ready, self._fingerprint, now),
+            *(heard.epoch, heard.role, heard.is_ready, self._fingerprint, now, heard.as_of),
         )
         signed = head + body
         return signed + self._tagger.tag(signed)
@@ -78,12 +78,12 @@ class Codec:
         if not _HEAD.size + TAG_BYTES <= len(data) <= LARGEST:
             return "length"
         head = _HEAD.unpack_from(data)
-        magic, version, kind, theirs, ours, count, epoch, role, is_ready, fingerprint, sent = head
+        magic, version, kind, theirs, ours, count, epoch, role, is_ready, fingerprint, sent, as_of = head
         if magic != MAGIC:
             return "magic"
         if version != VERSION:
             return "version"
-        if kind not in KINDS or role > Role.YIELDS or not math.isfinite(sent):
+        if kind not in KINDS or role > Role.YIELDS or not math.isfinite(sent) or math.isnan(as_of):
             return "kind"
         if not self._tagger.is_authentic(data):
             return "tag"
@@ -99,7 +99,7 @@ class Codec:
         if not self._is_new(count):
             return "repeat"
         body = data[_HEAD.size : -TAG_BYTES]
-        return Datagram(kind, Heard(Role(role), epoch, bool(is_ready)), fingerprint, sent, body)
+        return Datagram(kind, Heard(Role(role), epoch, bool(is_ready), as_of), fingerprint, sent, body)
 
     def _begin(self, theirs: int) -> None:
         """Another start of the other box is in force."""

@@ -28,10 +28,10 @@ class PairConfig(Section):
         "`bunraku pair secret` makes it."
     )
     silent_ms: float = key(
-        "Silence of the leading box after which the other one takes over. More frames are lost with more; "
-        "with less, a box that is held up for a moment loses the lead.",
-        42.0,
-        within=(30, 500),
+        "The other box takes over so long after the deadline of the leading box's newest frame. More frames "
+        "are lost with more; with less, a box that is held up for a moment loses the lead.",
+        48.0,
+        within=(40, 500),
     )
     priority: int = key(
         "How much above its `priority` a box sends sACN once it has taken over: receivers take its levels "

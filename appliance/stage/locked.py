@@ -93,7 +93,7 @@ class LockedStage(PairedStage):
 
     def _hear_leader(self) -> None:
         super()._hear_leader()
-        self._parts.outputs.may_speak = None
+        self._parts.outputs.speaks_until = None
 
     def _restore(self, keyframe: bytes) -> None:
         self._rejoining.begin(self._tick.frame)
@@ -101,7 +101,7 @@ class LockedStage(PairedStage):
 
     def _take_over(self, clock: TickClock) -> None:
         super()._take_over(clock)
-        self._parts.outputs.may_speak = None
+        self._parts.outputs.speaks_until = None
 
     def _begin_tick(self, now: float) -> None:
         """A frame that comes late makes nobody here lose step: they wait for ten of them."""

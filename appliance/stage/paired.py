@@ -49,6 +49,7 @@ _MOST_BEHIND = 25  # messages, so some 0.5 s: a jump that far is better than no 
 _CALL_EACH_S, _CALLS_FOR_S = 0.25, 3.0  # after that a wearable greets by itself
 _OWN_STATE_S = 1.0  # a box that lost the lead may take it back from where it stood, until it follows
 _FRESH_LOOK_S = 0.004
+_LATE_S = TICK_S / 2.0  # a frame that left later counts from when it left: its box was held up, and lives
 _GIVE_EACH_S = 1.0
 _OTHERS = frozenset(("run", "pid", "show_directory", "python", "numpy", "onnxruntime"))
 TOLERANCE_DEGREES = 0.5  # between processors of two kinds; beyond it the leader's state is fetched again
@@ -164,6 +165,7 @@ class PairedStage:
 
     def flush(self, now: float) -> None:
         """Send what has gathered."""
+        self.pair.newest_frame = max(self._tick.frame.frame_time, now - _LATE_S)
         if self._items:
             self.pair.publish(b"".join(self._items), now)
             self._items.clear()
@@ -301,15 +303,19 @@ class PairedStage:
             return f"This box follows {name}, its outputs silent ({roles.why}; change {roles.epoch})."
         return f"This box gives the lead to {name}."
 
-    def _may_speak(self) -> bool:
-        """Right before a frame leaves: a box that was held up may have lost the lead meanwhile."""
+    def _speaks_until(self) -> float:
+        """Right before a frame leaves: a box that was held up may have lost the lead meanwhile, and one that
+        is held up from now on may lose it as soon as the other one takes it for silent.
+        """
         if not self.pair.leads:
-            return False
+            return _never()
         now = time.monotonic()
         self._look_at_cable(now)
         if now - self._looked_at > _FRESH_LOOK_S:
             self._look(now)
-        return self.pair.leads and self._carrier.may_speak(now, self.pair.roles.heard)
+        if not self.pair.leads or not self._carrier.may_speak(now, self.pair.roles.heard):
+            return _never()
+        return max(self.pair.newest_frame + self._settings.silent_s, now + _FRESH_LOOK_S)
 
     def _look_at_cable(self, now: float) -> None:
         """A leader whose own cable is out gives the lead away, where another link still joins the two."""
@@ -328,7 +334,8 @@ class PairedStage:
             self.give_back(now)
 
     def _begin_tick(self, now: float) -> None:
-        self.pair.begin_tick(now)
+        """Before a frame that may wait for a reading: that this box is there, and leads."""
+        self.pair.beat(now)
 
     def _write_part(self, now: float) -> None:
         roles = self.pair.roles
@@ -339,9 +346,7 @@ class PairedStage:
     def _hear_leader(self) -> None:
         parts = self._parts
         parts.link, parts.live_inbox = self._rerun.heard, self._rerun.live
-        parts.outputs.may_speak = (
-            _never  # also while the leader's last ticks are run by a box that takes over
-        )
+        parts.outputs.speaks_until = _never  # also while a box that takes over runs the leader's last ticks
         parts.outputs.shift_s = self.pair.offset.seconds
 
     def _restore(self, keyframe: bytes) -> None:
@@ -417,7 +422,7 @@ class PairedStage:
         self.pair.lead_anew()
         self.pair.is_ready = True
         parts.link, parts.live_inbox = self._own_link, self._own_live
-        parts.outputs.may_speak = self._may_speak
+        parts.outputs.speaks_until = self._speaks_until
         parts.outputs.shift_s = 0.0
         self._sent_state = None
         if self._has_danced:
@@ -441,8 +446,8 @@ class PairedStage:
         self._write_part(clock.now())
 
 
-def _never() -> bool:
-    return False
+def _never() -> float:
+    return float("-inf")
 
 
 def _made_here_or_again(show: Show, parts: StageParts, made: Callable[[str], Loop]) -> Callable[[str], Loop]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import time
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,22 @@ def test_without_a_shared_frame_the_others_go_on(skeleton: Skeleton, frame: Join
         outputs.publish_frame(frame)
         outputs.publish_health({"state": "dancing"})
         assert len(osc.poll(5.0)) == 3
+        outputs.close()
+
+
+def test_a_box_that_is_stopped_between_its_last_look_and_a_frame_sends_none(
+    skeleton: Skeleton, frame: JointFrame
+) -> None:
+    """Both boxes of a pair would be heard: it may lead no longer when it goes on."""
+    with OscReceiver(LOOPBACK) as osc:
+        outputs = Outputs(configured(osc.port, osc.port), skeleton)
+        outputs.speaks_until = lambda: time.monotonic() + 60.0
+        outputs.publish_frame(frame)
+        assert osc.poll(5.0)
+        outputs.speaks_until = time.monotonic  # over by the time at which datagrams would leave
+        before = [one.sent for one in outputs.receivers]
+        outputs.publish_frame(frame)
+        assert [one.sent for one in outputs.receivers] == before and all(before)
         outputs.close()
 
 

@@ -120,7 +120,7 @@ def test_a_lead_that_was_short_makes_the_next_takeover_slower() -> None:
     one = following()
     one.look(1.0, True)
     one.hear(Heard(Role.LEADS, 9, True), 1.0 + SHORT_S / 2, True)
-    assert one.role is Role.FOLLOWS and one.patience_s == 2 * SILENT_S
+    assert one.role is Role.FOLLOWS and one.patience_s == SILENT_S + TICK_S
     one.look(60.0, False)
     assert one.patience_s == SILENT_S
 

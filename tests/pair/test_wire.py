@@ -180,7 +180,8 @@ def test_a_box_that_was_held_up_takes_none_for_silent_and_a_late_datagram_for_no
     other.look(1.0)
     other.is_ready = True
     assert other.roles.role is Role.FOLLOWS
-    one.beat(1.95)
+    one.newest_frame = 1.98
+    one.beat(1.99)
     clock[0] = 2.0
     other.look(1.0)  # it was stopped after it had read its clock
     other.look(2.01)
@@ -193,33 +194,56 @@ def test_a_box_that_was_held_up_takes_none_for_silent_and_a_late_datagram_for_no
     one.close(), other.close()
 
 
-def test_a_tick_that_begins_keeps_the_lead_no_longer_than_its_frame_is_due() -> None:
-    """A leader that dies between a tick's begin and its frame loses that frame, and no other one."""
-    clock = [0.0]
+def leading_pair(clock: list[float]) -> tuple[Pair, Pair]:
+    """The first box leads, and the frame of 1.000 has left; the second one is ready."""
     one, other = pair_of(KEY, KEY, clock=clock)
-    one.look(1.0)
-    for now, send in ((1.000, one.begin_tick), (1.002, one.beat), (1.020, one.begin_tick)):
-        clock[0] = now
-        send(now)
-        other.look(now)
+    clock[0] = 0.9
+    one.look(0.9)
+    one.beat(0.9)
+    other.look(0.9)
+    one.newest_frame = 1.0
+    one.publish(b"", 1.004)
     other.is_ready = True
-    for now, is_over in ((1.0439, False), (1.0441, True)):
-        clock[0] = now
-        other.look(now)
+    return one, other
+
+
+@pytest.mark.parametrize("held_up_until", [1.0045, 1.015])
+def test_silence_counts_from_the_newest_frame_however_late_it_was_heard_of(held_up_until: float) -> None:
+    """A leader that dies in its next tick, right after it said that it is there, loses that frame only."""
+    clock = [0.0]
+    one, other = leading_pair(clock)
+    clock[0] = held_up_until
+    other.look(held_up_until)
+    clock[0] = 1.02
+    one.beat(1.02)
+    for clock[0], is_over in ((1.0211, False), (1.0419, False), (1.0421, True)):
+        other.look(clock[0])
         assert other.leads is is_over
     one.close(), other.close()
 
 
 def test_a_leader_whose_frame_is_late_keeps_the_lead_though_the_frame_before_was_lost() -> None:
     clock = [0.0]
+    one, other = leading_pair(clock)
+    clock[0] = 1.0045
+    other.look(1.0045)
+    one.newest_frame, clock[0] = 1.02, 1.04  # nothing of it came; the frame of 1.040 waits for a reading
+    one.beat(1.04)
+    for clock[0], is_over in ((1.0405, False), (1.055, False), (1.0621, True)):
+        other.look(clock[0])
+        assert other.leads is is_over
+    one.close(), other.close()
+
+
+def test_a_leader_that_has_sent_no_frame_yet_counts_from_when_it_began_to_lead() -> None:
+    clock = [0.0]
     one, other = pair_of(KEY, KEY, clock=clock)
-    one.look(1.0)
-    for now, send in ((1.000, one.begin_tick), (1.002, one.beat), (1.040, one.begin_tick)):
-        clock[0] = now
-        send(now)
-        other.look(now)
-    other.is_ready = True
-    clock[0] = 1.055  # the frame of 1.040 waits for a reading
-    other.look(1.055)
-    assert not other.leads
+    clock[0] = 0.9
+    one.look(0.9)
+    one.newest_frame = 0.5  # of an earlier lead
+    for clock[0], is_over in ((0.9, False), (0.9419, False), (0.9421, True)):
+        one.beat(clock[0])
+        other.look(clock[0])
+        other.is_ready = True
+        assert other.leads is is_over
     one.close(), other.close()
