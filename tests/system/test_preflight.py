@@ -235,11 +235,7 @@ def test_a_show_put_aside_while_a_stick_is_checked_stays_so(
         return check(show, box)
 
     monkeypatch.setattr(commands, "candidate_problems", while_the_stage_fails)
-
-    def stick() -> bytes:
-        return bytes([preflight(machine.options._replace(late=True), print, SECONDS_AFTER_POWER_ON)])
-
-    assert run_with_timeout(60.0, stick) == b"\0"
+    late(machine, SECONDS_AFTER_POWER_ON)
     assert machine.dances == "Summer"
     assert bad not in {pair.id for pair in machine.choice.pairs}
     assert "did not dance" in only_aside(machine)
