@@ -2,7 +2,8 @@
 
 `body.npz` has what a GPU is given: vertices in 16 bits, normals and weights in 8. Most faces come in pairs,
 as `surface_of` makes them, so four corners describe two; in single ones the last corner is there twice. The
-file has a hash of the skeleton and of the model's number; a file with another hash is not used.
+file has what `bake` computes, too, and a hash of the skeleton and of the model's number; a file with another
+hash is not used.
 """
 
 from __future__ import annotations
@@ -14,19 +15,21 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.body.bake import bake
 from appliance.body.body_mesh import SPACING, body_mesh
-from appliance.body.skinning import MOVERS, BodyMesh
+from appliance.body.skinning import MOVERS, Baked, BodyMesh
 from appliance.pose.foreign_file import content, require_inside
 from appliance.pose.skeleton import Skeleton
 
 MESH_FILE = "body.npz"
-MODEL = 5  # another number where sculpture, surface or weights change: files of before are made again
+MODEL = 6  # another number where sculpture, surface, weights or `bake` change: files of before are made again
 LARGEST_BYTES = 4_000_000
 _LARGEST_UNPACKED = 16_000_000
 _DIGITS = 6  # decimals in the key: a skeleton that was written as text has the same
@@ -57,7 +60,10 @@ def read_mesh(folder: Path, skeleton: Skeleton) -> BodyMesh | None:
         with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
             if str(loaded["key"]) != mesh_key(skeleton):
                 return None
-            return unpacked({name: loaded[name] for name in loaded.files}, len(skeleton))
+            arrays = {name: loaded[name] for name in loaded.files}
+        mesh = unpacked(arrays, len(skeleton))
+        baked = None if mesh is None else _baked(arrays, mesh)
+        return None if mesh is None or baked is None else replace(mesh, baked=baked)
     except _UNREADABLE:
         return None
 
@@ -72,12 +78,11 @@ def write_mesh(
     """
     if read_mesh(folder, skeleton) is not None and _source(folder) == source:
         return False
-    mesh = body_mesh(skeleton) if model is None else model()
+    surface = _packed(body_mesh(skeleton) if model is None else model())
+    arrays = surface | _packed_bake(_surface(surface))
     written = folder / f".{MESH_FILE}.new"
     with written.open("wb") as stream:
-        np.savez_compressed(
-            stream, key=np.array(mesh_key(skeleton)), source=np.array(source), **_packed(mesh)
-        )
+        np.savez_compressed(stream, key=np.array(mesh_key(skeleton)), source=np.array(source), **arrays)
     written.replace(folder / MESH_FILE)
     return True
 
@@ -113,7 +118,7 @@ def _packed(mesh: BodyMesh) -> Arrays:
         "low": low,
         "step": step,
         "vertices": np.stack([places & 255, places >> 8]).astype(np.uint8),
-        "normals": np.round(255.0 * (0.5 + 0.5 * mesh.normals)).astype(np.uint8).T,
+        "normals": _signed_bytes(mesh.normals),
         "quads": _bytes(quads.T),
         "joints": mesh.joints.T,
         "weights": np.round(255.0 * mesh.weights).astype(np.uint8).T,
@@ -121,6 +126,46 @@ def _packed(mesh: BodyMesh) -> Arrays:
         "bind_positions": mesh.bind_positions,
         "bind_world": mesh.bind_world,
     }
+
+
+def _packed_bake(mesh: BodyMesh) -> Arrays:
+    """The arrays of what is computed from a surface: normals as differences from the mesh's, and of each face
+    its place in the order."""
+    baked = bake(mesh)
+    return {
+        "open": _signed_bytes(baked.open),
+        "sunk": baked.sunk.astype(np.float16).T,
+        "calm": _signed_bytes(baked.calm) - _signed_bytes(mesh.normals),
+        "order": _bytes(np.diff(np.argsort(baked.order), prepend=0).astype(np.int32)),
+    }
+
+
+def _baked(arrays: Arrays, mesh: BodyMesh) -> Baked | None:
+    """The reverse of `_packed_bake`; None if it does not fit the mesh. Raises as `unpacked`."""
+    baked = Baked(
+        _signed(arrays["open"]),
+        arrays["sunk"].T.astype(np.float16),
+        _signed(arrays["normals"] + arrays["calm"]),
+        np.argsort(np.cumsum(_numbers(arrays["order"]))),
+    )
+    numbers = (baked.open, baked.sunk, baked.calm)
+    is_whole = (
+        baked.order.shape == mesh.faces.shape[:1]
+        and baked.open.shape == mesh.vertices.shape[:1]
+        and baked.sunk.shape == baked.calm.shape == mesh.vertices.shape
+        and all(bool(np.isfinite(part).all()) for part in numbers)
+    )
+    return baked if is_whole else None
+
+
+def _signed_bytes(values: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Numbers from -1 to 1, transposed, as a GPU has them."""
+    return np.round(255.0 * (0.5 + 0.5 * values)).astype(np.uint8).T
+
+
+def _signed(columns: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """The reverse of `_signed_bytes`."""
+    return np.ascontiguousarray(columns.T.astype(np.float32) / 127.5 - 1.0, np.float32)
 
 
 def _paired(faces: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -146,7 +191,14 @@ def _numbers(planes: NDArray[np.uint8]) -> NDArray[np.int32]:
 
 
 def unpacked(arrays: Arrays, joint_count: int) -> BodyMesh | None:
-    """The surface of these arrays; None if they do not fit. Raises ValueError, LookupError, TypeError."""
+    """The surface of these arrays, without what is baked; None if they do not fit. Raises ValueError,
+    LookupError, TypeError."""
+    mesh = _surface(arrays)
+    return mesh if _is_whole(mesh, joint_count) else None
+
+
+def _surface(arrays: Arrays) -> BodyMesh:
+    """The reverse of `_packed`. Raises as `unpacked`."""
     low, high = arrays["vertices"].astype(np.float32)
     vertices = np.ascontiguousarray((arrays["step"] * (low + 256.0 * high)).T + arrays["low"], np.float32)
     quads = _numbers(arrays["quads"]).T.copy()
@@ -154,11 +206,10 @@ def unpacked(arrays: Arrays, joint_count: int) -> BodyMesh | None:
     quads[:, 1:] += quads[:, :1]
     faces = quads[:, _PAIR].reshape(-1, 3)
     faces = faces[faces[:, 1] != faces[:, 2]]
-    normals = arrays["normals"].T.astype(np.float32) / 127.5 - 1.0
     weights = arrays["weights"].T.astype(np.float32) / 255.0
-    mesh = BodyMesh(
+    return BodyMesh(
         vertices,
-        np.ascontiguousarray(normals, np.float32),
+        _signed(arrays["normals"]),
         np.ascontiguousarray(faces, np.int32),
         np.ascontiguousarray(arrays["joints"].T),
         np.ascontiguousarray(weights, np.float32),
@@ -166,7 +217,6 @@ def unpacked(arrays: Arrays, joint_count: int) -> BodyMesh | None:
         arrays["bind_positions"],
         arrays["bind_world"],
     )
-    return mesh if _is_whole(mesh, joint_count) else None
 
 
 def _is_whole(mesh: BodyMesh, joint_count: int) -> bool:

@@ -21,12 +21,28 @@ from appliance.pose.quaternion import Array
 
 
 @dataclass(frozen=True, eq=False)
+class Baked:
+    """A surface is drawn with these, too; `bake.bake` computes them.
+
+    open: (V,) float32, 0 to 1, how much of the light from all around reaches a vertex; sunk: (V, 3), figure
+    heights, how far a vertex moves where the face turns smooth, and calm: (V, 3) float32, its normal there;
+    order: (F,), the faces in the order in which they are drawn.
+    """
+
+    open: NDArray[np.float32]
+    sunk: NDArray[np.floating]
+    calm: NDArray[np.float32]
+    order: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
 class BodyMesh:
     """A closed surface around a skeleton, in the pose in which it was modelled.
 
     vertices, normals: (V, 3) float32, metres; faces: (F, 3) int32, counter-clockwise seen from outside;
     joints: (V, 4) uint8 and weights: (V, 4) float32, which joints move a vertex, sum 1, strongest first;
-    height: metres; bind_positions: (J, 3) and bind_world: (J, 4), where the joints were when it was modelled.
+    height: metres; bind_positions: (J, 3) and bind_world: (J, 4), where the joints were when it was modelled;
+    baked: in a surface that was read from a show.
     """
 
     vertices: NDArray[np.float32]
@@ -37,6 +53,7 @@ class BodyMesh:
     height: float
     bind_positions: NDArray[np.float32]
     bind_world: NDArray[np.float32]
+    baked: Baked | None = None
 
 
 def dual_quaternions(bind_positions: Array, bind_world: Array, positions: Array, world: Array) -> Array:

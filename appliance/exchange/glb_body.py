@@ -167,6 +167,8 @@ def _fitted(figure: _Figure, skeleton: Skeleton) -> BodyMesh:
     faces = number.reshape(-1)[figure.faces]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
+    if not len(faces):
+        raise ValueError("no triangle has an area")
     joints, shares = _strongest(weights[first])
     return BodyMesh(
         moved[first].astype(np.float32),

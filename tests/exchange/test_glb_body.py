@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.body.bake import bake
 from appliance.body.body_mesh import body_mesh
 from appliance.body.mesh_file import MESH_FILE, read_mesh
 from appliance.body.skinning import BodyMesh
@@ -99,6 +100,7 @@ def test_a_bundle_gets_it_once_and_its_own_body_back(tmp_path: Path, monkeypatch
     assert write_body(tmp_path, skeleton)
     worn = read_mesh(tmp_path, skeleton)
     assert own is not None and worn is not None and len(own.vertices) != len(worn.vertices)
+    assert worn.baked is not None and np.array_equal(worn.baked.order, bake(worn).order)
     monkeypatch.setattr(glb_body, "body_of", lambda *_: pytest.fail("made again"))
     assert not write_body(tmp_path, skeleton)
     (tmp_path / BODY_FILE).unlink()
@@ -135,6 +137,12 @@ def test_what_cannot_be_a_body_is_refused_in_words(change: str, says: str, tmp_p
 def test_too_many_triangles_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(glb_body, "MOST_TRIANGLES", 1000)
     with pytest.raises(ExchangeError, match="Decimate"):
+        body_of(figure(tmp_path / BODY_FILE, skeletons.mixamo()), skeletons.dancer())
+
+
+def test_a_figure_without_any_area_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(glb_body, "_WELD", 100.0)
+    with pytest.raises(ExchangeError, match="no triangle has an area"):
         body_of(figure(tmp_path / BODY_FILE, skeletons.mixamo()), skeletons.dancer())
 
 

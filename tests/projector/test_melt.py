@@ -8,9 +8,9 @@ import moderngl
 import numpy as np
 import pytest
 
+from appliance.body.bake import sunk
 from appliance.body.body_mesh import body_mesh
 from appliance.pose.recording import Recording
-from appliance.projector.picture.body_buffers import sunk
 from appliance.projector.picture.scene import WHOLE, Scene
 from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import LookConfig
