@@ -12,6 +12,7 @@ from serial.serialutil import Timeout
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
+from appliance.outputs.dmx import serial_port
 from appliance.outputs.dmx.adapter_wire import AdapterError, AdapterWire
 from appliance.outputs.dmx.serial_port import find_device, is_bare_ftdi, is_usb_pro
 from appliance.outputs.dmx.usb_pro import usb_pro_wire
@@ -110,7 +111,10 @@ def test_garbage_from_the_widget_changes_nothing(widget: UsbProWidget, until: Un
         wire.close()
 
 
-def test_a_widget_that_hangs_holds_up_nobody_and_comes_back(widget: UsbProWidget, until: Until) -> None:
+def test_a_widget_that_hangs_holds_up_nobody_and_comes_back(
+    widget: UsbProWidget, until: Until, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serial_port, "WRITE_TIMEOUT_S", 2.0)  # a busy machine sends little within 0.25 s
     with widget:
         wire = wire_to(widget)
         wire.send_universe(universe(), 0.0)
