@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 
+from appliance.outputs.frame_reader import FrameReader
 from hw_sim.peers import HOST
 from hw_sim.soak.delays import Delays
 from hw_sim.soak.frames import FrameWatch
@@ -25,7 +26,7 @@ from hw_sim.soak.script import KILLS_UNTIL, script
 from hw_sim.soak.unit import PAUSE_S, Unit
 from hw_sim.soak.vitals import Vitals
 from tests.bundles import write_show
-from tests.system.processes import PATIENCE_S
+from tests.system.processes import PATIENCE_S, wait_until
 
 LATE_MS = 15.0
 
@@ -214,11 +215,14 @@ def test_ended_early_it_gives_figures_verdict_picture_and_leaves_nobody_behind(t
     command = [sys.executable, "-m", "hw_sim.soak", "--minutes", "1", "--out", str(out), "--show", str(show)]
     with output.open("wb") as file:
         running = subprocess.Popen([*command, "--no-load"], stdout=file, stderr=subprocess.STDOUT)
-    until = time.monotonic() + PATIENCE_S
-    while b"ticks" not in output.read_bytes():
-        assert time.monotonic() < until and running.poll() is None, output.read_text()
-        time.sleep(0.05)
-    time.sleep(4.0)
+    with contextlib.closing(FrameReader(Path(f"/dev/shm/bunraku-soak-{running.pid}"))) as frames:
+
+        def has_danced() -> bool:
+            assert running.poll() is None, output.read_text()
+            newest = frames.newest(time.monotonic())
+            return newest is not None and newest.tick > 250 and b"ticks" in output.read_bytes()
+
+        wait_until(has_danced, output.read_text)
     running.send_signal(signal.SIGTERM)
     status = running.wait(PATIENCE_S)
     said = output.read_text()
