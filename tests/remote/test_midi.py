@@ -6,7 +6,6 @@ import os
 import pty
 import socket
 import struct
-import time
 import tty
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from appliance.remote.show_control_messages import command_of
 from appliance.show_control.midi_bindings import MidiBindings, Moved, checked, moved
 from appliance.show_control.packet import Message
 from hw_sim.peers import HOST, free_ports
+from tests.system.processes import wait_until
 
 CUES = ("walk in", "12", "end")
 FADER = {"device": "desk", "kind": "controller", "channel": 1, "number": 7}
@@ -111,8 +111,7 @@ def test_a_cable_that_is_unplugged_is_opened_again(tmp_path: Path) -> None:
     os.write(desk, b"\xb0\x07")
     assert list(midi.messages()) == []
     os.write(desk, b"\x7f\x40")
-    time.sleep(0.01)
-    assert list(midi.messages()) == [("midiC1D0", b"\xb0\x07\x7f")]
+    assert wait_until(lambda: list(midi.messages())) == [("midiC1D0", b"\xb0\x07\x7f")]
     midi.send("midiC1D0", b"\xb0\x07\x20")
     assert os.read(desk, 10) == b"\xb0\x07\x20"
     os.close(own)
@@ -127,8 +126,7 @@ def test_a_cable_that_is_unplugged_is_opened_again(tmp_path: Path) -> None:
     assert midi.names == ()
     midi.look(3.0)
     os.write(desk, b"\x90\x3c\x40")
-    time.sleep(0.01)
-    assert list(midi.messages()) == [("midiC1D0", b"\x90\x3c\x40")]
+    assert wait_until(lambda: list(midi.messages())) == [("midiC1D0", b"\x90\x3c\x40")]
     midi.close()
 
 
