@@ -21,7 +21,7 @@ from appliance.pair.roles import (
     Roles,
 )
 
-SILENT_S, TICK_S = 0.042, 0.02
+SILENT_S, TICK_S = 0.048, 0.02
 
 
 def roles(is_first: bool = True, now: float = 0.0) -> Roles:
