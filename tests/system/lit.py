@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -39,21 +40,33 @@ class Node:
 
     def __init__(self, receiver: ArtNetReceiver) -> None:
         self._receiver = receiver
+        self._came: deque[tuple[float, int, bytes]] = deque()
         self.levels: dict[int, bytes] = {}
         self.arrivals: list[tuple[float, int, bytes]] = []
 
     def receive(self) -> None:
         """Take what has arrived."""
-        for arrival, packet in self._receiver.poll(0.05):
-            self.levels[packet.port_address] = packet.levels
-            self.arrivals.append((arrival, packet.port_address, packet.levels))
+        self._poll()
+        while self._came:
+            self._take_one()
+
+    def _poll(self) -> None:
+        polled = self._receiver.poll(0.05)
+        self._came.extend((arrival, one.port_address, one.levels) for arrival, one in polled)
+
+    def _take_one(self) -> None:
+        if not self._came:
+            self._poll()
+        if self._came:
+            self.arrivals.append(self._came.popleft())
+            _, universe, self.levels[universe] = self.arrivals[-1]
 
     def await_levels(self, is_wanted: Callable[[bytes], bool], universe: int = 1) -> None:
-        """Wait until the newest levels are as wanted."""
+        """Wait until levels come that are as wanted; the next wait goes on after them, however many came."""
         wait_until(
             lambda: universe in self.levels and is_wanted(self.levels[universe]),
             lambda: f"universe {universe} has {self.levels.get(universe, b'')[:32].hex() or 'nothing'}",
-            self.receive,
+            self._take_one,
         )
 
     def await_dance(self) -> None:
