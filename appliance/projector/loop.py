@@ -40,13 +40,13 @@ from appliance.show.show import load_show
 
 STALE_S = 0.5
 FADE_S = 0.5
-_LONGEST_S = 0.25  # between two pictures: after a longer pause the fade still takes at least two steps
+_LONGEST_STEP_S = 0.25  # after a longer pause the fade still takes at least two pictures
 
-_SPARE = 0.45  # fraction of the display's period for drawing: cards, masks and other programs need the rest
+_DRAWING_SHARE = 0.45  # fraction of the display's period; cards, masks and other programs need the rest
 _TRIES = 2  # the faster one counts
+PAGE = "page "  # begins the line of the test card that has the page's address
 
 Looks = Mapping[str, LookConfig]
-PAGE = "page "  # begins the line of the test card that has the page's address
 
 
 class Painter(Protocol):
@@ -90,10 +90,10 @@ class Projector:
         self._poses: Interpolation | None = None
         self._painter: Painter | None = None
         self._cards: Cards | None = None
-        self._drawn: ShownShow | None = None  # what the painter was made for
-        self._to_draw: ShownShow | None = None  # a show that waits for its painter
+        self._drawn_show: ShownShow | None = None  # what the painter draws
+        self._next_show: ShownShow | None = None  # waits for its painter
+        self._is_black = False  # the display is, since that show waits
         self._detail = DETAILS[0]
-        self._is_black = False  # since that show waits
         self._test_card: Image | None = None
         self._test_card_of: tuple[object, ...] = ()
         self.shown: str | None = None  # the look of the last picture; None: none, or two that cross-fade
@@ -122,9 +122,9 @@ class Projector:
         self._follow_stage(now)
         moment = self._moment(now)
         self.held = _held(moment) if moment is not None else None
-        if self._to_draw is not None and moment is not None:
-            self._prepare(self._to_draw, moment, screen, display, share)
-        newest = self._poses.newest if self._poses is not None and self._drawn is not None else None
+        if self._next_show is not None and moment is not None:
+            self._prepare(self._next_show, moment, screen, display, share)
+        newest = self._poses.newest if self._poses is not None and self._drawn_show is not None else None
         presence = self._presence.step(newest, now)
         show_state = self._show_state.read()
         if self._controls.shows_test_card and not (show_state.panic or show_state.blackout):
@@ -199,15 +199,17 @@ class Projector:
         display: Size,
         share: float,
     ) -> None:
-        """Draw each look once, unseen: drivers defer work to the first use, which would halt the dance.
+        """Called for three pictures: one is black; before the next, everything is made; the third begins the
+        fade, which excludes that time.
 
-        Cross-faded with itself, onto a texture and onto the display: drivers compile shaders again for each.
+        Draws each look once, unseen: drivers defer work to the first use, which would halt the dance. Each is
+        cross-faded with itself, onto a texture and onto the display: shaders are compiled again for those.
         """
         if not self._is_black:
             self._is_black = True
             return
-        if self._painter is not None:  # one picture later, so that the fade excludes that time
-            self._drawn, self._to_draw = show, None
+        if self._painter is not None:
+            self._drawn_show, self._next_show = show, None
             return
         self.is_preparing = True
         self._painter = self._make_painter(self._gl, show.skeleton, show.looks, show.directory)
@@ -224,7 +226,7 @@ class Projector:
     def _affordable_detail(
         self, moment: Moment, show: ShownShow, screen: moderngl.Framebuffer, display: Size
     ) -> Detail:
-        """Measured with the look that takes longest."""
+        """The finest that this machine draws in time, measured with the look that takes longest."""
         size = self._picture_size(display)
 
         def drawn(look: str, detail: Detail) -> None:
@@ -243,13 +245,13 @@ class Projector:
 
     def _switch_to(self, facts: Facts) -> None:
         self._poses = Interpolation(self._reader, self._config.prediction_ms / 1000.0)
-        show = self._shown_show(facts)
-        if self._drawn is not None and self._drawn.is_like(show):
+        show = self._loaded(facts)
+        if self._drawn_show is not None and self._drawn_show.is_like(show):
             return
         self._release_show()
-        self._drawn = None
+        self._drawn_show = None
         self._presence.hide()
-        self._to_draw, self._is_black = show, False
+        self._next_show, self._is_black = show, False
 
     def _release_show(self) -> None:
         if self._painter is not None:
@@ -258,7 +260,7 @@ class Projector:
             self._cards.release()
         self._painter = self._cards = None
 
-    def _shown_show(self, facts: Facts) -> ShownShow:
+    def _loaded(self, facts: Facts) -> ShownShow:
         directory = facts.show_directory
         try:
             config = load_show(directory).config
@@ -333,9 +335,9 @@ def _changed_at(path: Path) -> int:
 def affordable_detail(
     draw: Callable[[Detail], None], period_s: float, clock: Callable[[], float] = time.perf_counter
 ) -> Detail:
-    """The finest detail for which a drawn picture leaves spare time. draw: draws the dearest look and waits.
+    """The finest detail that takes no more than _DRAWING_SHARE of a period. draw: draws once and waits.
 
-    It begins with the coarsest, which every machine draws, and ends with the first that takes too long.
+    Tries them from the coarsest, which every machine draws, up to the first that takes too long.
     """
     best = DETAILS[0]
     for detail in DETAILS:
@@ -345,7 +347,7 @@ def affordable_detail(
             began = clock()
             draw(detail)
             took_s.append(clock() - began)
-        if min(took_s) > _SPARE * period_s:
+        if min(took_s) > _DRAWING_SHARE * period_s:
             break
         best = detail
     return best
@@ -360,7 +362,7 @@ class Presence:
 
     def __init__(self, rate: float = USUAL_RATE) -> None:
         self.level = 0.0
-        self._pace = Pace(_LONGEST_S, rate)
+        self._pace = Pace(_LONGEST_STEP_S, rate)
         self._unseen_s = math.inf  # age of the newest frame, without the pauses of this process
 
     @property

@@ -50,11 +50,11 @@ from appliance.projector.stream.keying import keyed
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
 
-SHOWS_FOR_S = 600.0
+SHOWS_FOR_S = 600.0  # the test card of the first start
 MARK = "used"  # in the box's state folder: this box has been used
 
-PATIENCE_S = 5.0
-MESSAGE = (
+PATIENCE_S = 5.0  # with a display that takes no picture
+_DISPLAY_HANGS = (
     f"The display has taken no picture for {PATIENCE_S:g} s. The audience sees one that stands still, or "
     "none; the dance goes on. The projector ends so that it can be started again (a supervisor does it by "
     "itself); if it happens often, look at the cable, the projector and the graphics card's driver."
@@ -114,10 +114,10 @@ class Run:
             self._file = AlignmentFile(alignment_folder(box), config, say)
             opened.callback(self._file.close)
             self._controls = Controls(self._file.alignment, self._file.keep, options.shows_info)
-            self._first: FirstStart | None = None
+            self._first_start: FirstStart | None = None
             if options.is_first:
-                self._first = FirstStart(alignment_folder(box), (self._file.path, box.sensors.keys))
-                self._controls.shows_test_card = self._first.is_on
+                self._first_start = FirstStart(alignment_folder(box), (self._file.path, box.sensors.keys))
+                self._controls.shows_test_card = self._first_start.is_on
             self._inbox = _open_inbox(folder, opened, say)
             self.fallbacks = Fallbacks(OF_THE_PROJECTOR)
             self._health = ProcessHealthWriter(folder, "projector", self.fallbacks)
@@ -138,9 +138,9 @@ class Run:
         self._is_resolution_said = False
         self._meter = Meter()
         self._patience = Patience(PATIENCE_S)
-        self._lines: tuple[str, ...] = ()
-        self._card: tuple[str, ...] = ()
-        self._warned = not self.context.is_software
+        self._info_lines: tuple[str, ...] = ()
+        self._card_lines: tuple[str, ...] = ()
+        self._is_software_said = not self.context.is_software
 
     def introduction(self) -> list[str]:
         """Facts for the technician at the start."""
@@ -163,8 +163,9 @@ class Run:
     def project(self, stopped: Callable[[], bool], notifier: Notifier | None = None) -> Figures:
         """Show pictures until `stopped`, the end of the seconds, or a key; returns how they came out."""
         notifier = notifier or Notifier({})
+        end = partial(end_process, _DISPLAY_HANGS, GPU_LOST)
         try:
-            with guarded(self._patience, lambda: self.projector.is_preparing, give_up, is_well=notifier.ping):
+            with guarded(self._patience, lambda: self.projector.is_preparing, end, is_well=notifier.ping):
                 self._show_pictures(stopped, notifier)
             self._health.end(time.monotonic())
         except moderngl.Error as error:
@@ -196,16 +197,15 @@ class Run:
 
     def _show(self, now: float) -> None:
         screen, size, begun = self.context.gl.screen, self._window.size, time.monotonic()
-        lines = self._lines if self._controls.shows_info else ()
-        lines = self._card if self._controls.shows_test_card else lines
+        lines = self._info_lines if self._controls.shows_info else ()
+        lines = self._card_lines if self._controls.shows_test_card else lines
         left_stage = self.projector.draw(now, screen, size, lines, self._resolution.share)
         if self._options.stamps:
             stamp(screen, self._meter.pictures, self.projector.held if left_stage is not None else None)
-        if self._options.frames is not None:
-            pixels = screen.read(viewport=(0, 0, *size), components=4)
-            pixels = keyed(pixels) if self._options.is_keyed else pixels
-            self._write_png(self._options.frames, pixels, size)
         read = partial(screen.read, viewport=(0, 0, *size), components=4)
+        if self._options.frames is not None:
+            pixels = keyed(read()) if self._options.is_keyed else read()
+            self._write_png(self._options.frames, pixels, size)
         if self._raw is not None:
             self._raw.offer(read(), size)
         if self._feed is not None:
@@ -263,7 +263,7 @@ class Run:
             self._inbox.answer(order, *self._controls.carry_out(order))
 
     def report(self, now: float) -> None:
-        """Once a second."""
+        """Once a second: to the box's other processes, onto the picture and to the terminal."""
         figures = self._meter.figures()
         state = self.reader.state(now)
         width, height = self._window.size
@@ -274,7 +274,7 @@ class Run:
         where = self._options.card() if has_lettering else ()
         drawn_at = "" if share == 1.0 else f" at {share:.0%}"
         age = "-" if figures.age_p50_ms is None else f"{figures.age_p50_ms:.0f} / {figures.age_p99_ms:.0f} ms"
-        self._lines = (
+        self._info_lines = (
             f"{figures.rate:.1f} pictures/s",
             f"frame age {age}",
             f"stage {state}",
@@ -282,20 +282,19 @@ class Run:
             f"{width}x{height}{drawn_at} {'software' if self.context.is_software else self._window.driver}",
             *(where if self._controls.shows_info else ()),
         )
-        self._card = (socket.gethostname(), *where, f"{width}x{height} {self._window.driver}")
+        self._card_lines = (socket.gethostname(), *where, f"{width}x{height} {self._window.driver}")
         if self._options.shows_info:
             self._say(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")
-        if not self._warned and figures.dances >= _JUDGED_AFTER:
-            self._warned = True
+        if not self._is_software_said and figures.dances >= _JUDGED_AFTER:
+            self._is_software_said = True
             self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self.context.renderer))
 
     def _end_first_start(self, now: float) -> None:
-        if self._first is None or not self._first.is_on:
+        if self._first_start is None or not self._first_start.is_on:
             return
         newest = self.reader.newest(now)
         sequence = -1 if newest is None else newest.sensor_sequence
-        shown = self._show_state.read(), self._controls.shows_test_card
-        if self._first.is_over(now, sequence, *shown):
+        if self._first_start.is_over(now, sequence, self._show_state.read(), self._controls.shows_test_card):
             self._say(self._controls.set_test_card(False))
 
     def _publish_health(self, now: float, stage: str, share: float) -> None:
@@ -337,16 +336,11 @@ def _open_inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> 
     return inbox
 
 
-def give_up() -> None:
-    """End this process, and say why."""
-    end_process(MESSAGE, GPU_LOST)
-
-
 class FirstStart:
-    """Shows the test card by itself, once, until a sensor is heard or a command comes.
+    """Whether the test card shows by itself: once in a box's life, until a sensor is heard or commands come.
 
-    folder: the state folder. Where nothing can be kept the card would come back at each power-on, even in the
-    middle of an evening: there it does not come at all, nor where a picture was aligned or a sensor paired.
+    folder: for MARK, afterwards. If it cannot be written, the card never shows, as it would come back at each
+    power-on, even in the middle of an evening. signs_of_use: files that a new box does not have.
     """
 
     def __init__(self, folder: Path, signs_of_use: tuple[Path | None, ...] = ()) -> None:
@@ -356,8 +350,8 @@ class FirstStart:
         self._since: float | None = None
 
     def is_over(self, now: float, sensor_sequence: int, show_state: ShowState, is_shown: bool = True) -> bool:
-        """Once: when the card goes. now: seconds on the monotonic clock; sensor_sequence: -1 without one;
-        is_shown: False after a person switched the card off."""
+        """True once, when the card goes. now: monotonic seconds; sensor_sequence: the newest frame's, -1
+        before a sensor was heard; is_shown: False after a person switched the card off."""
         if not self.is_on:
             return False
         self._since = now if self._since is None else self._since

@@ -79,7 +79,7 @@ def test_the_projector_shows_it_until_a_sensor_is_heard(tmp_path: Path) -> None:
     ):
         stage.write(time.monotonic())
         run.report(time.monotonic())
-        assert run._controls.shows_test_card and "pin 123456" in run._card and not said
+        assert run._controls.shows_test_card and "pin 123456" in run._card_lines and not said
         stage._frame.sensor_sequence = 3
         stage.write(time.monotonic())
         run.report(time.monotonic())
