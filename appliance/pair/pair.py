@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from appliance.box.clock import TICK_S
 from appliance.pair import wire
 from appliance.pair.clock_offset import ClockOffset
 from appliance.pair.roles import Heard, Role, Roles
@@ -275,7 +276,8 @@ class Pair:
             self.offset.restart()
         self.offset.hear(found.sent, now)
         if now - found.sent - self.offset.seconds < _STALE_S + waited_s:
-            as_of = found.heard.as_of + self.offset.seconds
+            # While this box was held up its socket filled, and what came last may be lost.
+            as_of = now if waited_s > TICK_S else found.heard.as_of + self.offset.seconds
             self.roles.hear(found.heard._replace(as_of=as_of), now, self.is_ready)
         if (
             found.heard.role is Role.LEADS
