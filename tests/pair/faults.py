@@ -14,6 +14,7 @@ import itertools
 import json
 import random
 import signal
+import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
@@ -284,6 +285,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="one line of JSON for each fault, appended")
     parser.add_argument("--read", type=Path)
     given = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # its boxes and networks end with it
     results = [json.loads(line) for line in given.read.read_text().splitlines()] if given.read else []
     with tempfile.TemporaryDirectory(prefix="pair-") as name:
         folder = Path(name)
