@@ -83,6 +83,16 @@ class Page:
         answer = self.command(address, *arguments)
         return answer.status == 200 and bool(answer.value["done"])
 
+    def order(self, address: str, *arguments: object) -> Any:
+        """What a command is answered with: again while stage or show control were held up for too long."""
+
+        def answered() -> Any:
+            answer = self.command(address, *arguments)
+            is_late = answer.status != 200 or "not answer" in answer.value["message"]
+            return None if is_late else answer.value
+
+        return wait_until(answered, f"{address} is not answered")
+
     def status(self) -> dict[str, Any]:
         """What the page tells now."""
         value: dict[str, Any] = self.get("/status").value

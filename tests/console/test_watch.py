@@ -69,7 +69,7 @@ def test_a_browser_gets_the_poses_that_leave_the_box(venue: tuple[Box, Page]) ->
                 frame = await next_frame(browser)
                 tick, _, joints = BROWSER_HEAD.unpack_from(frame)
                 puppets = np.frombuffer(frame, "<f4", -1, BROWSER_HEAD.size).reshape(2, 8 * joints)
-                for seen in reader.frames(10, time.monotonic()):
+                for seen in reader.frames(60, time.monotonic()):
                     if seen.tick == tick:
                         for numbers, puppet in zip(puppets, seen.puppets, strict=True):
                             assert np.array_equal(numbers[: 4 * joints], puppet.world.ravel())
@@ -94,16 +94,18 @@ def test_frames_come_only_to_a_browser_that_wants_them_and_words_to_all(venue: t
             browser = await watching(session, page, frames=False)
             kinds = [(await browser.receive()).type for _ in range(3)]
             await browser.send_json({"frames": True})
-            await next_frame(browser)
-            began, frames = time.monotonic(), 0
-            while time.monotonic() - began < 2.0:
+            frames, until = 0, time.monotonic() + PATIENCE_S
+            while frames < 25 and time.monotonic() < until:
                 await next_frame(browser)
-                frames += 1
+                began, frames = time.monotonic(), 0
+                while time.monotonic() - began < 2.0:
+                    await next_frame(browser)
+                    frames += 1
             return kinds.count(WSMsgType.TEXT), frames
 
     text, frames = asyncio.run(count())
     assert text == 3
-    assert frames >= 25, "25 a second and more, on a quiet machine"
+    assert frames >= 25, "25 a second on a quiet machine, and half of it in some two seconds of a busy one"
 
 
 @pytest.mark.parametrize(
@@ -221,16 +223,16 @@ def test_twenty_browsers_five_of_them_stuck_and_a_flood_cost_the_dance_nothing(
 def test_a_command_of_the_page_is_one_of_a_desk(venue: tuple[Box, Page]) -> None:
     _, page = venue
     page.unlock()
-    done = page.command("/panic").value
+    done = page.order("/panic")
     assert done["done"] and "black" in done["message"]
     wait_until(lambda: page.status()["verdict"]["key"] == "panic")
-    page.command("/go")
+    page.order("/go")
     wait_until(lambda: page.status()["status"]["panic"] == 0)
-    refused = page.command("/cue", "clam").value
+    refused = page.order("/cue", "clam")
     assert not refused["done"] and "calm" in refused["message"], "the nearest name"
-    assert page.command("/cue", "calm").value["done"]
+    assert page.order("/cue", "calm")["done"]
     wait_until(lambda: {"name": "calm", "now": True} in page.status()["cues"])
-    assert page.command("/player/rate", 1).value["done"], "a stream is not answered when it is done"
+    assert page.order("/player/rate", 1)["done"], "a stream is not answered when it is done"
 
 
 def test_metrics_are_for_prometheus(venue: tuple[Box, Page]) -> None:
