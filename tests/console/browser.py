@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from playwright.sync_api import BrowserContext, expect
+from playwright.sync_api import Browser, BrowserContext, expect
 from playwright.sync_api import Page as Tab
 
 from appliance.box.show_state import ShowStateReader
@@ -20,6 +20,21 @@ LAPTOP: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}}
 ON_A_LAPTOP = pytest.mark.parametrize("context", [LAPTOP], ids=["laptop"], indirect=True)
 # For what finger and mouse do differently, and for the layout of a page.
 ON_BOTH = pytest.mark.parametrize("context", [PHONE, LAPTOP], ids=["phone", "laptop"], indirect=True)
+# A sentence stays for three seconds, a question and a request for six: one that is held up finds them still.
+_PATIENT = f"""{{
+  const later = setTimeout, ends = AbortSignal.timeout.bind(AbortSignal);
+  window.setTimeout = (act, ms, ...given) => later(act, ms >= 3000 ? {PATIENCE_MS} : ms, ...given);
+  AbortSignal.timeout = () => ends({PATIENCE_MS});
+}}"""
+
+
+def opened_context(browser: Browser, **options: Any) -> BrowserContext:
+    """A device, PHONE or LAPTOP with what else Playwright takes; its pages wait for a slow person."""
+    expect.set_options(timeout=PATIENCE_MS)
+    made = browser.new_context(**{"locale": "en-GB"} | options)
+    made.set_default_timeout(PATIENCE_MS)
+    made.add_init_script(_PATIENT)
+    return made
 
 
 def press(tab: Tab, where: str) -> None:
@@ -88,8 +103,6 @@ def unlock(tab: Tab, page: Page) -> None:
 
 def unlocked_tab(context: BrowserContext, page: Page, which: str) -> Tab:
     """A new tab on a device that gave the PIN, on one of the pages."""
-    expect.set_options(timeout=PATIENCE_MS)
-    context.set_default_timeout(PATIENCE_MS)
     tab = context.new_page()
     tab.goto(page.origin)
     await_box(tab)

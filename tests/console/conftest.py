@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, sync_playwright
 from playwright.sync_api import Page as Tab
 
 from tests.bundles import write_show
-from tests.console.browser import PATIENCE_MS, PHONE, await_box, observe
+from tests.console.browser import PHONE, await_box, observe, opened_context
 from tests.console.page import CUES, Page, box_with_page, page_alone
 from tests.system.box import Box
 from tools.page_pictures import CHROMIUM
@@ -60,8 +60,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def context(request: pytest.FixtureRequest, browser: Browser) -> Iterator[BrowserContext]:
     """A phone; or what a test is marked with: ON_A_LAPTOP, ON_BOTH."""
-    made = browser.new_context(**getattr(request, "param", PHONE), locale="en-GB")
-    made.set_default_timeout(PATIENCE_MS)
+    made = opened_context(browser, **getattr(request, "param", PHONE))
     yield made
     made.close()
 
@@ -69,7 +68,6 @@ def context(request: pytest.FixtureRequest, browser: Browser) -> Iterator[Browse
 @pytest.fixture
 def tab(context: BrowserContext, venue: tuple[Box, Page]) -> Iterator[Tab]:
     """The page, opened; an error of its scripts fails the test."""
-    expect.set_options(timeout=PATIENCE_MS)
     opened = context.new_page()
     errors: list[str] = []
     opened.on("pageerror", lambda error: errors.append(str(error)))

@@ -15,12 +15,12 @@ from appliance.levers.table import CARD, MASTER
 from tests.console.browser import (
     ON_A_LAPTOP,
     ON_BOTH,
-    PATIENCE_MS,
     PHONE,
     await_box,
     await_true,
     declared,
     observe,
+    opened_context,
     press,
     unlock,
 )
@@ -91,7 +91,12 @@ def test_an_evening_by_its_buttons(tab: Tab, venue: tuple[Box, Page]) -> None:
     tab.locator("#master").focus()
     tab.keyboard.press("Home")
     wait_until(lambda: declared(box)[MASTER].value == 0.0)
-    expect(tab.locator("#verdict")).to_contain_text("0 %")
+
+    def says_dark() -> bool:
+        """A fallback in force comes before it: on a busy machine ticks are late all the time."""
+        return "0 %" in tab.inner_text("#verdict") or page.status()["verdict"]["key"] == "fallbacks"
+
+    wait_until(says_dark, lambda: tab.inner_text("#verdict"))
     tab.locator("#master").focus()
     tab.keyboard.press("End")
     wait_until(lambda: declared(box)[MASTER].value == 1.0)
@@ -105,8 +110,7 @@ def test_an_evening_by_its_buttons(tab: Tab, venue: tuple[Box, Page]) -> None:
 
 def test_a_thumb_that_scrolls_over_panic_does_nothing(browser: Browser, venue: tuple[Box, Page]) -> None:
     box, page = venue
-    context = browser.new_context(**PHONE)
-    context.set_default_timeout(PATIENCE_MS)
+    context = opened_context(browser, **PHONE)
     tab = context.new_page()
     tab.goto(page.origin)
     await_box(tab)
@@ -143,8 +147,7 @@ def test_a_page_s_process_that_hangs_is_killed_and_comes_back(tab: Tab, venue: t
 
 def test_after_the_phone_slept_the_page_is_back(browser: Browser, venue: tuple[Box, Page]) -> None:
     """A frozen page runs no scripts, as behind a locked screen."""
-    context = browser.new_context(**PHONE)
-    context.set_default_timeout(PATIENCE_MS)
+    context = opened_context(browser, **PHONE)
     tab = context.new_page()
     tab.goto(venue[1].origin)
     await_box(tab)
@@ -192,8 +195,7 @@ ANSWERS = [  # as the box gives them: with values, several in one answer, and on
 
 
 def test_it_speaks_german_to_a_german_phone(browser: Browser, venue: tuple[Box, Page]) -> None:
-    context = browser.new_context(**PHONE, locale="de-AT")
-    context.set_default_timeout(PATIENCE_MS)
+    context = opened_context(browser, **PHONE, locale="de-AT")
     tab = context.new_page()
     tab.goto(venue[1].origin)
     expect(tab.locator("#panic")).to_have_text("PANIK")

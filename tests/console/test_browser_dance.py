@@ -6,7 +6,7 @@ import contextlib
 import time
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -36,18 +36,28 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     await_true(tab, "seen.held.length === 1 && seen.held[0][0] === 'lShldr' && seen.held[0][1] <= 1")
     assert tab.evaluate("seen.puppets") == 2
     before = tab.locator("#stage").screenshot()
-    tick, root = tab.evaluate("[seen.tick, seen.root]")
-    seen = {frame.tick: frame.puppets[0].root for frame in reader.frames(60, time.monotonic())}
-    assert np.allclose(root, seen[int(tick)], atol=0.001)
+
+    def seen_and_sent() -> tuple[int, Any, Any] | None:
+        """A tick, and its root on the page and in the box, which keeps a second of frames."""
+        tick, root = tab.evaluate("[seen.tick, seen.root]")
+        sent = {frame.tick: frame.puppets[0].root for frame in reader.frames(60, time.monotonic())}
+        return (tick, root, sent[int(tick)]) if int(tick) in sent else None
+
+    tick, root, sent_root = wait_until(seen_and_sent, "the page shows what the box never sent")
+    assert np.allclose(root, sent_root, atol=0.001)
     await_true(tab, f"seen.tick > {tick + 20}")
     assert tab.locator("#stage").screenshot() != before, "the figure moves"
     tab.locator("#show-dance").uncheck()
     expect(tab.locator("#held")).not_to_contain_text("No frame")
-    tab.wait_for_timeout(700)  # what was on its way has come
+
+    def rests() -> bool:
+        before = tab.evaluate("seen.frames")
+        tab.evaluate(PICTURES_COUNTED)
+        tab.wait_for_timeout(1000)
+        return bool(tab.evaluate("seen.frames") == before)
+
+    wait_until(rests, "switched off, it costs nothing")  # what was on its way has come
     count = tab.evaluate("seen.frames")
-    tab.evaluate(PICTURES_COUNTED)
-    tab.wait_for_timeout(1000)
-    assert tab.evaluate("seen.frames") == count, "switched off, it costs nothing"
     assert tab.evaluate("pictures / (performance.now() - picturesFrom)") < 0.01, "it draws what it has drawn"
     tab.locator("#show-dance").check()
     await_true(tab, f"seen.frames > {count}")

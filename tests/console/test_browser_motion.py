@@ -17,7 +17,7 @@ from appliance.show.bundle import default_show_path
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError
-from tests.console.browser import LAPTOP, PHONE, declared, press, unlocked_tab
+from tests.console.browser import LAPTOP, PHONE, declared, opened_context, press, unlocked_tab
 from tests.console.page import Page, box_with_page
 from tests.system.box import Box
 from tests.system.processes import wait_until
@@ -50,7 +50,7 @@ def value(box: Box, part: str) -> tuple[float, ...]:
 
 def test_variations_and_places_on_the_map(browser: Browser, studio: tuple[Box, Page]) -> None:
     box, page = studio
-    tab = unlocked_tab(browser.new_context(**PHONE, locale="en-GB"), page, "rehearsal")
+    tab = unlocked_tab(opened_context(browser, **PHONE), page, "rehearsal")
     expect(tab.locator("#motion-part")).to_be_hidden()
     press(tab, "#phrases >> text=Variation")
     sigma = tab.locator("#vary-sigma")
@@ -124,12 +124,12 @@ def test_the_settings_of_now_become_a_cue(browser: Browser, studio: tuple[Box, P
     page.unlock()
     assert page.get("/api/cue/show.zip").status == 404
     for address, *given in [("/phrase", "vary"), ("/motion/vary/sigma", 1.25), ("/iterations", 6, 4)]:
-        assert page.command(address, *given).value["done"]
+        assert page.order(address, *given)["done"]
     wait_until(lambda: _danced(page) == "vary", "no variation is danced")
     wait_until(lambda: page.status()["status"]["coding"] == 6)
-    assert page.command("/liveliness", 0.4, 0.5).value["done"] and page.command("/seed", 12).value["done"]
+    assert page.order("/liveliness", 0.4, 0.5)["done"] and page.order("/seed", 12)["done"]
     wait_until(lambda: round(page.status()["status"]["liveliness"], 3) == 0.4)
-    tab = unlocked_tab(browser.new_context(**LAPTOP, locale="en-GB"), page, "rehearsal")
+    tab = unlocked_tab(opened_context(browser, **LAPTOP), page, "rehearsal")
     for name, said in [("anna", "The cue anna is in the copy"), ("anna", "another name"), ("ben", "cue ben")]:
         tab.fill("#cue-name", name)
         press(tab, "#cue-keep")
@@ -152,7 +152,7 @@ def test_the_settings_of_now_become_a_cue(browser: Browser, studio: tuple[Box, P
 
 def test_knobs_of_springs_and_strings(browser: Browser, studio: tuple[Box, Page]) -> None:
     box, page = studio
-    tab = unlocked_tab(browser.new_context(**PHONE, locale="de-DE"), page, "rehearsal")
+    tab = unlocked_tab(opened_context(browser, **PHONE, locale="de-DE"), page, "rehearsal")
     setting, feedback = tab.locator("#springs >> text=strings"), tab.locator("#springs-feedback")
     expect(tab.locator("#springs >> text=loose")).to_have_attribute("aria-pressed", "true")
     expect(feedback).to_have_value("0")

@@ -11,7 +11,7 @@ from playwright.sync_api import Page as Tab
 
 from hw_sim.peers import free_ports
 from tests.bundles import write_show
-from tests.console.browser import PHONE, press, sensor_card, unlocked_tab
+from tests.console.browser import PHONE, opened_context, press, sensor_card, unlocked_tab
 from tests.console.page import Page, page_alone
 from tests.system.bench import NETWORK, PASSWORD, Bench
 from tests.system.box import playing
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.realtime
 
 
 def opened(browser: Browser, page: Page) -> Tab:
-    return unlocked_tab(browser.new_context(**PHONE, locale="en-GB"), page, "sensors")
+    return unlocked_tab(opened_context(browser, **PHONE), page, "sensors")
 
 
 def begin(tab: Tab, done: bool = True) -> str:

@@ -13,7 +13,16 @@ from playwright.sync_api import Page as Tab
 
 from hw_sim.peers import free_ports
 from tests.bundles import write_show
-from tests.console.browser import ON_BOTH, PATIENCE_MS, PHONE, await_box, await_true, declared, press, unlock
+from tests.console.browser import (
+    ON_BOTH,
+    PHONE,
+    await_box,
+    await_true,
+    declared,
+    opened_context,
+    press,
+    unlock,
+)
 from tests.console.page import Page
 from tests.console.test_browser_picture import drag
 from tests.stage.test_fallbacks import EVERY
@@ -264,10 +273,9 @@ def test_a_dead_receiver_has_its_name_in_each_language(
     with playing(write_show(tmp_path / "show"), tmp_path, settings=settings) as box:
         page = Page(port, box.box_file)
         wait_until(page.is_open, lambda: box.output)
-        context = browser.new_context(**PHONE, locale=locale)
-        context.set_default_timeout(PATIENCE_MS)
+        context = opened_context(browser, **PHONE, locale=locale)
         tab = context.new_page()
         tab.goto(page.origin)
         reported = tab.locator("#fallbacks-now li", has_text=message)
-        expect(reported).to_contain_text(f"127.0.0.1:{nobody}", timeout=PATIENCE_MS)
+        expect(reported).to_contain_text(f"127.0.0.1:{nobody}")
         context.close()
