@@ -28,7 +28,7 @@ GROUP = "bunraku play, the default show: start of the process -> first frame"
 NOTE_GROUP = "the place of the dance, noted after each frame"
 READ_GROUP = "the show state, read at each tick"
 ROUNDS = 7
-_PATIENCE_S = 30.0
+_PATIENCE_S = 60.0
 
 
 class Starts:

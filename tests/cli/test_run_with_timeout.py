@@ -15,7 +15,7 @@ from appliance.cli import run_with_timeout as run_with_timeout_module
 from appliance.cli.run_with_timeout import TimedOutError, run_with_timeout
 from appliance.release.choice import EMBEDDED_SHOW
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 def test_a_child_that_has_not_left_its_parent_s_group_is_ended_too(monkeypatch: pytest.MonkeyPatch) -> None:

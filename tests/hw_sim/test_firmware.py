@@ -291,7 +291,7 @@ def test_as_processes_over_real_sockets(emulate: Emulate, tmp_path: Path) -> Non
     process = emulate("--firmware", "--keys", path, "--port", port_of(link), "--network", "perfect")
     readings = hear_until(link, lambda heard: {one.sensor for one in heard} == {"left-wrist", "head"})
     process.terminate()
-    assert process.wait(timeout=20) == 0
+    assert process.wait(timeout=60) == 0
     link.close()
     assert len({reading.boot_nonce for reading in readings}) == 2
 
@@ -305,5 +305,5 @@ def test_as_a_process_over_a_real_tty(emulate: Emulate, tmp_path: Path) -> None:
         process = emulate("--firmware", "--keys", path, "--serial", cable.near, "--network", "perfect")
         hear_until(link, lambda heard: len(heard) > 25)
         process.terminate()
-        assert process.wait(timeout=20) == 0
+        assert process.wait(timeout=60) == 0
         link.close()

@@ -20,7 +20,7 @@ from tests.outputs.conftest import fill
 from tests.outputs.osc_peers import LOOPBACK
 from tests.outputs.small_stage import one_puppet
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 @pytest.fixture

@@ -86,7 +86,7 @@ def test_the_guard_gives_up_once_and_ends_with_what_it_guards(monkeypatch: pytes
 
     def await_looks() -> None:
         """Until the guard has looked twice at this time: it takes a clock that leaps for a standstill."""
-        until = time.monotonic() + 20.0
+        until = time.monotonic() + 60.0
         while seen.count(now) < 2:
             assert time.monotonic() < until
             time.sleep(0.002)
@@ -99,7 +99,7 @@ def test_the_guard_gives_up_once_and_ends_with_what_it_guards(monkeypatch: pytes
             await_looks()
         assert not gave_up.is_set()
         now = 106.0
-        assert gave_up.wait(20.0)
+        assert gave_up.wait(60.0)
     assert is_well[-1] == 104.5
     assert "watchdog" not in [thread.name for thread in threading.enumerate()]
 
@@ -113,7 +113,7 @@ def test_a_display_that_hangs_ends_the_projector_with_words_and_75(tmp_path: Pat
     )
     try:
         assert process.stdout is not None and "hangs" in process.stdout.readline()
-        _, output = process.communicate(timeout=20.0)
+        _, output = process.communicate(timeout=60.0)
     finally:
         process.kill()
     assert process.returncode == GPU_LOST

@@ -16,7 +16,7 @@ from appliance.sensor.framing import Deframer, frame
 from appliance.sensor.link import SensorLink, SensorReading
 from tests.sensor.peers import KEYS, Wearable
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 class Cable:

@@ -33,7 +33,7 @@ from tests.outputs.small_stage import one_puppet
 
 HOST = "127.0.0.1"
 OF_PUPPET = {"coding", "interaction", "phrase", "base", "made", "position_s", "let_go"}
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 CUES: tuple[dict[str, Any], ...] = (
     {"name": "1", "look": "lines", "lights": None, "master": None, "fade_s": 0.0},
     {

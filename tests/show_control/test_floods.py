@@ -220,7 +220,7 @@ def test_the_process_answers_after_all_that_and_has_not_grown(folder: Path, tmp_
         until(lambda: (asker.hear() or [])[:3] == ["/reply", "/panic", 1])  # after pongs that were late
         assert ShowStateReader(folder).read().panic
         process.terminate()
-        assert process.wait(20) == 0
+        assert process.wait(60) == 0
         flood.close()
         asker.close()
     *news, said = output.read_text().splitlines()

@@ -27,7 +27,7 @@ NOW = 1000.0
 def listener() -> Iterator[socket.socket]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind((HOST, 0))
-        listener.settimeout(20.0)
+        listener.settimeout(60.0)
         yield listener
 
 

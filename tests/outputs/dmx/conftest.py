@@ -10,7 +10,7 @@ import pytest
 
 from appliance.show.dmx import DmxConfig
 
-PATIENCE_S = 10.0
+PATIENCE_S = 60.0
 
 
 def universe(seed: int = 0) -> bytes:
