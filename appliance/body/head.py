@@ -46,17 +46,14 @@ def head(anatomy: Anatomy) -> list[Step]:
     if joint is None:
         return []
     height = anatomy.height
-    up, reach = _head_axis(anatomy, joint)
-    place = anatomy.positions[joint]
-    if not anatomy.is_person:
+    frame = head_frame(anatomy)
+    if frame is None:
+        up, reach = _head_axis(anatomy, joint)
+        place = anatomy.positions[joint]
         ends = place, place + max(reach, 0.05 * height) * up
         return [Slab(joint, *ends, 0.048 * height, 0.030 * height, 0.0, anatomy.across)]
-    front = np.cross(anatomy.across, up)
-    front = front / np.linalg.norm(front)
-    front = front if float(front @ anatomy.forward) >= 0 else -front
-    side = np.cross(up, front)
-    axes = np.array([front, up, side])
-    middle = place + min(max(reach - 0.055 * height, 0.03 * height), 0.058 * height) * up
+    middle, axes = frame
+    side = axes[2]
 
     def at(place: Place, mirrored: float = 1.0) -> Array:
         there: Array = middle + height * (np.array(place) * [1.0, 1.0, mirrored]) @ axes
@@ -79,6 +76,22 @@ def head(anatomy: Anatomy) -> list[Step]:
     steps += [ball(_LID, sign) for sign in both]
     steps += [slab(_RIDGE), *(ball(_WING, sign) for sign in both), slab(_LIPS)]
     return steps
+
+
+def head_frame(anatomy: Anatomy) -> tuple[Array, Array] | None:
+    """The middle of a person's head (3,), metres, and its axes (3, 3): to the front, upwards, to the side.
+
+    None without a head, or if it is not a person's.
+    """
+    if anatomy.head is None or not anatomy.is_person:
+        return None
+    height = anatomy.height
+    up, reach = _head_axis(anatomy, anatomy.head)
+    front = np.cross(anatomy.across, up)
+    front = front / np.linalg.norm(front)
+    front = front if float(front @ anatomy.forward) >= 0 else -front
+    above = min(max(reach - 0.055 * height, 0.03 * height), 0.058 * height)
+    return anatomy.positions[anatomy.head] + above * up, np.array([front, up, np.cross(up, front)])
 
 
 def neck(anatomy: Anatomy) -> list[Step]:

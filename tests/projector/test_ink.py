@@ -7,16 +7,20 @@ import numpy as np
 import pytest
 
 from appliance.outputs.coupling import ROW_S, ROWS
+from appliance.pose import quaternion
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
 from appliance.projector.picture.accents import Accent, accents, pressure
+from appliance.projector.picture.camera import view
 from appliance.projector.picture.kept_strokes import STAIN, STAIN_STEPS, STEP_S, WET, WET_LOSS, KeptStrokes
-from appliance.projector.picture.poses import Poses
+from appliance.projector.picture.looks.ink import Ink
+from appliance.projector.picture.poses import Poses, poses_of
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.picture.scene import Easel
 from appliance.projector.still import draw_still, moment_of
-from appliance.show.look import LookConfig
+from appliance.show.look import CameraConfig, LookConfig
 from tests.projector.golden_looks import SIZE, Picture
+from tests.projector.skeletons import quadruped
 
 INK = {"ink": LookConfig(name="ink", style="ink")}
 
@@ -141,3 +145,49 @@ def test_without_a_trail_nothing_is_kept(dance: Recording, gl: moderngl.Context)
         pictures.append(picture)
         renderer.release()
     assert np.array_equal(*pictures)
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, 90.0])
+def test_a_head_is_drawn_as_it_turns(turned_deg: float, dance: Recording, gl: moderngl.Context) -> None:
+    """The face is thin ink, the hair full: from behind the head is darker, however it is turned.
+
+    It was a filled circle from all sides."""
+    skeleton = dance.skeleton
+    poses = np.tile(quaternion.IDENTITY, (1, len(skeleton), 1)).astype(float)
+    poses[0, skeleton.index("head")] = quaternion.from_axis_angle((0.0, 1.0, 0.0), np.radians(turned_deg))
+    moment = moment_of(Recording(skeleton, poses, np.zeros((1, 3)), 50.0), 0.0)
+    easel = Easel(gl, skeleton)
+    where = poses_of(moment, moment.puppets[0], easel.height, easel.sole)
+    eyes = where.positions[0, [skeleton.index("leftEye"), skeleton.index("rightEye")]].mean(axis=0)
+    easel.release()
+    shades = []
+    for angle_deg in (turned_deg, turned_deg - 180.0):
+        camera = CameraConfig(move="still", angle_deg=angle_deg, elevation_deg=0.0)
+        look = {"ink": LookConfig(name="ink", style="ink", trail_s=0.0, camera=camera, render_scale=1.0)}
+        renderer = Renderer(gl, skeleton, look)
+        picture = draw_still(gl, renderer, moment, "ink", (360, 360)).mean(axis=2)
+        renderer.release()
+        across, up = view(camera, camera, 1.0, 0.0, where, 1.0).on_picture(eyes.astype(float))
+        x, y = round(360 * across), round(360 * (1.0 - up))
+        shades.append(float(np.median(picture[y - 8 : y + 12, x - 6 : x + 7])))
+    assert shades[0] > shades[1] + 25.0
+
+
+def test_an_animal_has_no_face(gl: moderngl.Context) -> None:
+    easel = Easel(gl, quadruped())
+    assert Ink(easel)._head["head_drawn"] == 0.0
+    easel.release()
+
+
+def test_the_paper_ends_in_a_clean_edge(dance: Recording, gl: moderngl.Context) -> None:
+    """It gets bright within a few pixels, and is not ruled straight."""
+    renderer = Renderer(gl, dance.skeleton, {"ink": LookConfig(name="ink", style="ink", trail_s=0.0)})
+    picture = draw_still(gl, renderer, moment_of(dance, 17.6), "ink", (1280, 720)).mean(axis=2)
+    renderer.release()
+    across = picture[:120, 160:1120:5]
+    most = across.max(axis=0)
+    begins = (across > 0.15 * most).argmax(axis=0)
+    ends = (across > 0.6 * most).argmax(axis=0)
+    assert (picture[:3] == 0.0).all()
+    assert 2.0 < np.mean(ends - begins) < 12.0
+    assert 0.8 < np.std(begins) < 6.0

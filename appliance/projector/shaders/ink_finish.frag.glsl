@@ -52,7 +52,7 @@ void main() {
         float echo = smoothstep(0.02, 0.7, 0.55 * wet.g + 0.45 * ink.g) * (0.68 + 0.75 * rough);
         float stroke = ink.b * (0.85 + 0.6 * rough) * (1.0 - 0.6 * covers);
         shown = mix(shown, light_colour, fog * (0.35 + 0.8 * drinks) * wet.r * (1.0 - body));
-        shown = mix(shown, mix(light_colour, blank, 0.35), clamp(echo, 0.0, 1.0));
+        shown = mix(shown, mix(light_colour, blank, 0.35), clamp(echo, 0.0, 1.0) * (1.0 - 0.8 * body * smoothstep(0.1, 0.3, ink.r)));  // thin ink shows paper, not the echo
         shown = mix(shown, accent_colour, clamp(max(stroke - old.r, 0.0), 0.0, 1.0));
         float mark = clamp((wet.a + ink.a) / max(wet.r + ink.r, 0.01), 0.0, 1.0);
         shown = mix(shown, mix(figure_colour, held_colour, mark), covers);

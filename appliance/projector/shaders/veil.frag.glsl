@@ -1,4 +1,4 @@
-// Glass: light catches where the surface turns away.
+// Glass: light catches along outlines. Alpha: how much it hides of what is drawn behind it later.
 in vec3 place;
 in vec3 normal;
 in vec3 skin;
@@ -10,14 +10,27 @@ uniform vec3 figure_colour;
 uniform vec3 light_colour;
 uniform vec3 held_colour;
 uniform float brightness;
+uniform float hides;
+uniform float pixel_height;  // figure heights that a pixel takes
 out vec4 colour;
 
+const vec2 RIM = vec2(0.010, 0.060);  // figure heights from the outline: full, and none
+const float THIN_RIM = 0.20;          // the mean of a rim across a limb
+
 void main() {
-    vec3 n = normalize(normal), to_eye = normalize(eye - place);
-    float facing = abs(dot(n, to_eye));
-    float rim = pow(1.0 - facing, 2.4) * smoothstep(0.0, 0.22, facing);
-    float glint = pow(clamp(dot(n, normalize(lamp + to_eye)), 0.0, 1.0), 40.0);
+    float straight = length(normal);
+    vec3 n = normal / straight, to_eye = normalize(eye - place);
+    float facing = abs(dot(n, to_eye)), aside = max(1.0 - facing, 0.0);
+    float change = fwidth(facing) + 1e-4;
+    float away = facing / change * pixel_height;  // from the outline; by its angle a limb that points at the eye is all outline
+    float rim = aside * aside * sqrt(aside) * smoothstep(0.0, 0.22, facing) * (1.0 - smoothstep(RIM.x, RIM.y, away));
+    float thin = smoothstep(0.15, 0.6, change);        // a finger is thinner than its rims: they would be dots
+    float even = smoothstep(0.70, 0.97, straight);     // an echo's fingers are a few triangles: splinters
+    rim = even * mix(rim, THIN_RIM, thin);
+    float glint = clamp(dot(n, normalize(lamp + to_eye)), 0.0, 1.0);
+    for (int i = 0; i < 5; i++) glint *= glint;  // its 32nd power
+    glint *= even * (1.0 - thin);
     vec3 glass = figure_colour * (0.05 + rim) + light_colour * 0.6 * glint;
     vec3 ember = held_colour * (0.28 + 0.25 * facing + rim);
-    colour = vec4(brightness * mix(glass, ember, mark), 1.0);
+    colour = vec4(brightness * mix(glass, ember, mark), hides);
 }

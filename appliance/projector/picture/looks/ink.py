@@ -8,6 +8,8 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from appliance.body.head import head_frame
+from appliance.body.rest_pose import anatomy_of
 from appliance.outputs.coupling import ROW_S, ROWS
 from appliance.pose.anatomy import Anatomy
 from appliance.projector.picture.accents import accents, pressure
@@ -15,7 +17,7 @@ from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.kept_strokes import KeptStrokes
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.particles import traced
-from appliance.projector.picture.scene import Easel, Scene
+from appliance.projector.picture.scene import Easel, Scene, direction
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
@@ -27,6 +29,8 @@ PAPER_LINES = 400  # lines of the sheet, which is made once
 SPILL = 0.25  # share of the picture's height that ink reaches beyond the figure: splashes, spreading and pull
 SWELL = 0.012  # figure heights between the outlines of a pressed and of a lifted brush
 MOST_SPLASHES, DROPS = 8, 26
+LAMP_FROM, LAMP_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor: the face's light
+FACE_SINKS = 4.0  # a melting face is gone after a quarter of the way
 PULL = 0.016  # fraction of the picture's height: how far fibres pull the ink
 
 
@@ -42,6 +46,7 @@ class Ink:
         self._strokes = easel.drawing("trail", "stroke", easel.vertices(strokes, instanced=True))
         parts = (f"MOST {MOST_SPLASHES}", f"DROPS {DROPS}")
         self._splashes = easel.drawing("splash", "splash", parts=parts)
+        self._head = _head(easel)
         anatomy = Anatomy(easel.skeleton)
         self._ends = [anatomy.chain(first)[-1] for _, first in anatomy.limbs()]
         self._kept = KeptStrokes(easel)
@@ -61,13 +66,15 @@ class Ink:
         }
         easel.weigh(pressure)
         moments = scene.shutter(wall)
+        head = self._head | {"lamp": direction(scene.view.azimuth + LAMP_FROM, LAMP_ABOVE)}
+        head["head_drawn"] *= max(0.0, 1.0 - FACE_SINKS * scene.melt)
 
         def draw(back: float) -> None:
             picture.start()
             picture.keep("ra")
             easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             own = {"row": 0, "level": 1.0, "hollow": 1.0, "swell": SWELL, "back": back}
-            easel.draw_figures(self._figure, inputs | own)
+            easel.draw_figures(self._figure, inputs | own | head)
             picture.keep("rgba")
             picture.finish()
 
@@ -162,6 +169,18 @@ class Ink:
         self._easel.draw_figures(self._strokes, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
         if any(strength for *_, strength in inputs["splash_at"]):
             self._splashes.draw(inputs, moderngl.TRIANGLE_STRIP, 4, MOST_SPLASHES * DROPS)
+
+
+def _head(easel: Easel) -> dict[str, Any]:
+    """The shader's inputs about where the head is in the rest pose, in figure heights."""
+    anatomy = anatomy_of(easel.skeleton)
+    frame = head_frame(anatomy)
+    if frame is None or anatomy.head is None:
+        return {"head_at": (0.0, 0.0, 0.0), "head_axes": np.eye(3), "head_drawn": 0.0}
+    middle, axes = frame
+    above = (middle - anatomy.positions[anatomy.head]) / anatomy.height
+    at = easel.bind_positions[anatomy.head] + above
+    return {"head_at": tuple(at.tolist()), "head_axes": axes, "head_drawn": 1.0}
 
 
 def _rows(trail_s: float) -> int:

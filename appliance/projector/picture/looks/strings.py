@@ -61,6 +61,8 @@ class Strings:
             "held_colour": stored(colours.held),
             "held": look.held.strength,
             "brightness": BODY,
+            "hides": 0.0,
+            "pixel_height": 1.0 / (scene.share_of_picture * picture.size[1]),
             "pixel": (2 / picture.size[0], 2 / picture.size[1]),
             "width": width,
             "steps": float(STEPS),

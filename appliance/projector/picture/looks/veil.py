@@ -12,6 +12,8 @@ from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 ECHOES = 10  # at density 1
+BRIGHT, ECHO_BRIGHT = 1.8, 1.3
+HIDES, ECHO_HIDES = 0.8, 0.3  # else a figure at rest would be as many times too bright as it has echoes
 KEY_FROM, KEY_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor
 
 
@@ -28,32 +30,39 @@ class Veil:
         """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, colours = self._easel, palette(look)
         picture = easel.picture(wall, look)
-        picture.start()
-        easel.ctx.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
-        easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
         inputs = {
             **scene.inputs,
             "lamp": direction(scene.view.azimuth + KEY_FROM, KEY_ABOVE),
             "light_colour": stored(colours.light),
             "held_colour": stored(colours.held),
+            "pixel_height": 1.0 / (scene.share_of_picture * picture.size[1]),
         }
         held = easel.held(look)["held"]
         echoes = round(ECHOES * look.density) if look.trail_s > 0 else 0
         rows = min(ROWS - 1, round(look.trail_s / ROW_S))
-        for echo in range(echoes, -1, -1):
+
+        def draw(back: float) -> None:
+            picture.start()
+            easel.ctx.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
+            easel.ctx.blend_equation = moderngl.MAX, moderngl.MAX  # the sum is white where a joint bends
+            own = {"row": 0, "held": held, "brightness": BRIGHT, "hides": HIDES, "back": back}
+            easel.draw_figures(self._figure, inputs | own | {"figure_colour": stored(colours.figure)})
+            easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+            picture.finish()
+
+        picture = easel.expose(picture, scene.shutter(wall), draw)
+        picture.use()
+        easel.ctx.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
+        easel.ctx.blend_func = moderngl.ONE_MINUS_DST_ALPHA, moderngl.ONE
+        for echo in range(1, echoes + 1):  # from the front to the back
             share = echo / (echoes + 1)
             inputs |= {
-                "row": round(rows * echo / max(echoes, 1)),
+                "row": round(rows * echo / echoes),
                 "figure_colour": stored(colours.figure * (1 - share) + colours.accent * share),
-                "held": held if echo == 0 else 0.0,
-                "brightness": 1.5 if echo == 0 else 0.75 * (1 - share) ** 1.3,
+                "held": 0.0,
+                "hides": ECHO_HIDES,
+                "brightness": ECHO_BRIGHT * (1 - share) ** 1.3,
             }
-            if echo:
-                easel.draw_figures(self._echo, inputs)
-                continue
-            moments = scene.shutter(wall)
-            inputs["brightness"] /= len(moments)
-            for back in moments:
-                easel.draw_figures(self._figure, inputs | {"back": back})
+            easel.draw_figures(self._echo, inputs)
         picture.finish()
         self._glow.finish(scene, look, colours, picture, opacity, wall)
