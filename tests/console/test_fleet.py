@@ -13,7 +13,7 @@ import subprocess
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 import yaml
@@ -70,10 +70,13 @@ def test_a_box_that_is_found_is_asked_and_one_that_is_away_stays_in_the_list(
         boxes = (("a", page.port), ("b", 9))
         lines = (f"=;lo;IPv4;{one};_bunraku._tcp;local;{one}.local;{HOST};{port};" for one, port in boxes)
         browser.write_text("#!/bin/sh\ncat <<'END'\n" + "\n".join(lines) + "\nEND\n")
-        wait_until(
-            lambda: "verdict" in page.get("/api/fleet").value[0]
-        )  # again if it was slow to answer itself
-        found = page.get("/api/fleet").value
+
+        def answered() -> Any:
+            """Again where it was slow to answer itself."""
+            found = page.get("/api/fleet").value
+            return found if "verdict" in found[0] else None
+
+        found = wait_until(answered)
     assert [one["host"] for one in found] == ["a.local", "b.local"]
     assert found[0]["verdict"]["key"] == "stage_absent"
     assert "verdict" not in found[1]
