@@ -147,9 +147,16 @@ def test_without_a_trail_nothing_is_kept(dance: Recording, gl: moderngl.Context)
     assert np.array_equal(*pictures)
 
 
-@pytest.mark.parametrize("turned_deg", [0.0, 90.0])
-def test_a_head_is_drawn_as_it_turns(turned_deg: float, dance: Recording, gl: moderngl.Context) -> None:
-    """The face is thin ink, the hair full: from behind the head is darker, however it is turned.
+CHALK = {"figure": "#f0e9da", "light": "#5b5550", "background": "#000000"}
+
+
+@pytest.mark.parametrize(
+    ("turned_deg", "colours", "darker"), [(0.0, {}, 25.0), (90.0, {}, 25.0), (0.0, CHALK, 10.0)]
+)
+def test_a_head_is_drawn_as_it_turns(
+    turned_deg: float, colours: dict[str, str], darker: float, dance: Recording, gl: moderngl.Context
+) -> None:
+    """From behind the head is darker, however it is turned: dark ink draws the hair, light ink the face.
 
     It was a filled circle from all sides."""
     skeleton = dance.skeleton
@@ -163,14 +170,18 @@ def test_a_head_is_drawn_as_it_turns(turned_deg: float, dance: Recording, gl: mo
     shades = []
     for angle_deg in (turned_deg, turned_deg - 180.0):
         camera = CameraConfig(move="still", angle_deg=angle_deg, elevation_deg=0.0)
-        look = {"ink": LookConfig(name="ink", style="ink", trail_s=0.0, camera=camera, render_scale=1.0)}
+        look = {
+            "ink": LookConfig(
+                name="ink", style="ink", trail_s=0.0, camera=camera, render_scale=1.0, **colours
+            )
+        }
         renderer = Renderer(gl, skeleton, look)
         picture = draw_still(gl, renderer, moment, "ink", (360, 360)).mean(axis=2)
         renderer.release()
         across, up = view(camera, camera, 1.0, 0.0, where, 1.0).on_picture(eyes.astype(float))
         x, y = round(360 * across), round(360 * (1.0 - up))
         shades.append(float(np.median(picture[y - 8 : y + 12, x - 6 : x + 7])))
-    assert shades[0] > shades[1] + 25.0
+    assert shades[0] > shades[1] + darker
 
 
 def test_an_animal_has_no_face(gl: moderngl.Context) -> None:

@@ -1,9 +1,11 @@
 // A head as a brush draws it, in places from its middle (figure heights: to the front, upwards, to the side): hair
-// in one sweep from the forehead to the nape, brows, eyes, the shadow under the jaw, and on the face thin ink.
+// in one sweep from the forehead to the nape, brows, eyes, the shadow under the jaw, and on the face thin ink. Light
+// ink on a dark ground draws what is lit: the face, and less of everything that dark ink would draw.
 uniform vec3 head_at;
 uniform mat3 head_axes;
 uniform float head_drawn;  // 0: no person's head, or it has melted
 uniform vec3 lamp;
+uniform bool is_light;
 const float HEAD_REACH = 0.09;
 
 float stroke(vec2 at, vec2 from, vec2 to, vec2 widths) {
@@ -19,9 +21,11 @@ float head_ink(vec3 at, vec3 n, float outline) {
     float under = 1.0 - smoothstep(-0.006, 0.004, dot(at.xy - vec2(-0.008, -0.034), vec2(0.588, 0.809)));
     float nose = (1.0 - smoothstep(0.012, 0.024, side)) * smoothstep(0.036, 0.046, at.x);
     float shade = 1.0 - smoothstep(-0.40, 0.25, dot(n, lamp));
-    float drawn = max(outline * outline, 0.70 * shade * (1.0 - 0.7 * nose));
+    float drawn = 0.70 * shade * (1.0 - 0.7 * nose);
     drawn = max(drawn, 0.85 * front * stroke(vec2(side, at.y), vec2(0.011, 0.002), vec2(0.036, 0.0035), wide * vec2(0.0050, 0.0018)));
     drawn = max(drawn, 0.40 * front * (1.0 - smoothstep(0.0025, 0.0060, length(vec2(0.5, 1.0) * (vec2(side, at.y) - vec2(0.020, -0.0105))))));
-    drawn = max(drawn, max(under, hair * max(mix(0.62, 1.0, smoothstep(0.34, 0.52, bristle)), 0.25 + shade)));
+    float strand = smoothstep(0.34, 0.52, bristle), edge = outline * outline;
+    if (is_light) return mix(mix(1.0, 0.34, max(drawn, 0.7 * under)), mix(0.80, 0.62, strand), hair) + 0.3 * edge;
+    drawn = max(max(drawn, edge), max(under, hair * max(mix(0.62, 1.0, strand), 0.25 + shade)));
     return mix(0.34, 1.08, drawn);
 }

@@ -68,6 +68,7 @@ class Ink:
         moments = scene.shutter(wall)
         head = self._head | {"lamp": direction(scene.view.azimuth + LAMP_FROM, LAMP_ABOVE)}
         head["head_drawn"] *= max(0.0, 1.0 - FACE_SINKS * scene.melt)
+        head["is_light"] = bool(colours.figure.sum() > colours.background.sum())
 
         def draw(back: float) -> None:
             picture.start()
