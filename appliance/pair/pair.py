@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from appliance.box.clock import TICK_S
 from appliance.pair import wire
 from appliance.pair.clock_offset import ClockOffset
 from appliance.pair.roles import Heard, Role, Roles
@@ -35,6 +34,7 @@ COPIES = 3  # sent at once: with a fifth of them lost, 0.8 % of ticks come a fra
 REPEATS = 2  # it is sent again in the two ticks after it
 BEATS = 2  # datagrams of a heartbeat
 _TRY_AGAIN_S = 1.0
+_OVERFLOWS_S = 0.4  # in a longer one more comes than is read at once, and then more than the socket holds
 _STALE_S = 0.1  # the kernel keeps datagrams for an address that does not answer, and sends them seconds later
 _KEYFRAME = 0  # first number of a question for a keyframe; messages are numbered from 1
 
@@ -276,8 +276,7 @@ class Pair:
             self.offset.restart()
         self.offset.hear(found.sent, now)
         if now - found.sent - self.offset.seconds < _STALE_S + waited_s:
-            # While this box was held up its socket filled, and what came last may be lost.
-            as_of = now if waited_s > TICK_S else found.heard.as_of + self.offset.seconds
+            as_of = now if waited_s > _OVERFLOWS_S else found.heard.as_of + self.offset.seconds
             self.roles.hear(found.heard._replace(as_of=as_of), now, self.is_ready)
         if (
             found.heard.role is Role.LEADS
