@@ -79,7 +79,7 @@ def write_mesh(
     if read_mesh(folder, skeleton) is not None and _source(folder) == source:
         return False
     surface = _packed(body_mesh(skeleton) if model is None else model())
-    arrays = surface | _packed_bake(_surface(surface))
+    arrays = surface | _packed_bake(surface)
     written = folder / f".{MESH_FILE}.new"
     with written.open("wb") as stream:
         np.savez_compressed(stream, key=np.array(mesh_key(skeleton)), source=np.array(source), **arrays)
@@ -128,14 +128,14 @@ def _packed(mesh: BodyMesh) -> Arrays:
     }
 
 
-def _packed_bake(mesh: BodyMesh) -> Arrays:
-    """The arrays of what is computed from a surface: normals as differences from the mesh's, and of each face
-    its place in the order."""
-    baked = bake(mesh)
+def _packed_bake(surface: Arrays) -> Arrays:
+    """The arrays of what is computed from a packed surface as a reader gets it. Normals are differences from
+    its own, and each face has its place in the order."""
+    baked = bake(_surface(surface))
     return {
         "open": _signed_bytes(baked.open),
         "sunk": baked.sunk.astype(np.float16).T,
-        "calm": _signed_bytes(baked.calm) - _signed_bytes(mesh.normals),
+        "calm": _signed_bytes(baked.calm) - surface["normals"],
         "order": _bytes(np.diff(np.argsort(baked.order), prepend=0).astype(np.int32)),
     }
 

@@ -48,9 +48,9 @@ class Roles:
     """The part of one box. Times are this machine's monotonic seconds.
 
     epoch: a number that grows with each change of the leader: of two leaders the one with the lower epoch
-    is silent, and where both are equal the second box. patience_s: a follower takes over so long after the
-    deadline of the leader's newest frame. takeovers: since the start. why, since: of the newest change, in a
-    word and in seconds.
+    is silent, and where both are equal the second box. patience_s: a follower takes over when that much time
+    has passed since the deadline of the leader's newest frame. takeovers: since the start. why, since: of
+    the newest change, in a word and in seconds.
     """
 
     is_first: bool

@@ -28,8 +28,8 @@ class PairConfig(Section):
         "`bunraku pair secret` makes it."
     )
     silent_ms: float = key(
-        "The other box takes over so long after the deadline of the leading box's newest frame. More frames "
-        "are lost with more; with less, a box that is held up for a moment loses the lead.",
+        "Time from the deadline of the leader's newest frame until the other box takes over. A larger value "
+        "loses more frames; with a smaller one, a short delay of the leader costs it the lead.",
         48.0,
         within=(40, 500),
     )

@@ -35,7 +35,7 @@ def toy(tmp_path: Path) -> Skeleton:
 
 
 def sent(mesh: BodyMesh) -> list[Any]:
-    """What a GPU gets of a surface: vertices and indices, fine and coarse."""
+    """A surface as a GPU gets it: vertices and indices, fine and coarse."""
     gpu: Any = SimpleNamespace(buffer=bytes)
     buffers = body_buffers.BodyBuffers(gpu, mesh)
     return [buffers.content(coarse) for coarse in (False, True)]

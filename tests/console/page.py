@@ -84,7 +84,7 @@ class Page:
         return answer.status == 200 and bool(answer.value["done"])
 
     def order(self, address: str, *arguments: object) -> Any:
-        """What a command is answered with: again while stage or show control were held up for too long."""
+        """The answer to a command, sent again while the stage or show control is too slow to answer."""
 
         def answered() -> Any:
             answer = self.command(address, *arguments)

@@ -230,7 +230,7 @@ def test_without_a_websocket_the_page_asks_for_words_and_frames(
 
 
 class HeldUpError(Exception):
-    """This machine sent nothing for so long that the phone counts as away."""
+    """This machine was silent until the box counted the phone as away."""
 
 
 def unless_held_up(do: Callable[[], None]) -> None:

@@ -266,7 +266,7 @@ def test_a_leader_that_has_sent_no_frame_yet_counts_from_when_it_began_to_lead()
     one, other = pair_of(KEY, KEY, clock=clock)
     clock[0] = 0.9
     one.look(0.9)
-    one.newest_frame = 0.5  # of an earlier lead
+    one.newest_frame = 0.5  # it led earlier, too
     one.beat(0.9)
     other.look(0.9)
     other.is_ready = True

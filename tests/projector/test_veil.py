@@ -15,7 +15,7 @@ from tests.projector.golden_looks import AT_S, renderer
 from tests.projector.skeletons import toy
 
 SIZE = 480, 480
-LIT = 4.0  # of 255: more than the dark room
+LIT = 4.0  # brighter than the dark room; white is 255
 Picture = NDArray[np.float64]
 
 

@@ -37,6 +37,7 @@ BACKDROP = "BACKDROP"  # the part of a look's last step that has an image behind
 Box = tuple[float, float, float, float]
 WHOLE: Box = (0.0, 0.0, 1.0, 1.0)
 WIDER, SPREAD_STEP, MOST_SPREAD = 1.2, 0.5, 5.0  # in a figure height from the middle; of `spread`
+KEY_FROM, KEY_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor
 SHUTTER = 0.5  # rows of poses for which the shutter is open: 12 ms
 MOST_MOMENTS, BLUR_STEP = 4, 5.0  # pixels from one moment to the next
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
@@ -94,6 +95,15 @@ class Scene:
     def share_of_picture(self) -> float:
         """Share of the picture's height that a figure height takes where the dancer is."""
         return 0.5 / (self.view.slopes[1] * self.distance)
+
+    @property
+    def lamp(self) -> Array:
+        """A unit vector towards the key light."""
+        return direction(self.view.azimuth + KEY_FROM, KEY_ABOVE)
+
+    def pixel_height(self, lines: int) -> float:
+        """Figure heights that one of a picture's lines takes where the dancer is."""
+        return 1.0 / (self.share_of_picture * lines)
 
     def shutter(self, wall: Wall) -> list[float]:
         """`back` of the moments that make one picture: more where a joint moves by many pixels, and where the

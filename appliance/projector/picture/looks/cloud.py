@@ -8,14 +8,13 @@ from appliance.outputs.coupling import ROW_S, ROWS
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import palette, stored
 from appliance.projector.picture.particles import particles_of
-from appliance.projector.picture.scene import Easel, Scene, direction
+from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 GRAINS = 40000  # at density 1
 GRAIN = 0.0045  # figure heights across
 LOOSE = 0.4  # share of the grains that may leave the body
-KEY_FROM, KEY_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor
 
 
 class Cloud:
@@ -36,7 +35,7 @@ class Cloud:
             **scene.inputs,
             "noise": easel.noise,
             "row": 0,
-            "lamp": direction(view.azimuth + KEY_FROM, KEY_ABOVE),
+            "lamp": scene.lamp,
             "pixels": GRAIN * picture.size[1] / view.slopes[1],
             "rows": float(min(ROWS, max(6, round(look.trail_s / ROW_S)))),
             "row_s": ROW_S,

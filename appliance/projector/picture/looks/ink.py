@@ -17,7 +17,7 @@ from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.kept_strokes import KeptStrokes
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.particles import traced
-from appliance.projector.picture.scene import Easel, Scene, direction
+from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
@@ -29,7 +29,6 @@ PAPER_LINES = 400  # lines of the sheet, which is made once
 SPILL = 0.25  # share of the picture's height that ink reaches beyond the figure: splashes, spreading and pull
 SWELL = 0.012  # figure heights between the outlines of a pressed and of a lifted brush
 MOST_SPLASHES, DROPS = 8, 26
-LAMP_FROM, LAMP_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor: the face's light
 FACE_SINKS = 4.0  # a melting face is gone after a quarter of the way
 PULL = 0.016  # fraction of the picture's height: how far fibres pull the ink
 
@@ -66,7 +65,7 @@ class Ink:
         }
         easel.weigh(pressure)
         moments = scene.shutter(wall)
-        head = self._head | {"lamp": direction(scene.view.azimuth + LAMP_FROM, LAMP_ABOVE)}
+        head = self._head | {"lamp": scene.lamp}
         head["head_drawn"] *= max(0.0, 1.0 - FACE_SINKS * scene.melt)
         head["is_light"] = bool(colours.figure.sum() > colours.background.sum())
 

@@ -14,7 +14,7 @@ from appliance.pose.anatomy import Anatomy
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import palette, stored
-from appliance.projector.picture.scene import Easel, Scene, direction
+from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
@@ -23,7 +23,6 @@ STRANDS = 7  # in each limb's string at density 1
 WIDTH, THINNEST = 1 / 560, 1.2  # half of a strand's: of the picture's height; pixels
 ABOVE = 1.5  # figure heights: where strings hang from while no hand holds a joint
 BODY = 1.0  # brightness of the glass
-KEY_FROM, KEY_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor
 
 
 class Strings:
@@ -54,7 +53,7 @@ class Strings:
         width = max(THINNEST, WIDTH * picture.size[1])
         inputs: dict[str, Any] = {
             **scene.inputs,
-            "lamp": direction(scene.view.azimuth + KEY_FROM, KEY_ABOVE),
+            "lamp": scene.lamp,
             "row": 0,
             "light_colour": stored(colours.light),
             "figure_colour": stored(colours.figure),
@@ -62,7 +61,7 @@ class Strings:
             "held": look.held.strength,
             "brightness": BODY,
             "hides": 0.0,
-            "pixel_height": 1.0 / (scene.share_of_picture * picture.size[1]),
+            "pixel_height": scene.pixel_height(picture.size[1]),
             "pixel": (2 / picture.size[0], 2 / picture.size[1]),
             "width": width,
             "steps": float(STEPS),

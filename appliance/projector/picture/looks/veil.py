@@ -7,14 +7,13 @@ import moderngl
 from appliance.outputs.coupling import ROW_S, ROWS
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import palette, stored
-from appliance.projector.picture.scene import Easel, Scene, direction
+from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 ECHOES = 10  # at density 1
 BRIGHT, ECHO_BRIGHT = 1.8, 1.3
 HIDES, ECHO_HIDES = 0.8, 0.3  # else a figure at rest would be as many times too bright as it has echoes
-KEY_FROM, KEY_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor
 
 
 class Veil:
@@ -32,10 +31,10 @@ class Veil:
         picture = easel.picture(wall, look)
         inputs = {
             **scene.inputs,
-            "lamp": direction(scene.view.azimuth + KEY_FROM, KEY_ABOVE),
+            "lamp": scene.lamp,
             "light_colour": stored(colours.light),
             "held_colour": stored(colours.held),
-            "pixel_height": 1.0 / (scene.share_of_picture * picture.size[1]),
+            "pixel_height": scene.pixel_height(picture.size[1]),
         }
         held = easel.held(look)["held"]
         echoes = round(ECHOES * look.density) if look.trail_s > 0 else 0
