@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from appliance.box.durable import alone_in, write_beside, write_whole
 from appliance.box.served import is_loopback
-from appliance.cli.preflight import LATE_TURN_S, candidate_problems, publish
+from appliance.cli.preflight import LATE_TURN_S, late_candidate_problems, publish
 from appliance.release.adoption import Outcome, Places, adopt, read_choice
 from appliance.release.arrivals import BOX, SHOW, Arrival, look
 from appliance.release.choice import CHOSEN, Choice
@@ -210,7 +210,7 @@ def _adopt(chosen: Path, arrival: Arrival, what: str, now: bool) -> dict[str, An
     """As from a stick: on the shelf under its content's id, the one before it kept, then tried."""
     places = _places(chosen)
     with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
-        outcome = adopt(places, [arrival], candidate_problems, late=True)
+        outcome = adopt(places, [arrival], late_candidate_problems, late=True)
         said = list(outcome.messages)
         if outcome.taken:
             publish(places, outcome, True, _AT_ONCE if now else _LATER, said.append, restarts=False)

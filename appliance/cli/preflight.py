@@ -19,6 +19,8 @@ from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice
 ANEW = "anew"  # touched to restart the units with another show or box file
 _AT_ONCE_S = 120.0  # this soon after power-on a stick takes effect at once; later no show is interrupted
 STICK_S = 45.0  # a stick that cannot be read does not keep the box from dancing
+# While it dances nobody waits, and a check gets only what the dance leaves of the processors.
+LATE_STICK_S, LATE_CHECK_S = 300.0, 240.0
 TURN_S, LATE_TURN_S = 20.0, 60.0  # how long to wait for another preflight
 _NOT_WRITTEN = 1
 
@@ -67,11 +69,13 @@ def _found(options: Options, places: Places) -> Outcome:
 
     def chosen() -> Outcome:
         arrivals = [look("stick", options.stick), look("boot", boot)]
-        return adopt(places, arrivals, candidate_problems, options.late)
+        check = late_candidate_problems if options.late else candidate_problems
+        return adopt(places, arrivals, check, options.late)
 
     try:
         if _is_folder(options.stick):
-            return Outcome.unpacked(run_with_timeout(STICK_S, lambda: chosen().packed()))
+            seconds = LATE_STICK_S if options.late else STICK_S
+            return Outcome.unpacked(run_with_timeout(seconds, lambda: chosen().packed()))
         return chosen()
     except TimedOutError as error:
         message = f"The stick could not be read ({error}). The show before goes on. Try another stick."
@@ -116,17 +120,27 @@ def publish(
         say("The box was switched on only just now: the new show dances at once.")
 
 
-def candidate_problems(show: Path, box: Path) -> list[str]:
-    """Why a show and a box file cannot be danced here; checked in a process that may crash or hang."""
+def late_candidate_problems(show: Path, box: Path) -> list[str]:
+    """As `candidate_problems`, while another show dances."""
+    return candidate_problems(show, box, LATE_CHECK_S)
+
+
+def candidate_problems(show: Path, box: Path, seconds: float | None = None) -> list[str]:
+    """Why a show and a box file cannot be danced here; checked in a process that may crash or hang.
+
+    seconds: how long it may take; None: CHECK_S, as while a box starts.
+    """
     import subprocess
+
+    seconds = CHECK_S if seconds is None else seconds
 
     command = (sys.executable, "-m", "appliance.cli.candidate", str(show), str(box))
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False, timeout=CHECK_S
+            command, capture_output=True, text=True, errors="replace", check=False, timeout=seconds
         )
     except subprocess.TimeoutExpired:
-        return [f"{show}: its check did not end within {CHECK_S:g} s. Try it with: bunraku check."]
+        return [f"{show}: its check did not end within {seconds:g} s. Try it with: bunraku check."]
     except OSError as error:
         return [f"{show}: it cannot be checked ({error.strerror})."]
     if done.returncode == 0:

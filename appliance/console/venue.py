@@ -22,7 +22,7 @@ from appliance.console.rehearsed import FOLDER as REHEARSED
 _LARGEST_FILE = 1 << 18  # bytes, as in show/yaml_file.py
 _LARGEST_SHOW = 400 << 20  # bytes; release/shelf.py takes no larger one
 _ARRIVED = "arrived"  # the folder of a show while it comes from another box
-_PATIENCE_S = 90.0  # the whole show is checked on a new box file, as from a stick
+_PATIENCE_S = 420.0  # the whole show is checked on a new box file, as from a stick
 _ANSWERED_S = 1.0  # the units that start anew are this process's too
 ANEW = "anew"  # cli/preflight.py
 _SHOW = re.compile(r"[0-9a-f]{0,64}\+[0-9a-f]{0,64}")

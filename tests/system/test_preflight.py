@@ -17,7 +17,7 @@ import pytest
 from appliance.box.durable import alone_in
 from appliance.cli import candidate
 from appliance.cli import preflight as commands
-from appliance.cli.preflight import candidate_problems, preflight
+from appliance.cli.preflight import candidate_problems, late_candidate_problems, preflight
 from appliance.cli.run_with_timeout import TimedOutError, run_with_timeout
 from appliance.dancer.phrase_cache import FOLDER, SUFFIX
 from appliance.keeper.mirror import Mirror
@@ -235,7 +235,7 @@ def test_a_show_put_aside_while_a_stick_is_checked_stays_so(
         fail_to_start(machine)
         return check(show, box)
 
-    monkeypatch.setattr(commands, "candidate_problems", while_the_stage_fails)
+    monkeypatch.setattr(commands, "late_candidate_problems", while_the_stage_fails)
     late(machine, SECONDS_AFTER_POWER_ON)
     assert machine.dances == "Summer"
     assert bad not in {pair.id for pair in machine.choice.pairs}
@@ -598,7 +598,9 @@ def test_a_check_that_crashes_refuses_the_show(tmp_path: Path, monkeypatch: pyte
 def test_a_check_that_hangs_refuses_the_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     replace_checker(tmp_path, monkeypatch, "exec sleep 60")
     monkeypatch.setattr(commands, "CHECK_S", 0.2)
-    assert "did not end" in candidate_problems(tmp_path, APPLIANCE_BOX)[0]
+    assert "did not end within 0.2 s" in candidate_problems(tmp_path, APPLIANCE_BOX)[0]
+    monkeypatch.setattr(commands, "LATE_CHECK_S", 0.3)
+    assert "did not end within 0.3 s" in late_candidate_problems(tmp_path, APPLIANCE_BOX)[0]
 
 
 def test_a_stick_that_hangs_is_given_up(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:

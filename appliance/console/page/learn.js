@@ -7,7 +7,7 @@ import { twice } from "./hold.js";
 import { sent } from "./update.js";
 import { locale, number, translated, words } from "./words.js";
 
-const LOOK_MS = 2000, LISTED_WITHIN_MS = 20_000, ADOPTED_WITHIN_MS = 120_000;
+const LOOK_MS = 2000, LISTED_WITHIN_MS = 20_000, ADOPTED_WITHIN_MS = 430_000;
 let timer = 0, chosen = "", isRead = false, reads = 0;
 
 export function initLearn() {

@@ -12,7 +12,7 @@ import { initSprings, showSprings } from "./springs.js";
 import { twice } from "./hold.js";
 import { hasWords, number, words } from "./words.js";
 
-const PHRASE_FADE_S = 1, LIVELINESS_FADE_S = 1, KEEPING_MS = 120_000;
+const PHRASE_FADE_S = 1, LIVELINESS_FADE_S = 1, KEEPING_MS = 430_000;
 const SEEDS = 1_000_000; // six digits are easily noted down
 let figure = null;
 

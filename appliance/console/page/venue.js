@@ -4,7 +4,7 @@ import { byId } from "./elements.js";
 import { twice } from "./hold.js";
 import { translated, words } from "./words.js";
 
-const CHECKED_WITHIN_MS = 100_000;
+const CHECKED_WITHIN_MS = 430_000;
 const RECEIVERS = ["outputs", "osc"];
 const NEW_RECEIVER = { host: "192.168.0.20", port: 9004 };
 let file = null, asked = "", receivers = [];
