@@ -14,6 +14,7 @@ from appliance.pose.foreign_file import plain_json
 
 LARGEST_REQUEST = 4096  # bytes
 _SENT_WITHIN_S, _FILE_WITHIN_S = 20.0, 900.0
+SILENT_S = 30.0  # without a byte for so long the sender is gone: a phone that left the network says nothing
 PART = 1 << 20
 
 
@@ -41,16 +42,21 @@ async def said(request: web.Request, most: int = LARGEST_REQUEST) -> dict[str, A
 async def received(request: web.Request, path: Path, largest: int) -> None:
     """Write the body into a file. Raises 503 where not all of it comes, or it is larger; no file is left."""
     size, is_whole = 0, False
+    loop = asyncio.get_running_loop()
+    until = loop.time() + _FILE_WITHIN_S
     try:
-        async with asyncio.timeout(_FILE_WITHIN_S):
+        async with asyncio.timeout(SILENT_S) as patience:
             with new_file(path) as file:
                 async for part in request.content.iter_chunked(PART):
                     size += len(part)
                     if size > largest:
                         raise OSError("it is too large")
                     file.write(part)
+                    patience.reschedule(min(until, loop.time() + SILENT_S))
         is_whole = True
-    except (OSError, TimeoutError) as error:
+    except TimeoutError:
+        raise web.HTTPServiceUnavailable(text="The file did not arrive whole (nothing more came).") from None
+    except OSError as error:
         raise web.HTTPServiceUnavailable(text=f"The file did not arrive whole ({error}).") from None
     finally:
         if not is_whole:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestClient, TestServer
 
+from appliance.console import body
 from appliance.console.guard import Handler, needs_device
 from appliance.console.update import FOLDER, TRIES, WANTED, Update
 from appliance.console.update_code import CODE_FILE, pending_code
@@ -63,7 +65,9 @@ async def status(client: TestClient[Any, Any], path: str, **said: Any) -> int:
         return answer.status
 
 
-async def send(client: TestClient[Any, Any], name: str, content: bytes = b"package") -> int:
+async def send(
+    client: TestClient[Any, Any], name: str, content: bytes | AsyncIterator[bytes] = b"package"
+) -> int:
     async with client.post("/api/update/file", params={"name": name}, data=content) as answer:
         return answer.status
 
@@ -124,6 +128,42 @@ def test_other_files_are_refused(hall: Hall, name: str) -> None:
     async def act(client: TestClient[Any, Any]) -> None:
         assert await send(client, name) == 400
         assert not (hall.runtime / FOLDER).exists()
+
+    hall.run(act)
+
+
+def test_a_phone_that_leaves_the_network_in_mid_upload_holds_up_the_next_one_shortly(
+    hall: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(body, "SILENT_S", 0.3)
+
+    async def act(client: TestClient[Any, Any]) -> None:
+        _, gone = await asyncio.open_connection(client.host, client.port)
+        head = f"POST /api/update/file?name={DEB} HTTP/1.1\r\nHost: box\r\nContent-Length: 1000\r\n\r\n"
+        gone.write(head.encode() + b"some of it")
+        await gone.drain()
+        while not (hall.runtime / FOLDER / DEB).exists():
+            await asyncio.sleep(0.01)
+        begun = time.monotonic()
+        while (taken := await send(client, DEB)) == 409 and time.monotonic() - begun < 10.0:
+            await asyncio.sleep(0.05)
+        assert taken == 200 and hall.files() == {DEB: b"package"}
+        gone.close()
+
+    hall.run(act)
+
+
+def test_a_slow_sender_is_waited_for(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(body, "SILENT_S", 0.5)
+
+    async def slowly() -> AsyncIterator[bytes]:
+        for letter in b"package":
+            yield bytes([letter])
+            await asyncio.sleep(0.15)
+
+    async def act(client: TestClient[Any, Any]) -> None:
+        assert await send(client, DEB, slowly()) == 200
+        assert hall.files() == {DEB: b"package"}
 
     hall.run(act)
 
