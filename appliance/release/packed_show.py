@@ -26,11 +26,15 @@ def pack_show(show: Path, path: Path) -> None:
     """Write the zip file; it is complete or not there at all. Raises OSError."""
     part = path.with_suffix(".part")
     part.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed:
-        for name in (*bundle_files(show), CHECKSUMS, SIGNATURE):
-            if (show / name).is_file():
-                packed.write(show / name, Path(_STICK, SHOW, name))
-    part.replace(path)
+    try:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed:
+            for name in (*bundle_files(show), CHECKSUMS, SIGNATURE):
+                if (show / name).is_file():
+                    packed.write(show / name, Path(_STICK, SHOW, name))
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)  # else a full disk stays full
+        raise
 
 
 def unpack_show(path: Path, folder: Path) -> None:

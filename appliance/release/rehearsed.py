@@ -14,7 +14,7 @@ from appliance.box.durable import write_whole
 from appliance.pose.counted import counted
 from appliance.release.arrivals import SHOW
 from appliance.release.packed_show import pack_show
-from appliance.show.bundle import write_checksums
+from appliance.show.bundle import CHECKSUMS, write_checksums
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
 from appliance.show.yaml_edit import with_cue
@@ -36,15 +36,25 @@ def keep_cue(show: Path, folder: Path, cue: Mapping[str, Any]) -> str:
         shutil.copytree(show, copy, ignore=shutil.ignore_patterns(".*"))
         write_whole(begun, digest.encode())
     file = copy / "show.yaml"
-    before = file.read_text(encoding="utf-8")
+    before = {one: one.read_bytes() if one.is_file() else None for one in (file, copy / CHECKSUMS)}
     try:
-        file.write_text(with_cue(before, cue), encoding="utf-8")
+        text = with_cue(file.read_text(encoding="utf-8"), cue)
+        write_whole(file, text.encode())  # whole: a full disk must not take the cues that are there
         config = load_show(copy).config
+        write_checksums(copy)
+        pack_show(copy, folder / ZIP)
     except (ConfigError, yaml.YAMLError, ValueError, OSError):
-        file.write_text(before, encoding="utf-8")
+        for path, content in before.items():
+            _restore(path, content)
         raise
-    write_checksums(copy)
-    pack_show(copy, folder / ZIP)
     return (
         f"The cue {cue['name']} is in the copy of the show, which has {counted(len(config.cues), 'cue')} now."
     )
+
+
+def _restore(path: Path, content: bytes | None) -> None:
+    """None: there was no such file. One that did not change is not written: the disk may be full."""
+    if content is None:
+        path.unlink(missing_ok=True)
+    elif path.read_bytes() != content:
+        write_whole(path, content)
