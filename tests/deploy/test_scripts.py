@@ -146,6 +146,28 @@ def test_done_is_said_only_of_a_network_that_is_on_the_air(radio: RadioBox) -> N
     assert list(radio.networks.iterdir()) == []
 
 
+def test_a_radio_that_tells_much_is_heard_to_the_end(radio: RadioBox) -> None:
+    """The answer of `iw phy` has many kB after the line that counts."""
+    (radio.folder / "bin/iw").write_text(
+        '#!/bin/sh\n[ $1 = phy ] || exit 0\necho "\t\t * AP"\nsleep 0.2\nyes "\t* 2412 MHz" | head -n 20000\n'
+    )
+    done = radio.run("--card", "wlan1", "--country", "DE", is_on=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_password_with_a_backslash_stays_the_same(radio: RadioBox) -> None:
+    (radio.folder / "bin/nmcli").write_text(
+        '#!/bin/sh\nwhile [ $# -gt 0 ]; do\n[ "$1" != wifi-sec.psk ] ||\n'
+        "printf 'psk=%s\\n' \"$2\" | sed 's/\\\\/&&/g; s/= /=\\\\s/'; shift\ndone\n"
+    )
+    given = r" a\s\curtain "
+    assert radio.run("--card", "wlan1", "--country", "DE", "--password", given, is_on=False).returncode == 0
+    before = (radio.networks / "sensors.nmconnection").read_text()
+    assert before == r"psk=\sa\\s\\curtain " + "\n", before
+    assert radio.run("--card", "wlan1", "--channel", "11", is_on=False).returncode == 0
+    assert (radio.networks / "sensors.nmconnection").read_text() == before
+
+
 def test_a_country_that_the_system_knows_is_taken(radio: RadioBox) -> None:
     (radio.folder / "known").write_text("CH")
     (radio.folder / "starts").touch()
