@@ -84,12 +84,15 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
     if not _asks(path):
         return ""
     try:
+        content = path.read_bytes()  # once: its stick may be pulled while the network is looked for
         wifi = read_wifi(path)
+    except OSError as error:
+        return f"{NAME} cannot be read ({error.strerror}). The box keeps the network from before."
     except ConfigError as error:
         message = str(error).replace(f"{path.parent}/", "")  # the wall has room for little
         return f"{message}\nThe box keeps the network from before."
     name_box(wifi.hostname)
-    is_new = not saved.is_file() or saved.read_bytes() != path.read_bytes()
+    is_new = not saved.is_file() or saved.read_bytes() != content
     try:
         if is_new:
             write_whole(places.saved / "country", f"COUNTRY={wifi.country}\n".encode())
@@ -105,7 +108,7 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
         _made(places, wifi, card, is_new, run) if wifi.access_point else _joined(places, wifi, is_new, run)
     )
     if is_new and not (message and wifi.access_point):
-        write_whole(saved, path.read_bytes(), private=True)
+        write_whole(saved, content, private=True)
     return message
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,6 +27,7 @@ class Box:
     ran: list[tuple[str, ...]] = field(default_factory=list)
     named: str = ""
     waited_s: float = 0.0
+    on_command: Callable[[], None] = lambda: None
 
     def __post_init__(self) -> None:
         for name in ("stick", "boot", "kept", "run", "cards/wlan7/phy80211"):
@@ -50,6 +51,7 @@ class Box:
 
     def _run(self, command: Sequence[str]) -> subprocess.CompletedProcess[str]:
         self.ran.append(tuple(command))
+        self.on_command()
         output = self.fails.get(command[0])
         return subprocess.CompletedProcess(command, output is not None, "", output or "")
 
@@ -95,6 +97,17 @@ def test_the_stick_counts_before_the_card_and_outlives_being_pulled(box: Box) ->
     (box.folder / "boot" / NAME).unlink()
     box.power_on()
     assert box.named == "other"
+
+
+def test_a_stick_that_is_pulled_while_its_network_is_looked_for_has_done_its_work(box: Box) -> None:
+    stick = box.folder / "stick" / NAME
+    stick.write_text(GOOD)
+    box.on_command = lambda: stick.unlink(missing_ok=True)
+    assert box.power_on() == 0 and not stick.exists()
+    assert (box.folder / "kept" / NAME).read_text() == GOOD
+    box.named = ""
+    box.power_on()
+    assert box.named == "puppet"
 
 
 def test_a_fault_is_said_with_its_line_and_the_network_before_stays(box: Box) -> None:
