@@ -28,6 +28,9 @@ _MOST_SESSIONS = 8
 _AT_ONCE = 64
 _BYTES = {0x8: 2, 0x9: 2, 0xA: 2, 0xB: 2, 0xC: 1, 0xD: 1, 0xE: 2}
 _SYSTEM_BYTES = {0xF1: 1, 0xF2: 2, 0xF3: 1}
+_REAL_TIME = 0xF8
+# Ends of a part of a system exclusive message: more comes; cancelled; left out by the sender; its end.
+_PARTS_END = {0xF0: b"", 0xF4: b"\xf4", 0xF5: b"\xf7", 0xF7: b"\xf7"}
 
 Address = tuple[str, int]
 
@@ -181,15 +184,17 @@ def commands_in(section: bytes) -> bytes:
                 break
         has_time = True
         begin = at
+        if listed[at] >= _REAL_TIME:  # running status goes on behind it
+            at += 1
+            continue
         if listed[at] >= 0x80:
             status, at = listed[at], at + 1
         if status in (0xF0, 0xF7):  # whole, or a part of one
-            while at < len(listed) and listed[at] not in (0xF0, 0xF7, 0xF4):
+            while at < len(listed) and listed[at] not in _PARTS_END:
                 at += 1
             if at >= len(listed):
                 break
-            found += listed[begin if status == 0xF0 else begin + 1 : at]
-            found += b"\xf7" if listed[at] in (0xF7, 0xF4) else b""
+            found += listed[begin if status == 0xF0 else begin + 1 : at] + _PARTS_END[listed[at]]
             at, status = at + 1, 0
             continue
         if status < 0x80:
@@ -198,6 +203,7 @@ def commands_in(section: bytes) -> bytes:
         if at > len(listed):
             break
         found += listed[begin:at]
+        status = status if status < 0xF0 else 0
     return bytes(found)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from appliance.remote.midi_messages import MidiParser
 from appliance.remote.network_midi import NetworkMidi, commands_in
 from appliance.remote.raw_midi import RawMidi
 from appliance.remote.show_control_messages import command_of
@@ -206,12 +207,28 @@ def test_only_listed_machines_open_a_session() -> None:
         (b"\x05\xf0\x7f\x01\x02\xf7", b"\xf0\x7f\x01\x02\xf7"),
         (b"\x04\xf0\x7f\x01\xf0", b"\xf0\x7f\x01"),  # the first part of a long message
         (b"\x04\xf7\x02\x03\xf7", b"\x02\x03\xf7"),  # and its last part
+        (b"\x04\xf7\x02\x03\xf5", b"\x02\x03\xf7"),  # the sender left its end out
+        (b"\x09\x90\x3c\x40\x00\xf8\x00\x3e\x41", b"\x90\x3c\x40\x3e\x41"),  # a clock between two notes
+        (b"\x08\x90\x3c\x40\x00\xf6\x00\x3e\x41", b"\x90\x3c\x40\xf6"),  # ends the running status
         (b"\x03\x90\x3c", b""),  # cut off
         (b"\x02\x3c\x40", b""),  # data without a status
     ],
 )
 def test_sections_of_commands(section: bytes, found: bytes) -> None:
     assert commands_in(section) == found
+
+
+def test_a_long_message_that_is_cancelled_commands_nothing() -> None:
+    """Null: its end instead, and the same parts are a command."""
+    go = b"\xf0\x7f\x01\x02\x01\x01"
+    parts = bytes([len(go) + 1]) + go + b"\xf0", b"\x03\xf7\x31"
+
+    def heard(end: bytes) -> list[bytes]:
+        parser = MidiParser()
+        return [one for part in (parts[0], parts[1] + end) for one in parser.messages(commands_in(part))]
+
+    assert heard(b"\xf7") == [go + b"\x31\xf7"]
+    assert heard(b"\xf4") == []
 
 
 def test_movements() -> None:
