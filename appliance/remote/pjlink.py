@@ -35,6 +35,8 @@ def ask(host: str, port: int, password: str | None, *commands: str) -> list[str]
             raise PjLinkError("speaks no PJLink")
         digest = ""
         if greeting[1] == "1":
+            if len(greeting) < 3:
+                raise PjLinkError("speaks no PJLink")
             if password is None:
                 raise PjLinkError("asks for a password")
             digest = hashlib.md5((greeting[2] + password).encode(), usedforsecurity=False).hexdigest()
@@ -97,16 +99,27 @@ class ProjectorPower:
             self._now.clear()
 
     def _look(self) -> Seen:
+        state = "unknown"
         try:
-            state, errors = ask(self.host, self._port, self._password, "POWR ?", "ERST ?")
-            state = _STATES.get(state, "unknown")
+            (answer,) = ask(self.host, self._port, self._password, "POWR ?")
+            state = _STATES.get(answer, "unknown")
             away = {True: "off", False: "on"}.get(self.wanted) if self.wanted is not None else None
             if state == away:
                 ask(self.host, self._port, self._password, f"POWR {int(bool(self.wanted))}")
                 state = "warming" if self.wanted else "cooling"
+            errors = self._errors(state)
         except PjLinkError as error:
-            return Seen(trouble=str(error))
+            return Seen(state, str(error))
         except OSError as error:
             return Seen(trouble=f"does not answer ({error.strerror or error})")
         faults = [name for name, level in zip(_ERRORS, errors, strict=False) if level == "2"]
         return Seen(state, f"reports a fault: {', '.join(faults)}" if faults else "")
+
+    def _errors(self, state: str) -> str:
+        """A digit for each of _ERRORS; "" from one that does not tell them unless it is on."""
+        try:
+            return ask(self.host, self._port, self._password, "ERST ?")[0]
+        except PjLinkError:
+            if state == "on":
+                raise
+            return ""
