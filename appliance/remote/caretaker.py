@@ -98,6 +98,8 @@ class Caretaker:
         is_open, before = self._hours.is_open(wall), self._memory.is_open
         if is_open != before:
             self._memory = self._memory._replace(is_open=is_open, stands=False, ends=False)
+            if is_open:
+                self._watch_anew(state)
             if is_open and before is not None and not state.panic:  # at power-on the show runs already
                 self._give(("/go",))
                 if self._config.open_cue:
@@ -110,6 +112,13 @@ class Caretaker:
             self._memory = self._memory._replace(ends=True)
             if self._config.close_cue:
                 self._give(("/cue", self._config.close_cue))
+
+    def _watch_anew(self, state: ShowState) -> None:
+        """A new day: nobody was missed yet, and yesterday's cue only counts while its stand-in is there."""
+        self._somebody_at = None
+        attract = self._config.attract
+        if attract is not None and (self._config.open_cue or state.cue) != attract.cue:
+            self._memory = self._memory._replace(before=None)
 
     def _quieten(self, state: ShowState, wall: float) -> None:
         most, loud = self._hours.strings(wall), self._memory.loud

@@ -164,11 +164,33 @@ def test_a_cue_while_nobody_is_there(tmp_path: Path) -> None:
     assert house.until("01T10:41") == []
 
 
+def test_nobody_is_missed_anew_each_day(tmp_path: Path) -> None:
+    """Yesterday's last visitor left before it closed, and the cue of the day has taken the place since."""
+    config = hours_of(open_cue="walk in", attract={"cue": "waiting", "after_s": 90})
+    house = House(tmp_path, config, "01T17:00")
+    assert house.until("01T18:01") == [("/cue", "waiting"), ("/stop",)]
+    house.until("02T09:59")
+    assert house.until("02T10:01") == [("/go",), ("/cue", "walk in")]
+    assert house.until("02T10:03") == [("/cue", "waiting")]
+    house.sensors = [["left-wrist", "linked"]]
+    assert house.until("02T10:04") == [("/cue", "walk in")]
+
+
+def test_the_cue_before_the_night_comes_back_where_none_opens_the_day(tmp_path: Path) -> None:
+    house = House(tmp_path, hours_of(attract={"cue": "waiting", "after_s": 90}), "01T17:00")
+    house.state = house.state.to(CUE, "duet")
+    assert house.until("02T10:30") == [("/cue", "waiting"), ("/stop",), ("/go",)]
+    house.sensors = [["left-wrist", "linked"]]
+    assert house.until("02T10:31") == [("/cue", "duet")]
+
+
 class Projector:
     """A projector as PJLink class 1 has it; it takes a moment to warm up."""
 
     def __init__(self, password: str = "") -> None:
         self.state, self.errors, self.commands, self._password = "0", "000000", [], password  # type: ignore[var-annotated]
+        self.tells_errors = True  # also in standby
+        self.greeting = b"PJLINK 1 498e4a67\r" if password else b"PJLINK 0\r"
         self._listening = socket.create_server((HOST, 0))
         self.port = self._listening.getsockname()[1]
         threading.Thread(target=self._serve, daemon=True).start()
@@ -180,7 +202,7 @@ class Projector:
             except OSError:
                 return
             with one, one.makefile("rwb", buffering=0) as line:
-                line.write(b"PJLINK 1 498e4a67\r" if self._password else b"PJLINK 0\r")
+                line.write(self.greeting)
                 received = b""
                 while byte := line.read(1):
                     received += byte
@@ -197,7 +219,7 @@ class Projector:
         if command == "%1POWR ?":
             return f"%1POWR={self.state}\r".encode()
         if command == "%1ERST ?":
-            return f"%1ERST={self.errors}\r".encode()
+            return f"%1ERST={self.errors if self.tells_errors or self.state == '1' else 'ERR3'}\r".encode()
         if command in ("%1POWR 1", "%1POWR 0"):
             self.state = "3" if command[-1] == "1" else "2"
             return b"%1POWR=OK\r"
@@ -229,6 +251,26 @@ def test_a_projector_is_switched_and_kept_so(projector: Projector) -> None:
     assert projector.commands.count("%1POWR 0") == 0  # it is not switched while it warms up
     projector.state = "1"
     wait_until(lambda: projector.state == "2", lambda: str(power.seen))
+    power.close()
+
+
+def test_a_projector_that_tells_no_errors_in_standby_is_switched_on(projector: Projector) -> None:
+    projector.tells_errors = False
+    power = ProjectorPower(HOST, projector.port, look_s=0.05)
+    wait_until(lambda: power.seen == Seen("off", ""), lambda: str(power.seen))
+    power.want(True)
+    wait_until(lambda: projector.state == "3", lambda: str(power.seen))
+    projector.state = "1"
+    wait_until(lambda: power.seen == Seen("on", ""), lambda: str(power.seen))
+    power.close()
+
+
+def test_a_greeting_that_is_cut_off_is_told_and_asked_again(projector: Projector) -> None:
+    whole, projector.greeting = projector.greeting, b"PJLINK 1\r"
+    power = ProjectorPower(HOST, projector.port, "secret", look_s=0.05)
+    wait_until(lambda: power.seen == Seen("unknown", "speaks no PJLink"), lambda: str(power.seen))
+    projector.greeting = whole
+    wait_until(lambda: power.seen == Seen("off", ""), lambda: str(power.seen))
     power.close()
 
 
