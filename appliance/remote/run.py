@@ -170,12 +170,12 @@ class Midi:
                     "in force stays. Give another `port` under midi: network: in the box file."
                 )
 
-    def turn(self, cues: tuple[str, ...], now: float) -> Iterator[bytes]:
-        """Carry out what has come; gives each message on, for the timecode in it."""
+    def turn(self, cues: tuple[str, ...], now: float) -> Iterator[tuple[str, bytes]]:
+        """Carry out what has come; gives each message and its device on, for the timecode in it."""
         heard = [] if self._raw is None else list(self._raw.messages())
         heard += [] if self._network is None else list(self._network.messages(now))
         for device, message in heard:
-            yield message
+            yield device, message
             if (what := moved(device, message)) is not None:
                 self.newest, self._moved_at[what.control] = what, now
                 commands = list(self._bindings.commands(what))
@@ -187,12 +187,16 @@ class Midi:
                 self._give(command)
 
     def show(self, state: ShowState, now: float) -> None:
-        """Move motor faders, and light rings, to where the levers are."""
+        """Move motor faders, and light rings, to where the levers are; of a device that comes back all."""
+        here = {*self.devices}
+        self._shown = {control: value for control, value in self._shown.items() if control[0] in here}
         for one in self._bindings.all:
             lever = ADDRESSES[one.address].lever
             if lever is None or one.kind != "controller" or one.low is None or one.high is None:
                 continue
-            if one.name or one.low == one.high or now - self._moved_at.get(one.control, 0.0) < _OWN_CONTROL_S:
+            if one.device not in here or one.name or one.low == one.high:
+                continue
+            if now - self._moved_at.get(one.control, 0.0) < _OWN_CONTROL_S:
                 continue
             number = lever.kind.formatted(state[lever].value)[1]
             if not number:
@@ -239,7 +243,7 @@ class Remote:
         self._timecode = timecode
         self.follower = Follower(timecode, self._give)
         self._senders = Senders(timecode)
-        self._midi_code = MidiTimecode()
+        self._midi_codes: dict[str, MidiTimecode] = {}  # by device: one code may come by several
         self._ltc = LtcInput(timecode.device) if timecode.source == "ltc" else None
         self._port: Port | None = None
         self._retry_at = 0.0
@@ -268,9 +272,14 @@ class Remote:
         names = tuple(str(cue["name"]) for cue in cues)
         if self.midi is not None:
             self.midi.look(now)
-            for message in self.midi.turn(names, now):
-                if self._timecode.source == "mtc" and (heard := self._midi_code.hear(message)) is not None:
+            for device, message in self.midi.turn(names, now):
+                if self._timecode.source != "mtc":
+                    continue
+                code = self._midi_codes.setdefault(device, MidiTimecode())
+                if (heard := code.hear(message)) is not None:
                     self.follower.clock.hear(heard.label, now, heard.ahead_frames)
+            for gone in self._midi_codes.keys() - {*self.midi.devices}:
+                del self._midi_codes[gone]
         self._hear_art_net(now)
         if self._ltc is not None:
             for heard, ended in self._ltc.labels(now):

@@ -92,6 +92,55 @@ def test_a_motor_fader_follows_its_lever_but_not_the_hand_on_it(tmp_path: Path) 
     os.close(own)
 
 
+def test_a_fader_that_is_plugged_in_later_is_moved_to_its_lever(tmp_path: Path) -> None:
+    """Also one that comes back: it stands anywhere then."""
+    device = tmp_path / "midiC1D0"
+    bindings = MidiBindings(tmp_path)
+    fader = {"device": "midiC1D0", "kind": "controller", "channel": 2, "number": 7, "address": "/master"}
+    bindings.bind(checked(fader))
+    text = f"midi: {{devices: ['{device}']}}\nstate: .\n"
+    now = 100.0
+    with closing(ShowStateWriter(tmp_path)) as writer:
+        remote = remote_of(tmp_path, text, [], Fallbacks(OF_THE_REMOTE))
+        writer.write(ShowState().to(MASTER, 0.5, 1.0))
+        for _ in range(2):
+            remote.turn(now)
+            desk, own = pty.openpty()
+            tty.setraw(own)
+            os.set_blocking(desk, False)
+            device.symlink_to(os.ttyname(own))
+            remote.turn(now + 3.0)
+            assert os.read(desk, 10) == b"\xb1\x07\x40"
+            os.close(own)
+            os.close(desk)
+            device.unlink()
+            now += 10.0
+        remote.close()
+
+
+def test_midi_timecode_that_comes_by_two_devices_is_one_code(tmp_path: Path) -> None:
+    """A sequencer sends it to all of its outputs: each quarter frame comes twice."""
+    desks, owns = zip(*(pty.openpty() for _ in range(2)), strict=True)
+    for place, own in enumerate(owns):
+        tty.setraw(own)
+        (tmp_path / f"midiC{place}D0").symlink_to(os.ttyname(own))
+    devices = [str(tmp_path / f"midiC{place}D0") for place in range(2)]
+    text = f"timecode: {{source: mtc}}\nmidi: {{devices: {devices}}}\nstate: .\n"
+    remote = remote_of(tmp_path, text, [], Fallbacks(OF_THE_REMOTE))
+    remote.turn(100.0)
+    pieces = [0x0A, 0x10, 0x25, 0x30, 0x40, 0x50, 0x61, 0x72]  # 01:00:05:10, 25 frames
+    for turn in range(4):
+        for piece, data in enumerate(pieces):
+            for desk in desks:
+                os.write(desk, bytes([0xF1, data + 2 * turn if piece == 0 else data]))
+            time.sleep(0.005)
+            remote.turn(100.0 + (8 * turn + piece) / 100)
+    assert (remote.report(100.32)["state"], remote.report(100.32)["rate"]) == ("running", "25")
+    remote.close()
+    for one in (*desks, *owns):
+        os.close(one)
+
+
 def test_a_sound_input_that_is_not_there_is_told_and_tried_again() -> None:
     track = LtcInput("no such input")
     assert list(track.labels(10.0)) == []
