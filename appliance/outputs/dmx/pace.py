@@ -50,7 +50,8 @@ class Universe:
             self.wire.take_over(raised, now)
 
     def cede(self, now: float) -> None:
-        """Another box sends from now on."""
+        """Another box sends from now on: what has not left does not leave."""
+        self._changed = False
         if isinstance(self.wire, NetworkWire):
             self.wire.cede(now)
 

@@ -100,6 +100,17 @@ def test_what_was_offered_last_leaves_before_the_end() -> None:
     assert listener.is_closed
 
 
+def test_a_box_that_cedes_sends_nothing_more() -> None:
+    """What waited when the other box took over would be a second source for the node."""
+    one, listener = paced()
+    for offer in range(3):
+        one.offer(universe(offer), 0.001 * offer)
+    before = len(listener.heard)
+    one.cede(0.004)
+    one.close(9.0)
+    assert (len(listener.heard), listener.is_closed) == (before, True)
+
+
 def test_after_a_stall_nothing_leaves_in_a_burst() -> None:
     one, listener = paced()
     one.offer(universe(0), 0.0)
