@@ -105,8 +105,11 @@ class Learn:
         return web.json_response({"done": True})
 
     async def _end(self, request: web.Request) -> web.Response:
+        """Only what is still being learned: another browser's second touch must not undo what was learned."""
+        was_wanted = self._learning.wanted() is not None
         self._learning.end()
-        self._learning.report(state="ended")
+        if was_wanted:
+            self._learning.report(state="ended")
         return web.json_response({"done": True})
 
     async def _use_rehearsal(self, request: web.Request) -> web.Response:
@@ -142,7 +145,8 @@ class Learn:
             except OSError as error:
                 raise web.HTTPServiceUnavailable(text=f"It cannot be kept ({error.strerror}).") from None
             finally:
-                part.unlink(missing_ok=True)
+                with contextlib.suppress(OSError):
+                    part.unlink(missing_ok=True)
                 with contextlib.suppress(OSError):
                     folder.rmdir()  # where nothing is in it
         return web.json_response({"name": f"box/{folder.name}"} | json.loads(read))

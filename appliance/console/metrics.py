@@ -62,7 +62,7 @@ def _metric(name: str, kind: str, meaning: str, values: list[tuple[str, float]])
         yield f"# HELP bunraku_{name} {meaning}"
         yield f"# TYPE bunraku_{name} {kind}"
         for labels, value in values:
-            yield f"bunraku_{name}{labels} {float(value):g}"
+            yield f"bunraku_{name}{labels} {float(value):.15g}"
 
 
 def _label(*pairs: str) -> str:

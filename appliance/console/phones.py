@@ -206,7 +206,7 @@ class Phones:
         """{"name", "where", "code" or "pass", "take_over"} -> {"session", "pass"}."""
         values = await said(request)
         place, where = self._place(values.get("name")), values.get("where")
-        if where not in FRONTS:
+        if not isinstance(where, str) or where not in FRONTS:
             raise web.HTTPBadRequest(text=f"A phone is worn as one of: {', '.join(FRONTS)}.")
         now = time.monotonic()
         device = self._guard.device(request)

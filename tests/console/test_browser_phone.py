@@ -362,6 +362,7 @@ def test_a_phone_needs_the_pin_or_its_code(stage: Stage) -> None:
     assert page.post("/api/phones/join", joining).status == 401
     assert page.post("/api/phones/code", {"name": NAME}).status == 401
     assert page.post("/api/phones/join", {**joining, "name": "head"}).status == 404
-    assert page.post("/api/phones/join", {**joining, "where": "foot"}).status == 400
+    for where in ("foot", ["hand"], {}, None):
+        assert page.post("/api/phones/join", {**joining, "where": where}).status == 400, where
     answers = [page.post("/api/phones/join", {**joining, "code": "x" * 10}).status for _ in range(7)]
     assert answers[0] == 403 and answers[-1] == 429

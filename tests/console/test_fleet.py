@@ -103,6 +103,12 @@ def test_the_examples_for_monitoring_name_metrics_that_there_are() -> None:
     assert job["metrics_path"] == "/metrics"
 
 
+def test_a_counter_of_a_long_season_is_told_to_the_last_tick() -> None:
+    reported = metrics({"status": Status(late=1_234_567, uptime_s=8_640_001.0)._asdict()})
+    assert "bunraku_late_ticks_total 1234567\n" in reported
+    assert "bunraku_uptime_seconds 8640001\n" in reported
+
+
 def packed_bundle(folder: Path, name: str, network: str = "plain") -> Path:
     show = write_show(folder, hands=[], network=network, name=name)
     write_checksums(show)
