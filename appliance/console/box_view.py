@@ -46,7 +46,7 @@ class BoxView:
         self._desk, self._stage, self._seen = desk, stage, seen
         self._batteries: dict[str, int] = {}
         self._late: tuple[int, int] | None = None
-        self._since = self._started = time.time()
+        self._since = self._started = time.monotonic()  # the other clock may be set meanwhile
         self.value: dict[str, Any] = {}
         self.text = "{}"
 
@@ -66,8 +66,9 @@ class BoxView:
         lines = seen.health().get("sensors", ()) if self._stage.lives else ()
         sensors = [self._sensor(RosterLine(*line)) for line in lines if len(line) == _FIELDS]
         fallbacks = [{"process": process, **one._asdict()} for process, one in seen.fallbacks(now)]
-        self._note_late(known)
-        judged: Verdict = verdict(frames, known, sensors, fallbacks, self._since, trouble)
+        self._note_late(known, now)
+        since = time.time() - (now - self._since)
+        judged: Verdict = verdict(frames, known, sensors, fallbacks, since, trouble)
         return {
             "time": time.time(),
             "trouble": trouble,
@@ -75,7 +76,7 @@ class BoxView:
             "frames": frames,
             "status": None if known is None else known._asdict(),
             "verdict": judged._asdict(),
-            "since": self._since,
+            "since": since,
             "sensors": sensors,
             "fallbacks": fallbacks,
             "processes": [{"process": one.process, "late": one.late} for one in members],
@@ -122,15 +123,15 @@ class BoxView:
         values = line._asdict() | {"battery": battery, "is_worn": bool(line.neutral)}
         return values | {"heard": line.state == "linked"}
 
-    def _note_late(self, status: Status | None) -> None:
+    def _note_late(self, status: Status | None, now: float) -> None:
         if status is None or status.uptime_s < 0:
             return
-        late, started = (status.late, status.skipped), time.time() - status.uptime_s
+        late, started = (status.late, status.skipped), now - status.uptime_s
         if self._late is None or started > self._started + _SAME_STAGE_S:
             self._started = started
-            self._since = started if late == (0, 0) else time.time()
+            self._since = started if late == (0, 0) else now
         elif late != self._late:
-            self._since = time.time()
+            self._since = now
         self._late = late
 
 

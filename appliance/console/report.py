@@ -28,7 +28,7 @@ Send = Callable[[Mapping[str, Any]], None]
 
 
 class Reports:
-    """Which changes are due. settings: as `after_s` and `every_s` in the box file; times in Unix seconds.
+    """Which changes are due. settings: as `after_s` and `every_s` in the box file; times: monotonic seconds.
 
     A fallback counts by its name and subject. A fallback that is over before it was due is never reported.
     """
@@ -107,7 +107,7 @@ async def watch(
     reports, posts = Reports(settings["after_s"], settings["every_s"]), posts_of(settings)
     while True:
         await asyncio.sleep(_LOOK_S)
-        lines = reports.look(value(), time.time())
+        lines = reports.look(value(), time.monotonic())
         for post in posts:
             post.add(lines)
             await post.look(value(), time.monotonic())

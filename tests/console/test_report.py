@@ -7,6 +7,7 @@ import contextlib
 import json
 import socketserver
 import threading
+import time
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -50,6 +51,38 @@ def test_a_moment_of_silence_is_never_told() -> None:
     for now in range(0, 100, 10):
         assert reports.look(box(SILENT, uptime_s=4000.0), float(now)) == []
         assert reports.look(box({**SILENT, "active": False}, uptime_s=4000.0), now + 5.0) == []
+
+
+def test_a_clock_that_is_set_reports_nothing_early_and_holds_no_report_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    came: list[str] = []
+    module = appliance.console.report
+    monkeypatch.setattr(module, "_LOOK_S", 0.01)
+    monkeypatch.setattr(module, "posts_of", lambda _: [Post("mail", lambda one: came.append(one["text"]))])
+    real, step = time.time, 0.0
+    monkeypatch.setattr(time, "time", lambda: real() + step)
+    fallbacks = [SILENT]
+
+    def value() -> dict[str, Any]:
+        return box(*fallbacks, uptime_s=4000.0)
+
+    async def watched() -> None:
+        nonlocal step
+        watching = asyncio.create_task(watch({"after_s": 1.0, "every_s": 0.0}, value, Fallbacks(OF_THE_PAGE)))
+        await asyncio.sleep(0.1)
+        step = 86400.0
+        await asyncio.sleep(0.3)
+        assert not came, "it has not lasted for a second yet"
+        step = -86400.0
+        await asyncio.sleep(1.5)
+        assert len(came) == 1 and "No readings" in came[0]
+        fallbacks.clear()
+        await asyncio.sleep(0.5)
+        assert len(came) == 2 and "Over" in came[1]
+        watching.cancel()
+
+    asyncio.run(watched())
 
 
 def sent(settings: dict[str, Any], lines: list[str], value: dict[str, Any]) -> None:

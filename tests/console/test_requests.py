@@ -24,6 +24,8 @@ from appliance.console.desk import NO_COMMANDS, SILENT, Desk
 from appliance.console.devices import FREE_TRIES
 from appliance.console.seen_stage import SeenStage
 from appliance.console.stage_view import StageView
+from appliance.console.verdict import verdict
+from appliance.levers.status import Status
 from hw_sim.peers import HOST
 from tests.console.page import Page, page_alone
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, until
@@ -328,6 +330,24 @@ def test_the_page_tells_what_a_desk_is_answered(tmp_path: Path, view: BoxView) -
         assert (sensor["name"], sensor["battery"], sensor["heard"]) == ("left-wrist", 80, True)
         assert (reported["frames"], reported["trouble"]) == ("fresh", "")
     control.close()
+
+
+def test_a_clock_that_is_set_back_keeps_no_warning(
+    tmp_path: Path, view: BoxView, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A machine whose clock had the time of its country, until a network told it."""
+    status = Status(state="dancing", rate_hz=50.0, level=1.0, late=2, uptime_s=600.0)
+    began = time.monotonic()
+    view._note_late(status, began)
+    real = time.time
+    monkeypatch.setattr(time, "time", lambda: real() - 7200.0)
+    view._note_late(status._replace(uptime_s=601.0), began + 1.0)
+    told = view._value(began + 61.0)["since"]
+    assert real() - 7200.0 - told == pytest.approx(61.0, abs=5.0)
+    assert verdict("fresh", status, [], [], told, "").key == "well_alone"
+    monkeypatch.setattr(time, "time", lambda: real() + 7200.0)
+    view._note_late(status._replace(uptime_s=662.0), began + 62.0)
+    assert verdict("fresh", status, [], [], view._value(began + 62.0)["since"], "").key == "well_alone"
 
 
 def test_without_show_control_the_page_says_so(tmp_path: Path, view: BoxView) -> None:
