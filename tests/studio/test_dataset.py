@@ -24,6 +24,7 @@ from appliance.studio.data.catalogue import (
 from appliance.studio.data.dataset import DatasetError, Take, load_dataset, load_take
 from appliance.studio.data.mirror import mirror_pairs
 from appliance.studio.data.sources import given, remembered
+from appliance.studio.evaluation.pictures import longest_sound
 from appliance.studio.studio_error import StudioError
 from tests.studio.tiny import STILL, moving, swaying, upside_down, write_recordings
 
@@ -206,8 +207,21 @@ def test_keep_on_the_command_line_is_remembered(tmp_path: Path) -> None:
     }
     again = remembered({"origin": source.as_state()}, None, tmp_path / "checkpoint.pt")
     assert again.catalogue == source.catalogue
-    with pytest.raises(StudioError, match=r"'solo_\*' is to be kept or masked, but no recording"):
-        given(folder, keep=["solo_*"])
+    for asked in ({"keep": ["solo_*"]}, {"held_out": ["solo_*"]}):
+        with pytest.raises(StudioError, match=r"'solo_\*' is to be kept, masked or held out, but no"):
+            given(folder, **asked)
+
+
+def test_a_take_that_is_masked_is_not_measured_on(tmp_path: Path) -> None:
+    """Neither one without a sound window, nor one whose sound stretches are shorter than a model's window."""
+    folder = write_recordings(tmp_path / "dancer", count=3)
+    masked = {"sway_2": ((0.0, 9.0),)}
+    found = load_dataset(folder, Catalogue(mask=masked))
+    assert {take.name for take in found.held_out} == {"sway_2"}
+    assert found.measured_on() == found.training
+    assert len(longest_sound(found.held_out[0], 60.0)) == 0
+    found = load_dataset(folder, Catalogue(mask={"sway_2": ((1.9, 2.1),)}))
+    assert found.measured_on() == found.held_out and found.measured_on(128) == found.training
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import torch
+from rich.console import Console
 
 from appliance.studio.autoencoder import losses
 from appliance.studio.autoencoder.answers import AnswerSettings
@@ -19,8 +20,9 @@ from appliance.studio.autoencoder.held_joints import HeldPlaces
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.autoencoder.models import settings_for
 from appliance.studio.autoencoder.repertoire import Nearness
-from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder
-from appliance.studio.data.dataset import Dataset, load_dataset
+from appliance.studio.autoencoder.training import Report, Settings, Training, load_autoencoder
+from appliance.studio.autoencoder.training_run import TrainingRun
+from appliance.studio.data.dataset import Catalogue, Dataset, load_dataset, windows
 from appliance.studio.data.sources import given
 from appliance.studio.processes import Processes
 from appliance.studio.studio_error import StudioError
@@ -76,6 +78,16 @@ def test_interrupted_and_resumed_is_uninterrupted_bit_for_bit(
     for name in (*whole.saved, "batches", "sequences", "random", "step"):
         assert same(one[name], other[name]), name
     assert one["history"][-1]["held_out_degrees"] == other["history"][-1]["held_out_degrees"]
+
+
+def test_a_strip_is_drawn_where_no_held_out_window_is_sound(recordings: Path, tmp_path: Path) -> None:
+    dataset = load_dataset(recordings, Catalogue(mask={"sway_2": ((1.9, 2.1),)}))
+    assert not len(windows(dataset.held_out, dataset.moving, window=128))
+    settings = settings_for("sequence", window=128, width=16, latent=4, batch=4)
+    assert isinstance(settings, Settings)
+    run = TrainingRun(Training(dataset, settings), tmp_path, Console(quiet=True))
+    run._draw_strip(Report(1, 60.0, 0.5, {}))
+    assert (tmp_path / "pictures" / "filmstrip_050.png").exists()
 
 
 def test_only_a_training_whose_motion_is_seen_has_a_motion_critic(dancer: Dataset) -> None:

@@ -60,7 +60,9 @@ class TrainingRun:
 
     def _draw_strip(self, report: Report) -> None:
         dataset = self.training.dataset
-        take = max(dataset.held_out or dataset.training, key=lambda take: len(window_starts(take)))
+        window = self.training.settings.window
+        takes = dataset.measured_on(window)
+        take = max(takes, key=lambda take: len(window_starts(take, window=window)))
         minutes, steps = counted(round(report.seconds / 60), "minute"), counted(report.step, "step")
         title = f"{take.name} after {minutes} ({steps})"
         path = self.folder / "pictures" / f"filmstrip_{round(100 * report.fraction):03d}.png"

@@ -84,6 +84,11 @@ class Dataset:
         """Whether mirror images are training data too."""
         return not self.asymmetry
 
+    def measured_on(self, window: int = WINDOW) -> tuple[Take, ...]:
+        """The held-out takes; the training takes where no held-out one has a sound window of this length."""
+        has_one = any(len(window_starts(take, window=window)) for take in self.held_out)
+        return self.held_out if has_one else self.training
+
     def still_pose(self) -> NDArray[np.float64]:
         """(J, 4): the mean pose of the training takes, in which the still joints stand for good."""
         return mean_pose(self.training)

@@ -43,11 +43,11 @@ def given(
         raise StudioError(f"{recordings} has no .bvh files. Give the folder that holds your recordings.")
     known = read_catalogue(catalogue) if catalogue else find_catalogue(recordings, files)
     known = replace(known, keep={**known.keep, **dict.fromkeys(keep, (ALWAYS,))})
-    for pattern in (*known.keep, *known.mask):
+    for pattern in (*known.keep, *known.mask, *held_out):
         if not any(fnmatch.fnmatch(file.stem, pattern) for file in files):
             raise StudioError(
-                f"'{pattern}' is to be kept or masked, but no recording in {recordings} has that name. "
-                "Give the name of a file without .bvh, or a pattern such as 'solo_*'."
+                f"'{pattern}' is to be kept, masked or held out, but no recording in {recordings} has that "
+                "name. Give the name of a file without .bvh, or a pattern such as 'solo_*'."
             )
     known = known.with_options(reading)
     return Sources(recordings, replace(known, held_out=tuple(held_out)) if held_out else known)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from appliance.pose.recording import Recording
-from appliance.studio.data.dataset import FPS, WINDOW, Dataset, Take
+from appliance.studio.data.dataset import FPS, WINDOW, Dataset, Take, window_starts
 from appliance.studio.evaluation.measurement import TICKS, Pair
 from appliance.studio.evaluation.pictures import longest_sound
 from appliance.studio.studio_error import StudioError
@@ -73,7 +73,7 @@ def own_takes(dataset: Dataset) -> OwnTakes:
 
     Raises StudioError if the recordings are too few or too short.
     """
-    apart = _longest_of_each(dataset.held_out)
+    apart = _longest_of_each([take for take in dataset.held_out if len(window_starts(take))])
     if len(apart) > 1:
         return OwnTakes(pair_up(apart, apart), dataset.training, "on takes that it never saw")
     if apart:

@@ -106,7 +106,7 @@ def reconstructed(coder: Coder, recording: Recording, iterations: int) -> NDArra
 
 def longest_sound(take: Take, most_s: float) -> Recording:
     """The middle of a take's longest stretch without a capture error, at most most_s long."""
-    first, last = max(take.sound_runs, key=lambda run: run[1] - run[0], default=(0, len(take.sound)))
+    first, last = max(take.sound_runs, key=lambda run: run[1] - run[0], default=(0, 0))
     spare = max(0, last - first - round(min(most_s * FPS, len(take.sound)))) // 2
     return take.recording.excerpt((first + spare) / FPS, (last - spare) / FPS)
 

@@ -188,7 +188,7 @@ def _takes(options: ExperimentOptions, coder: Coder) -> list[Take]:
     if options.excerpts is not None:
         return load_takes(recordings_in(options.recordings), coder, options.reading, trained)
     dataset = load_folder(options.recordings, options.reading.over(trained.options))
-    return list(dataset.held_out or dataset.training)
+    return list(dataset.measured_on())
 
 
 def _null_claims(

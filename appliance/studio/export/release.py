@@ -74,7 +74,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
             "Give the folder that it was trained on with --recordings."
         )
     places = [dataset.skeleton.index(name) for name in coder.joints]
-    judged_on = dataset.held_out or dataset.training
+    judged_on = dataset.measured_on()
     request.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".export-", dir=request.out) as folder:
         files = _export_both(coder, state["settings"]["network"], Path(folder))
@@ -241,7 +241,7 @@ def _own_phrase(dataset: Dataset) -> tuple[Recording, str, dict[str, Any]]:
 
 def _excerpt(dataset: Dataset) -> tuple[Recording, str]:
     """A phrase cut from a held-out take, or from any take if those are short; and the take's name."""
-    for takes in (dataset.held_out or dataset.training, dataset.takes):
+    for takes in (dataset.measured_on(), dataset.takes):
         take = _longest_sound_take(takes)
         phrase = longest_sound(take, PHRASE_S)
         if phrase.seconds >= SHORT_PHRASE_S:

@@ -67,7 +67,7 @@ class Sweep:
 
 def report(autoencoder: Autoencoder, dataset: Dataset, folder: Path, console: Console) -> None:
     """Measure, print, write report.json and variations.png."""
-    takes = list(dataset.held_out or dataset.training)
+    takes = dataset.measured_on(autoencoder.shape.window)
     found = sweep(autoencoder, dataset, takes, console)
     (folder / "report.json").write_text(json.dumps({"variations": asdict(found)}, indent=1) + "\n", "utf-8")
     with doing("drawing variations.png", console):
