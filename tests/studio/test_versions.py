@@ -176,6 +176,16 @@ def test_a_single_recording_is_cut_into_parts_with_its_own_seconds() -> None:
     assert max(map(period.second_of, range(len(period.rows)))) == pytest.approx(88, abs=2)
 
 
+def test_a_recording_of_ten_seconds_has_two_parts_to_compare(
+    folders: tuple[Path, Path], tmp_path: Path
+) -> None:
+    write_bvh(tmp_path / "ten.bvh", swaying(9.8, 1))
+    parts = _takes(tmp_path / "ten.bvh", ReadingOptions())
+    assert [len(part.recording) for part in parts] == [245, 245]
+    result = bunraku("periods", folders[0], tmp_path / "ten.bvh", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+
+
 def test_a_recording_that_is_too_short_is_no_practice(folders: tuple[Path, Path], tmp_path: Path) -> None:
     write_bvh(tmp_path / "short.bvh", swaying(4.0, 1))
     result = bunraku("periods", folders[0], tmp_path / "short.bvh", "--out", tmp_path / "out")

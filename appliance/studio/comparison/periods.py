@@ -48,7 +48,7 @@ EVERY = 10  # ticks from one second of dance to the next
 USUAL_PERCENT = 90.0  # percent of a period's seconds that are as near as that to another take
 BODY_CM = 170.0  # height of the body on which distances are measured
 LEAST_SECONDS = 40  # seconds of dance of a period, at 0.2 s from one to the next: 9 s
-PARTS_S = 10.0  # a period of one recording is cut into parts, each a take
+PARTS_S = 10.0  # a period of one recording is cut into parts, two at least, each a take
 MOST_NEW = 2000
 FEWEST_ROLES = 8
 
@@ -104,7 +104,7 @@ class Period:
                 owners += [number] * len(found)
                 firsts += [first + EVERY * place for place in range(len(found))]
         whole = np.concatenate(rows) if rows else np.zeros((0, 1))
-        if len(whole) < LEAST_SECONDS:
+        if len(whole) < LEAST_SECONDS or len(set(owners)) < 2:  # nothing says what is usual between takes
             raise StudioError(f"{name} has less than 9 s of sound dance: too little to call a practice.")
         return Period(name, takes, whole, np.array(owners), np.array(firsts))
 
@@ -123,7 +123,7 @@ class Period:
 
     def between_halves(self) -> Array:
         """(K,): from each second to the nearest one of the other half of the takes, every second one: cm."""
-        half = self.owners % 2
+        half = np.unique(self.owners, return_inverse=True)[1] % 2
         found = np.empty(len(self.rows))
         for side in (0, 1):
             found[half == side] = distances(self.rows[half == side], self.rows[half != side]).min(axis=1)
@@ -232,11 +232,11 @@ def _takes(path: Path, reading: ReadingOptions) -> list[Take]:
         found = [load_take(path, find_catalogue(path.parent, [path]).with_options(reading))]
     if len({take.take for take in found}) > 1:
         return found
-    parts = [
-        take.part(first, min(first + round(PARTS_S * FPS), len(take.recording)))
-        for take in found
-        for first in range(0, len(take.recording), round(PARTS_S * FPS))
-    ]
+    parts = []
+    for take in found:
+        count = len(take.recording)
+        length = min(round(PARTS_S * FPS), -(-count // 2))
+        parts += [take.part(first, min(first + length, count)) for first in range(0, count, length)]
     return [replace(part, name=part.file) for part in parts]
 
 
