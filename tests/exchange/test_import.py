@@ -356,11 +356,13 @@ def table_of(points: Array, names: Sequence[str], kind: str) -> str:
         rows = [[str(number + 1), f"{number / 25:.4f}", *row] for number, row in enumerate(rows)]
     if kind == "NA":
         rows[3][3:6], rows[4][3:6] = ["NA"] * 3, ["NaN", "#N/A", "null"]
+    if kind == "tabs and gaps":
+        rows[3][-3:], rows[4][-3:] = [""] * 3, [""] * 3
     if kind == "a row cut":
         rows[-1] = rows[-1][:4]
     if kind == "words in a row":
         rows[4][2] = "lost"
-    mark = {"semicolons": ";", "tabs": "\t"}.get(kind, ",")
+    mark = {"semicolons": ";", "tabs": "\t", "tabs and gaps": "\t"}.get(kind, ",")
     end = "\n\n  \n" if kind == "blank last lines" else "\n"
     comment = "# of a tracker\n" if kind == "a comment" else ""
     return comment + "\n".join(mark.join(row) for row in [titles, *rows]) + end
@@ -369,7 +371,8 @@ def table_of(points: Array, names: Sequence[str], kind: str) -> str:
 TABLES = {
     "plain": "", "underscores": "", "capitals": "", "semicolons": "", "tabs": "", "quoted commas": "",
     "index": "", "frame and time": "Rate: 25 frames a second, by the column of times", "blank last lines": "",
-    "NA": "Gaps: 1 of up to 0.04 s", "a comment": "", "a row cut": "line 51: 1 row lost (this line has 4",
+    "NA": "Gaps: 1 of up to 0.04 s", "tabs and gaps": "Gaps: 1 of up to 0.04 s",
+    "a comment": "", "a row cut": "line 51: 1 row lost (this line has 4",
     "words in a row": "'lost' is not a number",
 }  # fmt: skip
 

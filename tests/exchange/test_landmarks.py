@@ -109,6 +109,9 @@ def test_every_format_says_the_same(form: str, tmp_path: Path) -> None:
         ("a.csv", "frame,landmark,x,y,z\n0,nose,0,0,0\n0,tail,0,0,0\n", 3, "called 'tail'"),
         ("a.csv", "time,nose_x,nose_y\n0,0,0\n", 1, "left_eye_inner_x and 31 more"),
         ("a.txt", "", 0, "Landmarks are"),
+        ("a.npz", "PK\x03\x04 cut", 0, "no landmarks of numpy"),
+        ("a.json", f'[{{"time": {"9" * 400}, "world": null}}]', 0, "too large"),
+        ("a.json", f'[{{"time": {"9" * 5000}, "world": null}}]', 0, "no JSON"),
     ],
 )
 def test_a_broken_file_is_refused_with_its_line(
@@ -125,6 +128,12 @@ def test_times_that_go_back_and_landmarks_of_nobody_are_refused(tmp_path: Path) 
     np.savez(tmp_path / "back.npz", world=world, times=np.array([0.0, 0.1, 0.1]))
     with pytest.raises(ExchangeError, match="Frame 2 is not later"):
         read_landmarks(tmp_path / "back.npz")
+    np.savez(tmp_path / "end.npz", world=world, times=np.array([0.0, 0.1, np.inf]))
+    with pytest.raises(ExchangeError, match="Frame 2 is not later"):
+        read_landmarks(tmp_path / "end.npz")
+    np.savez(tmp_path / "rate.npz", world=world, fps=0.0)
+    with pytest.raises(ExchangeError, match="its fps is 0"):
+        read_landmarks(tmp_path / "rate.npz")
     assert read_landmarks(tmp_path / "back.npz", fps=25.0).times[-1] == pytest.approx(0.08)
     np.savez(tmp_path / "none.npz", world=np.full((3, 33, 3), np.nan))
     with pytest.raises(ExchangeError, match="Nobody was seen"):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import re
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,6 +101,8 @@ def read_landmarks(path: Path, fps: float | None = None) -> LandmarksFile:
             found = reader(path)
     except OSError as error:
         raise ExchangeError(path, f"The landmarks cannot be read ({error.strerror}).") from error
+    except (OverflowError, csv.Error) as error:
+        raise ExchangeError(path, f"These are no landmarks ({error}).") from None
     layout, points, seen, times, is_flat = found
     if len(points) > _MOST_FRAMES:
         raise ExchangeError(path, f"{len(points):,} frames are more than {_MOST_FRAMES:,}. Cut the video.")
@@ -110,9 +114,10 @@ def read_landmarks(path: Path, fps: float | None = None) -> LandmarksFile:
         times = np.arange(len(points)) / rate
         if fps is None:
             notes.append(f"no times are in it: taken as {rate:g} frames a second. If that is wrong: --fps")
-    steps = np.diff(times)
-    if not np.isfinite(times).all() or (steps <= 0).any():
-        at = int(np.flatnonzero(~(steps > 0))[0]) + 1 if len(steps) else 0
+    is_wrong = ~np.isfinite(times)
+    is_wrong[1:] |= ~(np.diff(times) > 0)
+    if is_wrong.any():
+        at = int(is_wrong.argmax())
         raise ExchangeError(
             path, f"Frame {at} is not later than the one before. Give --fps in place of times."
         )
@@ -130,7 +135,7 @@ def _read_json(path: Path) -> _Read:
         values = json.loads(text)
     except json.JSONDecodeError as error:
         raise ExchangeError(path, f"This is no JSON: {error.msg}.", error.lineno) from None
-    except (UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # another encoding; a number of thousands of digits
         raise ExchangeError(path, f"This is no JSON ({error}).") from None
     frames = values.get("frames") if isinstance(values, dict) else values
     if not isinstance(frames, list) or not frames:
@@ -307,7 +312,7 @@ def _read_arrays(path: Path) -> _Read:
             with opened(path) as stream:
                 points = np.lib.format.read_array(stream, allow_pickle=False)
         else:
-            with np.load(path, allow_pickle=False) as stored:
+            with opened(path) as stream, np.load(stream, allow_pickle=False) as stored:
                 name = next((one for one in ("world", "landmarks", "points") if one in stored), None)
                 if name is None:
                     raise ValueError(f"it has {', '.join(stored)}, and nothing called world or landmarks")
@@ -315,8 +320,20 @@ def _read_arrays(path: Path) -> _Read:
                 if "times" in stored:
                     times = stored["times"].astype(float)
                 elif "fps" in stored:
-                    times = np.arange(len(points)) / float(stored["fps"])
-    except (ValueError, EOFError, MemoryError, KeyError) as error:
+                    fps = float(stored["fps"])
+                    if not 0 < fps < np.inf:
+                        raise ValueError(f"its fps is {fps:g}")
+                    times = np.arange(len(points)) / fps
+    except (
+        ValueError,
+        EOFError,
+        MemoryError,
+        KeyError,
+        TypeError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise ExchangeError(path, f"These are no landmarks of numpy ({error}).") from None
     if points.ndim == 2 and len(points) and points.shape[1] % len(MEDIAPIPE) == 0:
         points = points.reshape(len(points), len(MEDIAPIPE), -1)

@@ -149,9 +149,14 @@ def read_rows(
 
 def _numbers(text: str, separator: str, columns: int) -> Array:
     """The numbers of a row. Raises ValueError, in words."""
-    words = (
-        text.strip().split(separator) if '"' not in text else next(csv.reader([text], delimiter=separator))
-    )
+    words = text.strip(" \r\n").split(separator)  # a tab at an end is a field without a value
+    if '"' in text:
+        try:
+            words = next(csv.reader([text], delimiter=separator))
+        except csv.Error as error:
+            raise ValueError(f"this line is no row of a table ({error})") from None
+    while len(words) > columns and not words[-1].strip():
+        words.pop()
     if len(words) != columns:
         commas = len(words) == 2 * columns and separator == ","
         hint = " (decimal commas? Save it with semicolons between the fields)" if commas else ""
