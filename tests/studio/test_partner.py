@@ -107,6 +107,14 @@ def trained(folder: Path, monkeypatch: pytest.MonkeyPatch, steps: int) -> tuple[
     return network, train(network, stretches(network, 0), stretches(network, 100, 2), 2, 1e9, steps)
 
 
+def test_a_training_too_short_to_be_looked_at_gives_what_it_learned() -> None:
+    network = torch.nn.Linear(1, 1)
+    begun = float(network.weight.detach())
+    descent = training._Descent(20, lambda message: None).within(1e9, "one")
+    learned = descent.learn(network, lambda one: (one.weight - 9).square().sum(), lambda one: (0.0, ""))
+    assert float(learned.weight.detach()) > begun
+
+
 def test_its_file_gives_what_was_trained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     network, partner = trained(tmp_path, monkeypatch, 30)
     export_partner(partner, network, tmp_path / FILE)

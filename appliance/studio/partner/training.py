@@ -516,4 +516,5 @@ class _Descent:
                 )
                 if value < least:
                     best, least = copy.deepcopy(average), value
-        return average if keeps_last else best
+        was_seen = least < math.inf  # else the best is still the network that it began with
+        return best if was_seen and not keeps_last else average
