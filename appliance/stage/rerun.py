@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -108,6 +108,12 @@ class _RecordedLink(SensorLink):
     def drain(self, now: float) -> Sequence[SensorReading]:
         here = self.recorded["reading_here"]
         return [self._reading(place, name) for place, name in enumerate(self._sensors) if here[place]]
+
+    def drain_late(
+        self, sensor: str, until: float, monotonic: Callable[[], float]
+    ) -> Sequence[SensorReading]:
+        """The recorded readings have those that were waited for."""
+        return self.drain(until)
 
     def states(self, now: float) -> list[SensorState]:
         names, are_here = self._asked

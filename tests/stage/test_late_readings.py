@@ -8,13 +8,16 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from appliance.box.clock import Slot
+from appliance.recorder.record import facts_of_run, layout_of
 from appliance.sensor.link import SensorLink, open_link
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.iterations import Iterations
+from appliance.stage.rerun import Rerun
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts, assemble
@@ -120,3 +123,24 @@ def test_packets_of_others_do_not_end_the_wait(parts: StageParts, link: SensorLi
     thread.join()
     assert tick.frame.sensor_sequence == radio.wearable.sequence
     assert link.counts["duplicate"] == 1
+
+
+def test_a_box_that_follows_hears_the_others_where_the_leader_waited_in_vain(tmp_path: Path) -> None:
+    """It asked the sockets again, which it does not hear, and lost the readings of all other sensors."""
+    hands: list[dict[str, object]] = [
+        {"sensor": "left-wrist", "joint": "lShldr"},
+        {"sensor": "head", "joint": "Chest"},
+    ]
+    show = load_show(write_show(tmp_path / "two", hands))
+    no_ports = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+    with closing(assemble(show, no_ports)) as parts:
+        tick, sensors = made(parts, 0.01), list(parts.worn)
+        rerun = Rerun(tick, tick.wearing, sensors)
+        parts.link = rerun.heard
+        recorded = np.zeros(1, layout_of(facts_of_run(show, sensors)))[0]
+        recorded["reading_orientation"][:, 0], recorded["iterations"] = 1.0, (1, 0)
+        for number, here in ((1, [1, 1]), (2, [0, 1])):
+            recorded["tick"], recorded["reading_here"] = number, here
+            recorded["frame_time"] = recorded["started"] = recorded["reading_times"][:, 1] = 100 + number / 50
+            rerun.dance(recorded)
+        assert [one.sensor for one in tick.readings] == ["head"]
