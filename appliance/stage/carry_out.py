@@ -89,7 +89,7 @@ def obey_for_sensors(order: Order, parts: StageParts, wearing: SensorFit, now: f
 def _admit(order: Order, parts: StageParts) -> str:
     parts.link.set_keys({name: SensorKey(name, *key) for name, key in order.keys.items()})
     known = f"The box knows {len(order.keys)} sensor{'' if len(order.keys) == 1 else 's'} now"
-    missing = [name for name in parts.worn if name not in order.keys]
+    missing = [name for name in parts.worn if name not in order.keys and not parts.link.is_foreign(name)]
     if not missing:
         return f"{known}."
     return f"{known}, but not {', '.join(missing)} of this show: the dancer moves freely there."

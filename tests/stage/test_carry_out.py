@@ -134,6 +134,13 @@ def test_commands_about_sensors_are_done_or_refused_in_words(
     assert {name: (one.device_id, one.key) for name, one in worn.link.admitted.items()} == order.keys
 
 
+def test_a_phone_that_needs_no_key_is_not_said_to_miss_one(worn: StageParts) -> None:
+    worn.link = SensorLink({}, [], foreign={"head": SensorKey("head", 2, bytes(16), "phone")})
+    wearing = SensorFit(worn, SensorMemory(None, print), print)
+    order = Order("reload", keys={"left-wrist": (1, bytes(16))})
+    assert obey_for_sensors(order, worn, wearing, 100.0) == (True, "The box knows 1 sensor now.")
+
+
 @pytest.mark.parametrize("name", ["neutral", "heading"])
 @pytest.mark.parametrize("sensor", ["left-wrist", ""])
 def test_whoever_asks_a_sensor_that_is_linked_and_not_heard_now_is_told_that_nothing_is_done(
