@@ -51,20 +51,18 @@ class LogWriter:
         self._thread.join(_LAST_OUTPUT_S)
 
     def _speak(self) -> None:
-        try:
-            while (line := self._lines.get()) is not None:
-                self._write(line)
-                if (dropped := self.dropped) != self._reported and self._lines.empty():
-                    self._write(
-                        f"{dropped - self._reported} lines before this one are missing: nothing took them."
-                    )
-                    self._reported = dropped
-        except OSError:
-            return  # the reader is gone: the show goes on
+        while (line := self._lines.get()) is not None:
+            self._write(line)
+            if (dropped := self.dropped) != self._reported and self._lines.empty():
+                self._write(
+                    f"{dropped - self._reported} lines before this one are missing: nothing took them."
+                )
+                self._reported = dropped
 
     def _write(self, line: str) -> None:
         self._keep(f"{time.time():.3f} {line}\n")
-        os.write(self._descriptor, f"{line}\n".encode(errors="backslashreplace"))
+        with contextlib.suppress(OSError):  # its reader is gone: the page still gets the line
+            os.write(self._descriptor, f"{line}\n".encode(errors="backslashreplace"))
 
     def _keep(self, line: str) -> None:
         self._last.append(line)

@@ -6,6 +6,7 @@ import fcntl
 import os
 import sys
 import threading
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -60,6 +61,19 @@ def test_what_was_dropped_is_counted_and_told_once_lines_are_taken_again() -> No
         heard += more
     assert heard.endswith(b"The show goes on.\n") and heard.count(b"missing") == 1
     os.close(reading)
+
+
+def test_the_page_still_gets_the_lines_when_the_terminal_is_gone(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    speaker = LogWriter(writing)
+    speaker.keep_in(tmp_path / "said")
+    for line in ("The show begins.", "The show goes on."):
+        speaker.say(line)
+    speaker.close()
+    os.close(writing)
+    kept = (tmp_path / "said").read_text().splitlines()
+    assert [line.partition(" ")[2] for line in kept] == ["The show begins.", "The show goes on."]
 
 
 def test_the_tick_hands_a_line_over_without_a_lock() -> None:
