@@ -46,6 +46,7 @@ class MirroredJournal:
                 if not is_over:
                     return
                 self._memory.close()
+                self._memory = None
                 self._segments.finish()
             self._memory = RunMemory.at(self._memory_file)
             if self._memory is not None:

@@ -138,6 +138,18 @@ def test_what_another_release_has_noted_is_said_and_the_next_stage_is_kept(
     assert len(read_journal(tmp_path / "journal").ticks) == 30
 
 
+def test_a_stage_of_another_release_after_one_of_this_release_is_said(night: Night, tmp_path: Path) -> None:
+    mirror = night.mirror(tmp_path / "journal")
+    night.dance(30)
+    mirror.turn(0.0)
+    with closing(RingFileWriter.new(night.runtime / FILE, KIND, FORMAT + 1, [(1, 500)] * 3)) as other:
+        other.publish()
+        for turn in (1, 2):  # the second one read on in a file that was closed
+            mirror.turn(turn * RETRY_S)
+            assert "Update this program" in mirror.complaint
+    assert len(read_journal(tmp_path / "journal").ticks) == 30
+
+
 def test_a_memory_of_another_format_is_said_too(night: Night, tmp_path: Path) -> None:
     with closing(RingFileWriter.new(night.runtime / FILE, KIND, FORMAT + 1, [(1, 500)] * 3)) as other:
         other.publish()
