@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
+import termios
 import threading
 import time
 from collections import Counter
@@ -84,6 +85,26 @@ def test_unplugged_and_plugged_in_again(cable: Cable) -> None:
         assert link.drain(time.monotonic()) == ()
     assert link.counts["serial_error"] >= 3
     link.close()
+
+
+def test_a_cable_that_is_pulled_out_while_it_is_opened_is_tried_again(
+    cable: Cable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """pyserial lets termios.error through, which ended the thread and with it the cable."""
+    flush, pulled = serial.Serial._reset_input_buffer, [termios.error(5, "Input/output error")]
+
+    def flushed(port: serial.Serial) -> None:
+        if pulled:
+            raise pulled.pop()
+        flush(port)
+
+    monkeypatch.setattr(serial.Serial, "_reset_input_buffer", flushed)
+    cable.plug_in()
+    intake = SerialIntake(str(cable.name))
+    await_that(lambda: intake.trouble is None)
+    assert intake.counts["serial_error"] == 1
+    intake.close()
+    cable.pull_out()
 
 
 def test_from_the_network_to_a_cable_and_back(cable: Cable) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import select
 import socket
+import termios
 import threading
 import time
 from collections import Counter, deque
@@ -93,7 +94,8 @@ class SerialIntake:
                     self.trouble = None
                     retry_s = FIRST_RETRY_S
                     self._serve_port(port)
-            except (OSError, ValueError) as error:  # pyserial's SerialException is an OSError
+            # SerialException is a subclass of OSError, termios.error is not: open() lets it through.
+            except (OSError, ValueError, termios.error) as error:
                 self.counts["serial_error"] += 1
                 self.trouble = (
                     f"{self.device} cannot be read ({error}). Sensors on this cable are silent. "
