@@ -18,7 +18,7 @@ from appliance.pose.foreign_file import plain_json, stored_json
 
 PROCESSES = ("control", "lights", "projector", "keeper", "console", "generator", "sound", "remote")
 BEAT_S, LATE_S = 1.0, 5.0
-_LARGEST = 8192
+_LARGEST, _SHORT = 8192, 40  # bytes; characters
 _CHOSEN = "chosen.json"
 
 DIED = {
@@ -118,14 +118,28 @@ class ProcessHealthWriter:
     def _write(self, now: float, ended: bool) -> None:
         if self._block is None:
             return
-        fallbacks = self._fallbacks.happened(now)
+        fallbacks, parts = self._fallbacks.happened(now), dict(self._fallbacks.parts)
         values: dict[str, Any] = {"pid": os.getpid(), "starts": self._starts, "beat": now, "ended": ended}
-        values |= {"fallbacks": fallbacks, "parts": dict(self._fallbacks.parts), "reported": self.reported}
+        values |= {"fallbacks": fallbacks, "parts": parts, "reported": self.reported}
         packed = json.dumps(values).encode()
-        while len(packed) > _LARGEST and fallbacks:
-            values["fallbacks"] = fallbacks = fallbacks[:-1]
+        while len(packed) > _LARGEST and _halve_longest(fallbacks, parts):
             packed = json.dumps(values).encode()
         self._block.write(packed)
+
+
+def _halve_longest(fallbacks: list[Fallen], parts: dict[str, str]) -> bool:
+    """Cut the longest sentence: those of 32 universes do not fit. False: all are short."""
+    sentences: list[tuple[str, int | str]] = [(one.message, place) for place, one in enumerate(fallbacks)]
+    sentences += [(why, name) for name, why in parts.items()]
+    longest, place = max(sentences, key=lambda one: len(one[0]), default=("", 0))
+    if len(longest) <= _SHORT:
+        return False
+    half = f"{longest[: len(longest) // 2]}…"
+    if isinstance(place, str):
+        parts[place] = half
+    else:
+        fallbacks[place] = fallbacks[place]._replace(message=half)
+    return True
 
 
 class Member(NamedTuple):

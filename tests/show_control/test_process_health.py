@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from pathlib import Path
 
 from appliance.box.fallback import Fallback, Fallbacks
@@ -40,6 +41,21 @@ def test_a_process_tells_its_fallbacks(folder: Path) -> None:
     assert reported(processes, 11.0) == {"dmx-away": ("lights", 1, True)}
     lights.end(11.5)
     lights.close()
+    processes.close()
+
+
+def test_a_network_that_is_away_from_all_universes_is_told_in_short(folder: Path) -> None:
+    """Their sentences do not fit a block, which ended the process of the lights."""
+    wires = {f"sACN multicast from 192.168.178.200, universe {number}": "Away. " * 40 for number in range(32)}
+    fallbacks, processes = Fallbacks([DMX]), ProcessHealth(folder)
+    fallbacks.parts = wires
+    fallbacks.set("dmx-away", " ".join(wires.values()))
+    with closing(ProcessHealthWriter(folder, "lights", fallbacks)) as lights:
+        lights.publish_health(10.0)
+        (member,) = processes.members(10.0)
+    assert member.parts.keys() == wires.keys() and all(member.parts.values())
+    assert reported(processes, 10.0) == {"dmx-away": ("lights", 1, True)}
+    assert all(one.message.endswith("…") for one in member.fallbacks)
     processes.close()
 
 
