@@ -90,8 +90,8 @@ class Requests:
         number = fade.generation
         if self._fading.get(key, (0, 0.0))[0] != number:
             self._fading[key] = number, self._newest.get(key, own)
-        before, since = self._fading[key][1], number / 1e9  # declared at that monotonic second
-        gone = math.floor(max(now - since, 0.0) / STEP_S + 1.0) * STEP_S
+        before = self._fading[key][1]
+        gone = math.floor(max(now - fade.since, 0.0) / STEP_S + 1.0) * STEP_S
         share = 1.0 if gone >= fade.seconds or PARAMETERS[source][parameter].is_whole else gone / fade.seconds
         value = self._newest[key] = before + share * (fade.value - before)
         return value

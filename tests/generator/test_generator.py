@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -191,6 +192,19 @@ def test_parameters_reach_their_value_in_steps(
     one.declare(phrase=("path", NO_FADE), motion_path_points=("", (0.25, 0.75)))
     recipe = one.recipe()
     assert recipe["points"] == [0.25, 0.75] and recipe["wobble"] == 0.3
+
+
+def test_a_fade_ends_too_where_the_other_box_of_the_pair_counted_generations(
+    bench: Benches, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are nanoseconds of a machine that was switched on long before this one."""
+    monkeypatch.setattr(requests, "STEP_S", 1.0)
+    one = bench(write_show_with_sources(tmp_path / "show"))
+    one.declared = replace(one.declared, generation=int(1e9 * (time.monotonic() + 1e6)))
+    one.declare(phrase=("vary", NO_FADE))
+    assert one.recipe()["sigma"] == 1.0
+    one.declare(motion_vary_sigma=("", (3.0, 4.0)))
+    assert [one.recipe()["sigma"] for _ in range(6)][-1] == 3.0
 
 
 def test_a_kept_motion_outlives_the_power_and_is_written_as_a_file(
