@@ -251,6 +251,16 @@ class Playback:
         position = round((position_s - loop.start_s) * FPS, _FRAME_DIGITS)
         self._begin(min(max(position, 0.0), loop.length - 1.0), standing)
 
+    def return_home(self, from_m: float) -> None:
+        """Stand in the middle of the stage, where a walk has led farther away than from_m metres."""
+        x, z, _ = self.standing
+        if not math.hypot(x, z) > from_m:
+            return
+        for head in filter(None, (self._head, self._crossfade.leaving)):
+            place = head.placement
+            head.placement = Placement(place.yaw, place.x - x, place.z - z)
+        self._stream.tracks[:, [X, Z]] -= np.array((x, z), np.float32)
+
     def advance(self) -> None:
         """Advance by one tick. `jumped`: whether a jump began in it."""
         self.jumped = False

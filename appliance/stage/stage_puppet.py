@@ -177,6 +177,7 @@ class StagePuppet:
         if not is_possible:
             self.figures_refused += 1
             grounding.begin_anew()
+            self.motion.return_home(FARTHEST_ON_STAGE_M / 2.0)
             if self.live is not None:
                 self.live.stand_anew()
             return

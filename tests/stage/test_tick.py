@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from appliance.box.clock import TICK_S, Slot
 from appliance.pose import quaternion
+from appliance.pose.possible import FARTHEST_ON_STAGE_M
 from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.osc import OscConfig
@@ -281,3 +282,16 @@ def test_they_are_never_more_than_fit_nor_interactions_more_than_codings(
         iterations.advance()
         assert 1 <= iterations.coding <= most
         assert 0 <= iterations.interaction <= iterations.coding
+
+
+def test_a_walk_without_end_is_led_back_before_its_numbers_end(stage: Callable[..., Tick]) -> None:
+    """A phrase that walks gets 1e5 m in a day; the figure then stood still for good, also after a restart."""
+    tick = stage()
+    led = tick.parts.led
+    _, position_s, _ = led.motion.going_on
+    led.motion.start_at("main", led.motion.excerpt_s, position_s, 1.0, (2.0 * FARTHEST_ON_STAGE_M, 0.0, 0.0))
+    for number in range(20):
+        tick.run(Slot(number, number * TICK_S, number * TICK_S))
+        tick.after(Slot(number, number * TICK_S, number * TICK_S))
+    assert led.figures_refused == 1
+    assert np.hypot(*led.frame.root[[0, 2]]) < 10.0
