@@ -70,7 +70,7 @@ class Stage:
     ) -> None:
         self.show, self.box, self.box_file, self.rehearsal = show, box, box_file, rehearsal
         self.say, self._now = say, 0.0
-        self._comes_from_stop = self._held_up = False
+        self._comes_from_stop = self._held_up = self._is_ready = False
         self.health = Health()
         with ExitStack() as opened:
             self.sharing = Sharing(box, rehearsal)
@@ -239,7 +239,9 @@ class Stage:
             if self.recorder is not None:
                 self.recorder.keyframe(self.tick)
             return False  # the reconciler and the orders come with the first tick
-        self.notifier.ready()
+        if not self._is_ready:  # a supervisor need not hear it a hundred times a second
+            self._is_ready = True
+            self.notifier.ready()
         self.notifier.ping(now)
         while (order := self.inbox.take()) is not None:
             self.inbox.answer(order, False, paired.refused(order))

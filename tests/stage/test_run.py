@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -227,3 +228,17 @@ def test_a_show_that_one_busy_start_lowered_dances_its_own_iterations_ten_second
     assert [message for message in evening.said if "coding iterations fit by now" in message]
     now = evening.time.now
     assert not [one for one in stage.watch.fallbacks.happened(now) if one.active and "lowered" in one.name]
+
+
+def test_a_box_that_follows_says_once_that_it_is_ready(
+    evening: Evening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It looks at the network some hundred times a second, and each time the supervisor was told."""
+    said = list[str]()
+    monkeypatch.setattr(evening.stage.notifier, "ready", lambda: said.append("ready"))
+    evening.stage.paired = SimpleNamespace(  # type: ignore[assignment]
+        leads=False, follow=lambda clock, pulse: None, close=lambda: None, reported=lambda now: {}
+    )
+    for _ in range(100):
+        assert not evening.stage._may_dance(TickClock(monotonic=lambda: 0.0))
+    assert said == ["ready"]
