@@ -62,6 +62,18 @@ def test_no_joint_leaves_the_picture(dance: Recording, config: CameraConfig, asp
             assert np.abs(joints).max() < 0.97
 
 
+@pytest.mark.parametrize("metres", [0.0, 36.0])
+@pytest.mark.parametrize("lens_deg", [10.0, 15.0, 30.0])
+def test_no_joint_is_too_far_away_to_be_drawn(dance: Recording, lens_deg: float, metres: float) -> None:
+    """A small figure through a long lens, and one that goes to the end of a wide stage."""
+    config = CameraConfig(lens_deg=lens_deg, figure=0.1, follow=0.0)
+    moment = travelled(moment_of(dance, 3.0), metres)
+    poses = poses_of(moment, moment.puppets[0], HEIGHT, SOLE)
+    at = view(config, config, 1.0, moment.time_s, poses, 16 / 9)
+    clip = np.insert(poses.positions[0].astype(float), 3, 1.0, axis=1) @ at.projection.T
+    assert (np.abs(clip[:, 2]) < clip[:, 3]).all()
+
+
 @pytest.mark.parametrize(
     ("aspect", "in_middle", "sizes"), [(16 / 9, 1.0, 1.2), (4 / 3, 1.0, 1.2), (9 / 16, 0.95, 1.4)]
 )

@@ -19,7 +19,7 @@ UPRIGHT = 1.35  # a figure may stand taller than an upright picture is wide: it 
 AIM = 0.5  # height that the camera looks at, in figure heights
 ROOM = 0.82  # fraction of the half picture that joints may use; the rest is for the flesh around them
 KNEE = 8  # how suddenly the camera draws back when a joint comes near the edge: higher is later
-NEAR, FAR = 0.2, 30.0  # figure heights
+NEAR, FAR = 0.2, 30.0  # figure heights; for a camera that stands no farther off than half of it
 
 Changes = Mapping[str, float | str]
 
@@ -49,7 +49,9 @@ class View:
         look[:3, :3], look[:3, 3] = axes, -axes @ self.eye
         lens = np.zeros((4, 4))
         lens[0, 0], lens[1, 1] = 1 / self.slopes[0], 1 / self.slopes[1]
-        lens[2, 2], lens[2, 3] = (FAR + NEAR) / (NEAR - FAR), 2 * FAR * NEAR / (NEAR - FAR)
+        away = float((self.eye - [self.ground[0], AIM, self.ground[1]]) @ self.back)
+        near, far = (limit * max(1.0, 2.0 * away / FAR) for limit in (NEAR, FAR))
+        lens[2, 2], lens[2, 3] = (far + near) / (near - far), 2 * far * near / (near - far)
         lens[3, 2] = -1.0
         return np.asarray(lens @ look)
 
