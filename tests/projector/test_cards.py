@@ -14,9 +14,14 @@ from appliance.levers.show_state import ShowState
 from appliance.levers.table import CARD, MASTER
 from appliance.projector.context import offscreen
 from appliance.projector.corners import homography
-from appliance.projector.picture.cards import Cards
+from appliance.projector.picture.cards import Cards, content_of
 from appliance.projector.picture.image_file import MOST_PIXELS, read_image
-from appliance.projector.picture.lettering import fonts_of_machine, lettered, letters_without_font
+from appliance.projector.picture.lettering import (
+    MOST_HIGH,
+    fonts_of_machine,
+    lettered,
+    letters_without_font,
+)
 from appliance.projector.picture.wall import Wall
 from appliance.show.card import BLANK, CardConfig, cards_by_name
 from appliance.show.config_error import ConfigError
@@ -91,6 +96,22 @@ def test_words_too_wide_are_shrunk_into_the_picture(show: Show) -> None:
     long = CardConfig(name="long", text="W" * 60, size=0.3, background="#000000")
     light = show([long], ShowState().to(CARD, "long")).max(axis=(0, 2))
     assert light.max() > 100 and not light[:3].any() and not light[-3:].any()
+
+
+def test_lines_too_many_are_shrunk_into_the_picture(show: Show) -> None:
+    """A roll of credits; and no more lines make an image larger than a graphics chip takes."""
+    roll = CardConfig(name="roll", text="W\n" * 40, size=0.08, background="#000000")
+    light = show([roll], ShowState().to(CARD, "roll")).max(axis=(1, 2))
+    assert light.max() > 50 and not light[:1].any() and not light[-1:].any()
+    largest = lettered("W\n" * 500, 540, RED)
+    assert largest.shape[0] <= MOST_HIGH and largest[..., 3].any()
+
+
+def test_an_image_too_wide_is_shrunk(tmp_path: Path) -> None:
+    Image.new("RGB", (9000, 500)).save(tmp_path / "wide.png")
+    assert read_image(tmp_path / "wide.png").shape == (228, 4096, 4)
+    whole = content_of(CardConfig(name="w", image="wide.png", image_size=1.0), tmp_path, pytest.fail)
+    assert whole is not None and whole.shape[:2] == (228, 4096)
 
 
 @pytest.mark.skipif(not fonts_of_machine(), reason="no font is installed here")

@@ -12,7 +12,7 @@ import numpy as np
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import CARD
 from appliance.projector.picture.drawing import Drawing
-from appliance.projector.picture.image_file import LINES, Image, read_image, texture_of
+from appliance.projector.picture.image_file import LINES, MOST_WIDE, Image, read_image, texture_of
 from appliance.projector.picture.lettering import lettered, letters_without_font
 from appliance.projector.picture.wall import Wall
 from appliance.show.card import CardConfig
@@ -36,7 +36,7 @@ class _Card:
         if self.content is None:
             return 0.0, 0.0, 1.0, 1.0
         width = self.height / aspect * self.content.width / self.content.height
-        shrunk = min(1.0, (1 - 2 * MARGIN) / width)
+        shrunk = min(1.0, (1 - 2 * MARGIN) / width, 1.0 / self.height)
         half_width, half_height = 0.5 * shrunk * width, 0.5 * shrunk * self.height
         x, y = self.place[0], 1 - self.place[1]
         return x - half_width, y - half_height, x + half_width, y + half_height
@@ -134,7 +134,8 @@ def content_of(card: CardConfig, directory: Path, say: Callable[[str], None]) ->
 def _sized(image: Image, lines: int) -> Image:
     from PIL import Image as Files
 
-    size = max(1, round(image.shape[1] * lines / image.shape[0])), max(1, lines)
+    lines = max(1, min(lines, image.shape[0] * MOST_WIDE // image.shape[1]))
+    size = max(1, round(image.shape[1] * lines / image.shape[0])), lines
     return np.asarray(Files.fromarray(image).resize(size, Files.Resampling.LANCZOS))
 
 

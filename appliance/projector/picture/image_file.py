@@ -11,11 +11,12 @@ from PIL import Image as Files
 
 Image = NDArray[np.uint8]
 MOST_PIXELS = 64_000_000  # in a file: more would hold up the projector's start
-LINES = 1080  # most lines of a texture
+LINES, MOST_WIDE = 1080, 4096  # most lines and columns of a texture: more not every graphics chip takes
 
 
 def read_image(path: Path | str, lines: int = LINES) -> Image:
-    """(height, width, 4) red, green, blue, alpha, top row first, of at most `lines` rows.
+    """(height, width, 4) red, green, blue, alpha, top row first, of at most `lines` rows and
+    MOST_WIDE columns.
 
     Raises OSError for what is no image, or one of too many pixels.
     """
@@ -23,7 +24,7 @@ def read_image(path: Path | str, lines: int = LINES) -> Image:
         with Files.open(path, formats=("PNG", "JPEG")) as file:
             if file.width * file.height > MOST_PIXELS:
                 raise OSError(f"it has more than {MOST_PIXELS // 1_000_000} million pixels")
-            shrunk = min(1.0, lines / file.height)
+            shrunk = min(1.0, lines / file.height, MOST_WIDE / file.width)
             size = max(1, round(file.width * shrunk)), max(1, round(file.height * shrunk))
             image = file.convert("RGBA")
             return np.asarray(image if image.size == size else image.resize(size, Files.Resampling.LANCZOS))

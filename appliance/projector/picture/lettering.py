@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image as Files
 from PIL import ImageDraw, ImageFont, features
 
-MOST_WIDE = 3840  # pixels: graphics chips have limits
+MOST_WIDE, MOST_HIGH = 3840, 2160  # pixels: graphics chips have limits
 _FOLDERS = ("~/.fonts", "~/.local/share/fonts", "/usr/local/share/fonts", "/usr/share/fonts")
 _FIRST = ("DejaVuSans", "NotoSans-Regular", "NotoSansCJK-Regular", "LiberationSans-Regular")
 _NO_LETTER = "\U0010fffe"  # no font has it: what stands for it stands for all that a font lacks
@@ -29,15 +29,18 @@ def lettered(
 ) -> NDArray[np.uint8]:
     """(height, width, 4) red, green, blue, alpha: lines one below the other, centred.
 
-    size_px: height of a line of type, less where an image would be wider than MOST_WIDE; font: tried first.
+    size_px: height of a line of type, less where an image would be wider than MOST_WIDE or higher than
+    MOST_HIGH; font: tried first.
     Scripts from right to left and those that join letters need the library libraqm, which Pillow's wheels
     bring along. Raises OSError for a broken font.
     """
     lines = [_Line(line, size_px, font) for line in text.splitlines()]
     width = max((line.width for line in lines), default=0) + size_px
-    if width > MOST_WIDE and size_px > 1:
-        return lettered(text, max(1, size_px * MOST_WIDE // width), colour, font)
-    image = Files.new("RGBA", (width, round(size_px * (_LINE * max(len(lines), 1) + 0.5))), (*colour, 0))
+    height = round(size_px * (_LINE * max(len(lines), 1) + 0.5))
+    if (width > MOST_WIDE or height > MOST_HIGH) and size_px > 1:
+        fits = min(size_px * MOST_WIDE // width, size_px * MOST_HIGH // height, size_px - 1)
+        return lettered(text, max(1, fits), colour, font)
+    image = Files.new("RGBA", (width, height), (*colour, 0))
     draw = ImageDraw.Draw(image)
     for row, line in enumerate(lines):
         line.write(draw, (width - line.width) / 2, size_px * (_LINE * row + 1.1), (*colour, 255))
