@@ -137,6 +137,11 @@ class PairedStage:
         """Whether this box speaks."""
         return self.pair.leads
 
+    @property
+    def ahead_s(self) -> float:
+        """How far this machine's clock is ahead of the other box's."""
+        return self.pair.offset.seconds
+
     def note(self, kind: int, noted: bytes) -> None:
         """The recorder's tap: what the other box needs of it."""
         if self.pair.leads and (kind == TICK or (kind == EVENT and b'"kind": "order"' in noted[:64])):

@@ -46,7 +46,7 @@ class Rerun:
     def __init__(self, tick: Tick, wearing: SensorFit, sensors: Sequence[str]) -> None:
         """sensors: whose readings were recorded, in this order."""
         self._tick, self._wearing = tick, wearing
-        self.heard, self.live = _RecordedLink(sensors), _RecordedLive()
+        self.heard, self.live = _RecordedLink(sensors, tick.parts.link), _RecordedLive()
 
     def dance(self, recorded: Recorded) -> Slot:
         """Run one tick, also what can wait until its frame has left. Raises what DAMAGED lists."""
@@ -96,9 +96,10 @@ class _RecordedLink(SensorLink):
 
     recorded: Recorded
 
-    def __init__(self, sensors: Sequence[str]) -> None:
+    def __init__(self, sensors: Sequence[str], own: SensorLink) -> None:
+        """own: the link of this box, which has its keys."""
         super().__init__({}, ())
-        self._sensors = sensors
+        self._sensors, self.lets_in = sensors, own.lets_in  # type: ignore[method-assign]
         self._asked: tuple[set[str], bool] = set(), False
 
     def answers(self, sensor: str | int, done: bool) -> None:

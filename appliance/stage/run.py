@@ -324,10 +324,13 @@ class Stage:
 
     def _publish_health(self, now: float) -> None:
         """Publish how the box is in the shared frame."""
-        states, wearing = self.parts.link.states(now), self.wearing
+        states, wearing, locked = self.parts.link.states(now), self.wearing, self._is_locked
+        leaders_now = now
+        if self.paired is not None and not self.paired.leads:  # that box has the sensors, and its own clock
+            states, leaders_now = [], now - self.paired.ahead_s
         self.batteries.hear(states, now)
         roster = roster_lines(states, wearing.neutral_of, wearing.corrected_of, self.batteries.left_s)
-        age_s, locked = self._sensor_age_s(now), self._is_locked
+        age_s = self._sensor_age_s(leaders_now)
         if self.paired is not None:
             self.paired.set_fallbacks(self.watch.fallbacks, now)
         fallbacks = self.watch.fallbacks.happened(now)

@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import yaml
@@ -23,6 +24,7 @@ from appliance.show.show import load_show
 from appliance.stage import run
 from appliance.stage.admission import SecondLook
 from appliance.stage.fallback import SENSOR_SILENT
+from appliance.stage.rerun import Rerun
 from appliance.stage.run import Stage
 from appliance.stage.watch import Watch
 from tests.bundles import swaying_phrase, write_show
@@ -230,15 +232,42 @@ def test_a_show_that_one_busy_start_lowered_dances_its_own_iterations_ten_second
     assert not [one for one in stage.watch.fallbacks.happened(now) if one.active and "lowered" in one.name]
 
 
+def follower(ahead_s: float) -> SimpleNamespace:
+    return SimpleNamespace(
+        leads=False,
+        ahead_s=ahead_s,
+        follow=lambda clock, pulse: None,
+        close=lambda: None,
+        reported=lambda now: {},
+        set_fallbacks=lambda fallbacks, now: None,
+    )
+
+
+def test_a_box_that_follows_reports_no_sensors_and_ages_by_the_leaders_clock(
+    evening: Evening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It hears them by the leader's ticks: bunraku doctor told people there to provision or to charge them."""
+    stage, reported = evening.stage, list[dict[str, Any]]()
+    stage.parts.link.lets_in = lambda sensor: True  # type: ignore[method-assign]
+    heard = Rerun(stage.tick, stage.wearing, list(stage.parts.worn)).heard
+    heard.answers("left-wrist", False)
+    stage.parts.link = heard
+    stage.parts.worn["left-wrist"][0].take_reading(RAISED, 5000.0)
+    stage.paired = follower(ahead_s=-4000.0)  # type: ignore[assignment]
+    monkeypatch.setattr(stage.parts.outputs, "publish_health", reported.append)
+    stage._publish_health(1000.5)
+    (health,) = reported
+    assert health["sensors"] == [] and health["not_let_in"] == []
+    assert health["sensor_age_s"] == pytest.approx(0.5)
+
+
 def test_a_box_that_follows_says_once_that_it_is_ready(
     evening: Evening, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It looks at the network some hundred times a second, and each time the supervisor was told."""
     said = list[str]()
     monkeypatch.setattr(evening.stage.notifier, "ready", lambda: said.append("ready"))
-    evening.stage.paired = SimpleNamespace(  # type: ignore[assignment]
-        leads=False, follow=lambda clock, pulse: None, close=lambda: None, reported=lambda now: {}
-    )
+    evening.stage.paired = follower(ahead_s=0.0)  # type: ignore[assignment]
     for _ in range(100):
         assert not evening.stage._may_dance(TickClock(monotonic=lambda: 0.0))
     assert said == ["ready"]
