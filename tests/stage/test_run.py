@@ -246,7 +246,7 @@ def follower(ahead_s: float) -> SimpleNamespace:
 def test_a_box_that_follows_reports_no_sensors_and_ages_by_the_leaders_clock(
     evening: Evening, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It hears them by the leader's ticks: bunraku doctor told people there to provision or to charge them."""
+    """It hears them by the ticks of the leader: bunraku doctor told people to provision or charge them."""
     stage, reported = evening.stage, list[dict[str, Any]]()
     stage.parts.link.lets_in = lambda sensor: True  # type: ignore[method-assign]
     heard = Rerun(stage.tick, stage.wearing, list(stage.parts.worn)).heard
