@@ -34,7 +34,7 @@ def mocopi_messages(received: bytes) -> list[tuple[str, list[object]]]:
     return bones
 
 
-def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+def _chunks(data: bytes, depth: int = 0) -> Iterator[tuple[bytes, bytes]]:
     """The innermost chunks of a frame, in their order."""
     at = 0
     while at < len(data):
@@ -42,11 +42,11 @@ def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
             raise ValueError("This is no datagram of mocopi.")
         length, name = _HEAD.unpack_from(data, at)
         at += _HEAD.size
-        if length > len(data) - at or not name.isalpha():
+        if length > len(data) - at or not name.isalpha() or depth > len(_OUTER):
             raise ValueError("This is no datagram of mocopi.")
         content = data[at : at + length]
         at += length
         if name in _OUTER:
-            yield from _chunks(content)
+            yield from _chunks(content, depth + 1)
         else:
             yield name, content

@@ -166,6 +166,15 @@ def test_cut_datagrams_of_mocopi_are_refused(cut: int) -> None:
         mocopi_messages(whole[:-cut])
 
 
+def test_a_datagram_of_frames_within_frames_is_refused() -> None:
+    """It ended show control, which hears it: Python nests a thousand calls."""
+    nested = b""
+    for _ in range(4000):
+        nested = chunk(b"fram", nested)
+    with pytest.raises(ValueError, match="no datagram of mocopi"):
+        mocopi_messages(nested)
+
+
 def test_every_program_has_a_source_with_its_own_values() -> None:
     for name, program in PROGRAMS.items():
         address = "/q" if name == "osc" else ""
