@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -20,7 +21,8 @@ def recorded_minutes(folder: Path) -> tuple[int, float]:
                 found = _FRAMES.search(stream.read(_HEAD))
             if found is not None:
                 files += 1
-                seconds += int(found[1]) * float(found[2].replace(b",", b"."))
+                long = float(found[1]) * float(found[2].replace(b",", b"."))
+                seconds += long if math.isfinite(long) else 0.0
     except (OSError, ValueError):  # the stick was pulled, or a frame time is no number
         pass
     return files, seconds / 60

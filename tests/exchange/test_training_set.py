@@ -105,6 +105,14 @@ def test_train_takes_the_folder_as_it_is(rehearsal: Path, tmp_path: Path) -> Non
     assert read_catalogue(folder / "catalogue.yaml").acknowledgement == "A rehearsal of A test."
 
 
+@pytest.mark.parametrize(("frames", "time"), [("9" * 400, "0.01"), ("100", "1e999")])
+def test_a_head_with_numbers_without_end_adds_no_minutes(tmp_path: Path, frames: str, time: str) -> None:
+    """The page that lists the recordings on a stick got an error, or what no browser reads."""
+    (tmp_path / "a.bvh").write_text(f"HIERARCHY\nMOTION\nFrames: {frames}\nFrame Time: {time}\n")
+    (tmp_path / "b.bvh").write_text("HIERARCHY\nMOTION\nFrames: 600\nFrame Time: 0.1\n")
+    assert recorded_minutes(tmp_path) == (2, 1.0)
+
+
 def test_the_command_writes_it_once(rehearsal: Path, tmp_path: Path, bunraku: Command) -> None:
     out = tmp_path / "set"
     asked = ("journal", "export", "--journal", rehearsal, "--training", out)
