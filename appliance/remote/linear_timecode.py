@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.box.alsa import has_sound
 from appliance.remote.midi_timecode import CodeHeard
 from appliance.remote.timecode import RATES, Rate, Timecode
 
@@ -135,6 +136,8 @@ class LtcInput:
             return
         self._tries_at = now + _RETRY_S
         try:
+            if not has_sound():
+                raise OSError("ALSA is not configured: Debian package libasound2-data")
             import sounddevice
 
             self._decoder = LtcDecoder()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.box.alsa import has_sound
 from appliance.box.realtime import thread_priority
 from appliance.show.sound import SoundConfig
 
@@ -17,7 +16,6 @@ RETRY_S = 1.0
 LIBRARY_RETRY_S = 10.0  # to look for it costs a tenth of a second
 STALLED_S = 1.0  # without a request for a block: the card is gone, whatever its driver says
 OFTEN, COUNTED_S, LONGEST = 6, 10.0, 512  # dropouts; samples
-_ALSA = "libasound.so.2"
 
 
 class Card:
@@ -74,7 +72,7 @@ class Card:
 
     def _open(self, now: float) -> None:
         config, self.is_missing = self._config, True
-        if not _has_sound():
+        if not has_sound():
             self.trouble = (
                 "This system has no sound: ALSA, through which Linux reaches sound cards, is not configured. "
                 "The strings are silent, and are looked for each second. Install the Debian package "
@@ -133,19 +131,3 @@ def _loaded() -> Any:
     import sounddevice
 
     return sounddevice
-
-
-def _has_sound() -> bool:
-    """Whether PortAudio may start: where ALSA's configuration names no devices it aborts."""
-    try:
-        alsa = ctypes.CDLL(_ALSA)
-    except OSError:
-        return True  # another system's sound; without any PortAudio says so itself
-    alsa.snd_config_search.argtypes = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p
-    alsa.snd_config_update_free_global()  # it remembers what it once read
-    with contextlib.suppress(ValueError):
-        return alsa.snd_config_update() < 0 or (
-            bool(top := ctypes.c_void_p.in_dll(alsa, "snd_config").value)
-            and alsa.snd_config_search(top, b"pcm", None) == 0
-        )
-    return True

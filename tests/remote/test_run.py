@@ -6,6 +6,8 @@ import os
 import pty
 import re
 import socket
+import subprocess
+import sys
 import time
 import tty
 from contextlib import closing
@@ -146,6 +148,20 @@ def test_a_sound_input_that_is_not_there_is_told_and_tried_again() -> None:
     assert list(track.labels(10.0)) == []
     assert "The sound input for timecode cannot be opened" in track.trouble
     track.close()
+
+
+def test_a_system_without_sound_is_no_end_of_the_process() -> None:
+    """In a process of its own: PortAudio would abort it, and MIDI and opening hours with it."""
+    program = """
+from appliance.remote.linear_timecode import LtcInput
+track = LtcInput(None)
+print(list(track.labels(10.0)), track.trouble)
+"""
+    surroundings = {**os.environ, "ALSA_CONFIG_PATH": "/nonexistent"}
+    command = [sys.executable, "-c", program]
+    ran = subprocess.run(command, env=surroundings, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.startswith("[] The sound input for timecode cannot be opened (ALSA is not configured")
 
 
 @pytest.mark.parametrize(
