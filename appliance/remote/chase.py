@@ -14,6 +14,7 @@ _CLOSES_S = 10.0  # in which a small error is taken away
 _MOST = 0.03  # share of the speed: nobody sees it
 _SAME = 2e-4  # speeds that differ by less are one
 _FAR_S, _NEAR_S = 0.02, 0.005  # further than a frame of the dance: is brought as near as this
+_BACK_S = 0.1  # a code that goes back by less was late, or stood still before that was noticed
 _LEARNS, _MOST_LEARNED = 0.004, 0.01  # share of the error a second: the box's clock drifts against the code
 
 
@@ -37,14 +38,18 @@ class CueChase:
             return None
         reached = [cue for cue in cues if cue[0] <= time_s]
         newest = reached[-1] if reached else None
-        if newest == self._before:
+        if newest == self._before or self._is_in_force(time_s):
             return None
         self._before = newest
         return None if newest is None else newest[1]
 
     def start(self, time_s: float) -> float:
         """When the cue that is in force began, in seconds of the code; 0 before the first."""
-        return self._before[0] if self._before is not None and self._before[0] <= time_s else 0.0
+        return self._before[0] if self._before is not None and self._before[0] <= time_s + _BACK_S else 0.0
+
+    def _is_in_force(self, time_s: float) -> bool:
+        """Whether the newest cue has only just begun, and the code is hardly before it."""
+        return self._before is not None and time_s < self._before[0] <= time_s + _BACK_S
 
 
 class DanceChase:

@@ -28,6 +28,17 @@ def test_cues_are_called_as_their_time_comes() -> None:
     assert chase.start(12.0) == 10.48
 
 
+def test_a_code_that_hardly_goes_back_calls_no_cue_again() -> None:
+    """It stands two frames before a cue, and is taken to run for three more; or a label comes late."""
+    cues, chase = [(5.0, "a"), (10.48, "b")], CueChase()
+    for late_s in (0.001, 0.04, 0.08):
+        assert chase.due(10.49, cues) in ("b", None)
+        assert chase.due(10.48 - late_s, cues) is None
+        assert chase.start(10.48 - late_s) == 10.48
+    assert chase.due(10.3, cues) == "a"
+    assert chase.start(10.3) == 5.0
+
+
 class Player:
     """A stage that plays a phrase by the box's own clock, and tells of itself once a second."""
 
