@@ -68,7 +68,7 @@ class PosiStageNet(DatagramSender):
 
     def encode(self, frame: JointFrame) -> Sequence[memoryview]:
         """Datagrams of this frame, the same buffers each time; once a second the names first."""
-        if self._started is None:
+        if self._started is None or frame.frame_time < self._started:  # a follower learns its leader's clock
             self._started = self._next_info = self._time_before = frame.frame_time
             self._place(frame, self._before)
         self._place(frame, self._positions)

@@ -104,6 +104,22 @@ def test_a_frame_is_split_into_packets_that_fit_an_ethernet_frame(joints: int, s
     assert {number: name for one in info for number, name in one.names.items()} == dict(enumerate(many.names))
 
 
+def test_the_clock_of_a_box_that_follows_may_be_corrected_backwards(
+    skeleton: Skeleton, frame: JointFrame
+) -> None:
+    """Its leader's first datagram was on its way for long: time and names begin anew, nothing is raised."""
+    psn = output(skeleton, joints=["hip"])
+    frame.frame_time = 5003.0
+    encoded(psn, frame)
+    times, named = [], 0
+    for tick in range(100):
+        frame.frame_time = 5000.0 + 0.02 * tick
+        info, data = encoded(psn, frame)
+        times.append(data[0].time_us)
+        named += len(info)
+    assert (times[0], times[50], named) == (0, 1_000_000, 2)
+
+
 def test_speeds_are_metres_a_second_and_a_late_frame_keeps_them(
     skeleton: Skeleton, frame: JointFrame
 ) -> None:
