@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import ipaddress
 import signal
 import socket
@@ -62,6 +63,9 @@ _IDLE_S = 0.2  # how often the stage is looked for while no browser shows the da
 _NICER = 10
 _LAST_REQUESTS_S = 0.5
 _WAITING_CONNECTIONS = 256
+_NAMED_S = (
+    5.0  # how often the certificate is looked at: a network that comes after the page has an address too
+)
 
 
 def run_console(settings: Settings) -> int:
@@ -128,6 +132,7 @@ async def _serve(settings: Settings) -> int:
         asyncio.create_task(phones.watch()),
         asyncio.create_task(night.watch()),
         *_reporting(folder, box, fallbacks),
+        *([] if context is None else [asyncio.create_task(_renew(context, settings))]),
         asyncio.create_task(stopped.wait()),
     ]
     ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -159,10 +164,27 @@ def _reporting(folder: Path, box: BoxView, fallbacks: Fallbacks) -> list[asyncio
 
 
 def _https(settings: Settings) -> ssl.SSLContext:
+    return https_context(_certificate(settings))
+
+
+def _certificate(settings: Settings) -> Path:
+    """The file, made anew where it lacks an address or a name that the box has now. Raises OSError."""
     host = socket.gethostname()
     private = (one for _, one in addresses() if ipaddress.ip_address(one).is_private)
     names = (host, f"{host}.local", *private, *settings.names)
-    return https_context(certificate_in(Path(settings.devices).parent, names))
+    return certificate_in(Path(settings.devices).parent, names)
+
+
+async def _renew(context: ssl.SSLContext, settings: Settings) -> None:
+    """For the connections from now on; where none can be made, the one before goes on."""
+    served = -1
+    while True:
+        with contextlib.suppress(OSError):
+            path = await asyncio.to_thread(_certificate, settings)
+            if (made := path.stat().st_mtime_ns) != served:
+                context.load_cert_chain(path)
+                served = made
+        await asyncio.sleep(_NAMED_S)
 
 
 async def _pulse(notifier: Notifier, health: ProcessHealthWriter) -> None:

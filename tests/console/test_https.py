@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from appliance.console.certificate import (
+    AUTHORITY_FILE,
     FILE,
     authority_certificate,
     certificate_in,
@@ -23,7 +24,10 @@ from appliance.console.certificate import (
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
 from tests.system.box import playing
+from tests.system.namespace import Cable, Namespace, why_not
 from tests.system.processes import BUNRAKU, Process, run_bunraku, wait_until
+
+WHY_NOT = why_not()
 
 
 def served(port: int) -> str:
@@ -92,6 +96,33 @@ def test_one_command_offers_a_phone_the_page_and_what_makes_it_trusted(tmp_path:
     assert authority_certificate(tmp_path) == authority
     certificate_in(tmp_path, ["new.hall"])
     assert authority_certificate(tmp_path) != authority, "it may sign the names of this box only"
+
+
+@pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))
+def test_a_network_that_comes_after_the_page_is_in_its_certificate(tmp_path: Path) -> None:
+    """As at power-on, where the router gives the box its address some seconds later."""
+    address, port = "10.77.0.1", 8443
+    box_file = tmp_path / "box.yaml"
+    console = {"host": "0.0.0.0", "port": port, "https": True, "viewers": ["10.77.0.0/24"]}
+    kept = {"console": console, "control": None, "runtime": "runtime", "state": "state"}
+    box_file.write_text(yaml.safe_dump(kept))
+
+    def trusts() -> bool:
+        """As a phone that has installed the box's authority, or another box."""
+        trusted = ssl.create_default_context(cafile=str(tmp_path / "state" / AUTHORITY_FILE))
+        with socket.create_connection((address, port), 10.0) as plain:
+            try:
+                trusted.wrap_socket(plain, server_hostname=address).close()
+            except ssl.SSLCertVerificationError:
+                return False
+        return True
+
+    with Namespace("box") as box, Namespace("phone") as phone, box.entered():
+        command = [*BUNRAKU, "console", "--box", box_file]
+        with Process(tmp_path / "page.txt", command) as process:
+            wait_until(lambda: served(port), lambda: process.output)
+            Cable(box, f"{address}/24", phone, "10.77.0.2/24")
+            wait_until(trusts, lambda: process.output)
 
 
 def test_what_cannot_be_used_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
