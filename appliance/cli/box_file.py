@@ -135,7 +135,7 @@ def dance_again(chosen: Path, show: str) -> dict[str, Any]:
     if here is None:
         raise StageError("The show that this box chose at power-on cannot be read. Run bunraku doctor.")
     places = Places(here.data, chosen.parent)
-    with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
+    with _alone(places):
         saved = read_choice(places.data)
         pair = next((one for one in (*saved.pairs, *here.pairs) if one.id == show and one.is_there), None)
         if pair is None or not pair.id:
@@ -202,6 +202,16 @@ def _questions(before: BoxConfig, after: BoxConfig) -> Iterator[str]:
                 yield f"{name}: viewers: {network} lets every device in that reaches the box."
 
 
+@contextlib.contextmanager
+def _alone(places: Places) -> Iterator[None]:
+    """No preflight meanwhile. Raises StageError where one does not end: it may check a show from a stick."""
+    try:
+        with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
+            yield
+    except BlockingIOError:
+        raise StageError("The box is checking a show from a stick. Try again in a few minutes.") from None
+
+
 def _places(chosen: Path) -> Places:
     return Places((Choice.read(chosen) or Choice()).data, chosen.parent)
 
@@ -209,7 +219,7 @@ def _places(chosen: Path) -> Places:
 def _adopt(chosen: Path, arrival: Arrival, what: str, now: bool) -> dict[str, Any]:
     """As from a stick: on the shelf under its content's id, the one before it kept, then tried."""
     places = _places(chosen)
-    with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
+    with _alone(places):
         outcome = adopt(places, [arrival], late_candidate_problems, late=True)
         said = list(outcome.messages)
         if outcome.taken:
