@@ -46,15 +46,20 @@ class Help:
                 ]
             except web.HTTPException as error:
                 log = [error.text or ""]
-            await answer_of(
-                "help_file",
-                _PATIENCE_S,
-                out=str(self._file),
-                journal=self._journal if wanted else None,
-                log=log,
-                status=json.loads(self._view.text),
-                **self._box,
-            )
+            part = self._file.with_suffix(".part")  # another browser may still be fetching the last one
+            try:
+                await answer_of(
+                    "help_file",
+                    _PATIENCE_S,
+                    out=str(part),
+                    journal=self._journal if wanted else None,
+                    log=log,
+                    status=json.loads(self._view.text),
+                    **self._box,
+                )
+                part.replace(self._file)
+            finally:
+                part.unlink(missing_ok=True)
         host = re.sub(r"[^A-Za-z0-9-]", "", socket.gethostname())
         self._name = f"bunraku-help-{host}-{time.strftime('%Y%m%d-%H%M%S')}.zip"
         return web.json_response({"name": self._name})

@@ -86,7 +86,7 @@ class Learn:
     async def _begin(self, request: web.Request) -> web.Response:
         values = await said(request)
         name, minutes = values.get("recordings"), values.get("minutes", USUAL_MIN)
-        folder, begins_with = self._folder(name), values.get("begins_with", "")
+        folder, begins_with = await asyncio.to_thread(self._folder, name), values.get("begins_with", "")
         if begins_with != "" and begins_with not in [one["id"] for one in await self._shows()]:
             raise web.HTTPBadRequest(text="There is no such show to begin with.")
         if folder is None or not isinstance(minutes, int | float) or not 1 <= minutes <= 720:

@@ -102,7 +102,8 @@ class Update:
         """{"name"} of a package on the stick."""
         self._require_possible()
         name = (await said(request)).get("name")
-        if not isinstance(name, str) or name not in _names(self._stick) or name.endswith(_SIGNATURE):
+        names = await asyncio.to_thread(_names, self._stick)  # a stick that is dying answers late
+        if not isinstance(name, str) or name not in names or name.endswith(_SIGNATURE):
             raise web.HTTPNotFound(text="There is no such update on the stick.")
         async with self._alone():
             self._make_room(name)
