@@ -1,9 +1,10 @@
-"""ALSA, through which Linux reaches sound cards: whether it is configured."""
+"""ALSA, through which Linux reaches sound cards, and PortAudio on top of it: whether they can be started."""
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+from typing import Any
 
 _ALSA = "libasound.so.2"
 
@@ -22,3 +23,10 @@ def has_sound() -> bool:
             and alsa.snd_config_search(top, b"pcm", None) == 0
         )
     return True
+
+
+def start_anew(library: Any) -> None:
+    """Start PortAudio (`sounddevice`) once more: it lists the cards when it starts. Raises its own errors."""
+    with contextlib.suppress(Exception):  # it did not start at the last try
+        library._terminate()
+    library._initialize()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.box.alsa import has_sound
+from appliance.box.alsa import has_sound, start_anew
 from appliance.remote.midi_timecode import CodeHeard
 from appliance.remote.timecode import RATES, Rate, Timecode
 
@@ -141,8 +141,7 @@ class LtcInput:
             import sounddevice
 
             self._decoder = LtcDecoder()
-            sounddevice._terminate()  # PortAudio lists the cards once, when it starts
-            sounddevice._initialize()
+            start_anew(sounddevice)
             self._stream = sounddevice.InputStream(
                 samplerate=SAMPLE_RATE, blocksize=_BLOCK, device=self._device, channels=1, latency="low"
             )

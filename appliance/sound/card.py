@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.box.alsa import has_sound
+from appliance.box.alsa import has_sound, start_anew
 from appliance.box.realtime import thread_priority
 from appliance.show.sound import SoundConfig
 
@@ -91,8 +91,7 @@ class Card:
             return
         self.is_missing = False
         try:
-            library._terminate()  # PortAudio lists the cards once, when it starts
-            library._initialize()
+            start_anew(library)
             self._library, self._priority = library, self._wanted_priority
             stream = library.OutputStream(
                 samplerate=config.rate,

@@ -121,6 +121,27 @@ def test_a_card_that_is_pulled_out_while_it_plays_is_opened_again(
     capfd.readouterr()  # what ALSA and PortAudio say of it
 
 
+def test_a_library_that_did_not_start_once_is_started_again(
+    null_card: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import sounddevice
+
+    start, fails = sounddevice._initialize, [True]
+
+    def initialize() -> None:
+        if fails and fails.pop():
+            raise sounddevice.PortAudioError("no memory")
+        start()
+
+    monkeypatch.setattr(sounddevice, "_initialize", initialize)
+    card = Card(SoundConfig(), lambda frames: np.zeros((frames, 2), np.float32))
+    card.look(0.0)
+    assert "No sound card plays" in card.trouble
+    card.look(2.0)
+    assert card.trouble == ""
+    card.close()
+
+
 def test_a_card_that_asks_for_nothing_any_more_is_opened_again(null_card: None) -> None:
     """Some drivers never say that their card is gone."""
     card, ended = Card(SoundConfig(), lambda frames: np.zeros((frames, 2), np.float32)), []
