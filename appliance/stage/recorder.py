@@ -26,7 +26,7 @@ FACTS, LOG, KEYFRAMES = range(RINGS)  # the rings in the file
 LOG_SLOTS = 4096  # 80 s: how long the disk may hang before the journal loses a tick
 KEYFRAME_TICKS = 500  # from one keyframe to the next
 KEYFRAME_SLOTS = 1 + LOG_SLOTS // KEYFRAME_TICKS
-KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 16, 1 << 9  # and for each joint; a partner takes 45 KB
+KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 16, 1 << 9  # a puppet's, and for each joint
 EVENT_BYTES = 1024  # in one entry
 LONGEST_EVENT = 8 * EVENT_BYTES  # the recipe of an improvisation with its prompt has half of that
 ENTRY = struct.Struct("<Q")  # kind of an entry of the log; then the tick's record, or the event as JSON
@@ -40,12 +40,14 @@ class Recorder:
     Raises OSError where the runtime folder takes no file of its size. lost: what could not be noted.
     """
 
-    def __init__(self, folder: Path, facts: dict[str, Any]) -> None:
-        """facts: of this run, as record.facts_of_run gives them."""
+    def __init__(self, folder: Path, facts: dict[str, Any], state_bytes: int = 0) -> None:
+        """facts: of this run, as record.facts_of_run gives them. state_bytes: size of the parts in a
+        keyframe; a puppet that goes on by itself has 1.4 KB for each joint.
+        """
         said, layout = json.dumps(facts).encode(), layout_of(facts)
         entry_bytes = ENTRY.size + max(layout.itemsize, EVENT_BYTES)
-        keyframe_bytes = KEYFRAME_BYTES + KEYFRAME_JOINT_BYTES * len(facts["joints"])
-        keyframe_bytes *= len(facts["puppets"])
+        of_joints = KEYFRAME_JOINT_BYTES * len(facts["joints"]) * len(facts["puppets"])
+        keyframe_bytes = KEYFRAME_BYTES * len(facts["puppets"]) + max(of_joints, state_bytes)
         shapes = [(1, len(said)), (LOG_SLOTS, entry_bytes), (KEYFRAME_SLOTS, keyframe_bytes)]
         self.lost = 0
         self.tap: Callable[[int, bytes], None] | None = None  # gets what is noted: kind, and record or JSON

@@ -15,6 +15,7 @@ from appliance.box.orders import Order, OrderInbox
 from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.runtime_folder import renew_lost
 from appliance.box.show_state import ShowStateReader
+from appliance.box.snapshot import packed
 from appliance.dancer.phrase_cache import MEMORY
 from appliance.pair.part import forget_part
 from appliance.recorder.record import ORDER, SAID, facts_of_run
@@ -376,7 +377,8 @@ class Stage:
     def _open_recorder(self) -> Recorder | None:
         """The flight recorder, unless there is no memory for it: that does not stop the show."""
         try:
-            return Recorder(self.sharing.noted, facts_of_run(self.show, list(self.parts.worn)))
+            facts = facts_of_run(self.show, list(self.parts.worn))
+            return Recorder(self.sharing.noted, facts, len(packed(self.parts)))
         except OSError as error:
             self.say(
                 f"{self.sharing.noted}: no journal can be noted there ({error.strerror}). The dance goes on "

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from appliance.box.clock import TICK_S, Slot
 from appliance.box.orders import Order
+from appliance.box.snapshot import packed
 from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.mirror import Mirror
 from appliance.levers.show_state import ShowState
@@ -43,7 +44,8 @@ class Night:
         self.tick = Tick(self.parts, self.wearing, LATEST_START_S)
         self._declared = _Declared(self.show.config.name)
         self.reconciler = Reconciler(self.show.config.name, self.parts, self._declared)
-        self.recorder = Recorder(runtime, facts_of_run(self.show, list(self.parts.worn)))
+        facts = facts_of_run(self.show, list(self.parts.worn))
+        self.recorder = Recorder(runtime, facts, len(packed(self.parts)))
         self.slot = Slot(-1, begins_at, begins_at)
         self.recorder.keyframe(self.tick)
 

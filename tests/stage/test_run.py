@@ -21,7 +21,7 @@ from appliance.pose.bvh import write_bvh
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage import run
+from appliance.stage import recorder, run
 from appliance.stage.admission import SecondLook
 from appliance.stage.fallback import SENSOR_SILENT
 from appliance.stage.rerun import Rerun
@@ -271,3 +271,20 @@ def test_a_box_that_follows_says_once_that_it_is_ready(
     for _ in range(100):
         assert not evening.stage._may_dance(TickClock(monotonic=lambda: 0.0))
     assert said == ["ready"]
+
+
+def test_a_keyframe_of_this_show_finds_room(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A puppet of 43 joints that goes on by itself took more than was reserved: no journal of it could be
+    danced again, and one segment grew until the disk was full.
+    """
+    monkeypatch.setattr(recorder, "KEYFRAME_BYTES", 1 << 11)
+    monkeypatch.setattr(recorder, "KEYFRAME_JOINT_BYTES", 0)
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    evening = Evening(bundle, tmp_path / "runtime", monkeypatch)
+    with closing(evening.stage):
+        evening.dance(0.2)
+        assert evening.stage.recorder is not None
+        evening.stage.recorder.keyframe(evening.stage.tick)
+        assert evening.stage.recorder.lost == 0
