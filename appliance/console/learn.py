@@ -165,7 +165,7 @@ class Learn:
         found = []
         for place, root in (("box", self._recordings), ("stick", STICK)):
             with contextlib.suppress(OSError):
-                inside = sorted(one for one in root.iterdir() if one.is_dir())
+                inside = sorted(one for one in root.iterdir() if one.is_dir() and one.name[0] != ".")
                 for folder in (root, *inside):
                     files, minutes = recorded_minutes(folder)
                     if files:
@@ -179,7 +179,7 @@ class Learn:
             return None
         place, _, inner = name.partition("/")
         root = {"box": self._recordings, "stick": STICK}.get(place)
-        if root is None or inner in (".", "..") or "/" in inner:
+        if root is None or inner.startswith(".") or "/" in inner:  # hidden: a rehearsal that is not whole yet
             return None
         folder = root / inner if inner else root
         return folder if folder.is_dir() else None

@@ -11,8 +11,10 @@ from aiohttp import web
 from aiohttp.test_utils import TestClient, TestServer
 
 from appliance.console.learn import Learn
-from appliance.console.learning import FOLDER, Learning, Wanted
+from appliance.console.learning import FOLDER, RECORDINGS, Learning, Wanted
 from appliance.console.stage_view import StageView
+from appliance.pose.bvh import write_bvh
+from tests.bundles import swaying_phrase
 
 
 def post(state: Path, path: str, **sent: Any) -> tuple[int, str]:
@@ -38,6 +40,16 @@ def test_a_second_touch_on_end_does_not_undo_what_was_learned(tmp_path: Path) ->
     learning.report(state="learned")
     assert post(tmp_path, "/api/learn/end")[0] == 200
     assert learning.reported() == {"state": "learned"} and learning.playable() == learning.show
+
+
+def test_a_rehearsal_that_is_still_written_is_not_offered(tmp_path: Path) -> None:
+    for name in ("mine", ".rehearsal-2026-11-28-040500.part"):
+        (tmp_path / RECORDINGS / name).mkdir(parents=True)
+        write_bvh(tmp_path / RECORDINGS / name / "sway.bvh", swaying_phrase())
+    learn = Learn(tmp_path, None, {}, True, cast(StageView, None))
+    assert [one["name"] for one in learn._listed()] == ["box/mine"]
+    assert learn._folder("box/mine") is not None
+    assert learn._folder("box/.rehearsal-2026-11-28-040500.part") is None
 
 
 def test_a_name_that_no_disk_takes_is_refused_with_the_reason(tmp_path: Path) -> None:
