@@ -119,10 +119,11 @@ class ProcessHealthWriter:
         if self._block is None:
             return
         fallbacks, parts = self._fallbacks.happened(now), dict(self._fallbacks.parts)
+        reported = dict(self.reported)
         values: dict[str, Any] = {"pid": os.getpid(), "starts": self._starts, "beat": now, "ended": ended}
-        values |= {"fallbacks": fallbacks, "parts": parts, "reported": self.reported}
+        values |= {"fallbacks": fallbacks, "parts": parts, "reported": reported}
         packed = json.dumps(values).encode()
-        while len(packed) > _LARGEST and _halve_longest(fallbacks, parts):
+        while len(packed) > _LARGEST and (_halve_longest(fallbacks, parts) or _drop_longest(reported)):
             packed = json.dumps(values).encode()
         self._block.write(packed)
 
@@ -140,6 +141,14 @@ def _halve_longest(fallbacks: list[Fallen], parts: dict[str, str]) -> bool:
     else:
         fallbacks[place] = fallbacks[place]._replace(message=half)
     return True
+
+
+def _drop_longest(reported: dict[str, Any]) -> bool:
+    """Leave out the longest part of a report: names come from outside. False: nothing is left."""
+    if reported:
+        del reported[max(reported, key=lambda name: len(json.dumps(reported[name])))]
+        return True
+    return False
 
 
 class Member(NamedTuple):

@@ -185,6 +185,20 @@ def test_a_session_by_network_as_a_computer_opens_it() -> None:
     midi.close()
 
 
+def test_a_session_s_name_is_no_longer_than_a_binding_takes() -> None:
+    """60,000 letters did not fit the process's report, and ended it."""
+    port = free_ports(1)[0]
+    midi = NetworkMidi(HOST, port, "Bunraku")
+    computer = Computer(port)
+    for place in range(2):
+        packet = struct.pack(">2s2sIII", b"\xff\xff", b"IN", 2, 1, computer.own) + b"N" * 60_000
+        computer.sockets[place].sendto(packet, (HOST, port + place))
+        assert list(midi.messages(1.0)) == []
+    assert midi.names == ("N" * 64,)
+    assert checked({**FADER, "device": midi.names[0], "address": "/master"})
+    midi.close()
+
+
 def test_only_listed_machines_open_a_session() -> None:
     """Anything else at these ports is nothing at all."""
     port = free_ports(1)[0]

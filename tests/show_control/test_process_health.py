@@ -59,6 +59,19 @@ def test_a_network_that_is_away_from_all_universes_is_told_in_short(folder: Path
     processes.close()
 
 
+def test_a_report_that_does_not_fit_is_left_out_and_the_rest_is_told(folder: Path) -> None:
+    """Sixteen gestures with long Cyrillic names: JSON has six letters for each of theirs."""
+    gestures = [{"name": "ж" * 60, "cue": "ц" * 60, "hand": "LeftArm"} for _ in range(16)]
+    fallbacks, processes = Fallbacks([DMX]), ProcessHealth(folder)
+    fallbacks.set("dmx-away", "Away.")
+    with closing(ProcessHealthWriter(folder, "control", fallbacks)) as control:
+        control.reported = {"refused": 3, "gestures": {"list": gestures}}
+        control.publish_health(10.0)
+        assert processes.reported("control", 10.0) == {"refused": 3}
+    assert reported(processes, 10.0) == {"dmx-away": ("control", 1, True)}
+    processes.close()
+
+
 def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
     processes = ProcessHealth(folder)
     for who in ("lights", "projector", "keeper", "console", "sound"):
