@@ -39,13 +39,20 @@ class LiveRigWriter:
         """beams: of each the fixture's name, its place (x, y, z; metres), where it points (a unit vector),
         its colour (red, green, blue; 0..1), its level 0..1, its width in degrees; walk: what is walked now.
         """
-        seen = {"beams": beams[:MOST_BEAMS], "walk": walk}
-        self._block.write(json.dumps(seen, separators=(",", ":")).encode())
+        count, packed = MOST_BEAMS, _packed(beams[:MOST_BEAMS], walk)
+        while count and len(packed) > LARGEST:  # long names, of which JSON makes six times as much
+            count //= 2
+            packed = _packed(beams[:count], walk)
+        self._block.write(packed)
 
     def close(self) -> None:
         """Nothing shines any more."""
         self._block.write(NOTHING)
         self._block.close()
+
+
+def _packed(beams: Sequence[Sequence[Any]], walk: str) -> bytes:
+    return json.dumps({"beams": beams, "walk": walk}, separators=(",", ":")).encode()
 
 
 class LiveRigReader:

@@ -345,10 +345,12 @@ def test_a_reader_sees_where_each_lamp_points_and_how_bright_it_is(patch: Patch,
     reader.close()
 
 
-def test_a_rig_of_any_size_fits(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "most"), [("a rather long name", MOST_BEAMS), ("灯" * 60, 100)])
+def test_a_rig_of_any_size_fits(tmp_path: Path, name: str, most: int) -> None:
+    """Names in another script too: JSON has six letters for each of theirs, and the first beams are told."""
     fixtures = [
         {
-            "name": f"a rather long name {place}",
+            "name": f"{name} {place}",
             "profile": "rgb",
             "universe": 1 + place // 100,
             "address": 1 + 3 * (place % 100),
@@ -359,7 +361,7 @@ def test_a_rig_of_any_size_fits(tmp_path: Path) -> None:
     reader, live = LiveRigReader(tmp_path), LiveRig(tmp_path)
     assert reader.newest() == NOTHING
     live.publish(patch, patch.defaults, "x" * 200, 1.0)
-    assert len(json.loads(reader.newest())["beams"]) == MOST_BEAMS and len(reader.newest()) < LARGEST
+    assert len(json.loads(reader.newest())["beams"]) == most and len(reader.newest()) < LARGEST
     live.close()
 
 
