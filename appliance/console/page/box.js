@@ -2,7 +2,7 @@
 const SILENT_MS = 4000;
 const RETRY_MS = 1000;
 const REFUSED = 2; // tries in a row, and the page asks for each word and frame instead
-const WORDS_MS = 1000, FRAME_MS = 40;
+const WORDS_MS = 1000, FRAME_MS = 40, LATEST_MS = 2000; // a frame that takes longer is lost with its network
 
 export class Box extends EventTarget {
   constructor() {
@@ -67,7 +67,8 @@ export class Box extends EventTarget {
   }
 
   async pollFrame() {
-    const frame = await fetch(this.ghostWanted ? "/frame?ghost" : "/frame").then((answer) => answer.arrayBuffer()).catch(() => null);
+    const asked = fetch(this.ghostWanted ? "/frame?ghost" : "/frame", { signal: AbortSignal.timeout(LATEST_MS) });
+    const frame = await asked.then((answer) => answer.arrayBuffer()).catch(() => null);
     const tick = frame?.byteLength >= 8 ? new DataView(frame).getFloat64(0, true) : this.tick;
     if (tick === this.tick) return;
     this.tick = tick;

@@ -7,10 +7,13 @@ export function showChoices(parent, part, entries, act) {
     parent.replaceChildren(...entries.map((one) => {
       const button = document.createElement("button");
       button.type = "button";
-      button.textContent = one.label ?? one.name;
       button.addEventListener("click", () => act(one.name, button.getAttribute("aria-pressed") === "true"));
       return button;
     }));
   }
-  entries.forEach((one, place) => parent.children[place].setAttribute("aria-pressed", one.now));
+  entries.forEach((one, place) => {
+    const button = parent.children[place], said = one.label ?? one.name;
+    if (button.textContent !== said) button.textContent = said;
+    button.setAttribute("aria-pressed", one.now);
+  });
 }

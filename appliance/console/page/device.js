@@ -30,12 +30,13 @@ export function initDevice(me, table) {
   }));
 }
 
-// Ask the box for something; a device that it does not know gives the PIN first, and then it is done at once.
+// Ask the box for something; a device that it does not know gives the PIN first, and then it is done at once. Where the
+// PIN is not given, the answer is that it is needed.
 export async function ask(path, said, patience) {
   const answer = await request(path, said, patience);
   if (answer.status !== 401) return answer;
   render(false);
-  return new Promise((answered) => askPin(() => answered(ask(path, said, patience))));
+  return new Promise((answered) => askPin(() => answered(ask(path, said, patience)), "", () => answered(answer)));
 }
 
 export async function command(address, ...given) {
@@ -67,8 +68,10 @@ export function say(sentence, refused = false) {
   silence = setTimeout(() => { said.textContent = ""; }, refused ? 8000 : 3000);
 }
 
-function askPin(then, why = "") {
-  waiting = then;
+function askPin(then, why = "", instead = () => {}) {
+  const before = waiting;
+  waiting = { then, instead };
+  before?.instead();
   byId("pin-said").textContent = why && words(why);
   if (!byId("pin").open) {
     byId("pin-input").value = "";
@@ -78,8 +81,10 @@ function askPin(then, why = "") {
 }
 
 function closePin() {
+  const before = waiting;
   waiting = null;
   byId("pin").close();
+  before?.instead();
 }
 
 async function givePin() {
@@ -95,9 +100,9 @@ async function givePin() {
   byId("pin").close();
   render(true);
   document.dispatchEvent(new Event("known"));
-  const then = waiting;
+  const given = waiting;
   waiting = null;
-  then?.();
+  given?.then?.();
 }
 
 // Such as "iPhone, Safari" or "Linux, Chrome": enough to tell the devices in a list apart.

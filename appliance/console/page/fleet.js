@@ -52,5 +52,6 @@ function spoken({ key, values }) {
   const said = { ...values };
   if ("since" in said) said.since = clock(said.since);
   if ("rate" in said) said.rate = number(said.rate, 1);
+  if ("message" in said) said.message = translated(said.message);
   return words(`verdict_${key}`, said);
 }

@@ -96,8 +96,8 @@ function figures(rows) {
 async function dance() {
   say(words("file_checking"));
   const answer = await ask("/api/learn/dance", {}, ADOPTED_WITHIN_MS);
-  const problems = answer.value?.problems?.map((one) => one.message).join(" ");
-  say(answer.status === 200 ? problems || answer.value.message : translated(answer.message) || words("no_page"));
+  const problems = answer.value?.problems?.map((one) => translated(one.message)).join(" ");
+  say(problems || translated(answer.status === 200 ? answer.value.message : answer.message) || words("no_page"));
 }
 
 async function upload() {

@@ -1,7 +1,7 @@
 // The last lines of the box's units, for a device that gave the PIN.
 import { ask } from "./device.js";
 import { byId } from "./elements.js";
-import { clock, words } from "./words.js";
+import { clock, translated, words } from "./words.js";
 
 export function initLogs() {
   byId("logs-read").addEventListener("click", readLogs);
@@ -10,7 +10,7 @@ export function initLogs() {
 async function readLogs() {
   byId("logs-said").textContent = words("box_reading");
   const answer = await ask("/api/logs");
-  byId("logs-said").textContent = answer.status === 200 ? words(answer.value.length ? "logs_newest" : "logs_none") : answer.message || words("no_page");
+  byId("logs-said").textContent = answer.status === 200 ? words(answer.value.length ? "logs_newest" : "logs_none") : translated(answer.message) || words("no_page");
   if (answer.status !== 200) return;
   byId("logs").replaceChildren(...answer.value.reverse().map((line) => {
     const item = document.createElement("li"), small = document.createElement("small");

@@ -2,7 +2,7 @@
 import { request } from "./box.js";
 import { ask, say } from "./device.js";
 import { byId } from "./elements.js";
-import { words } from "./words.js";
+import { translated, words } from "./words.js";
 
 let targets = [], newest = null, isRead = false;
 
@@ -70,7 +70,7 @@ function bind() {
 
 async function send(path, one) {
   const answer = await ask(path, one);
-  if (!take(answer)) say(answer.message || words("no_page"), true);
+  if (!take(answer)) say(translated(answer.message) || words("no_page"), true);
 }
 
 const spoken = ({ device, kind, channel, number }) => words(`midi_${kind}`, { device, channel, number });

@@ -73,8 +73,17 @@ export class PhoneLink extends EventTarget {
 
   fill() {
     const now = performance.now();
+    if (this.socket?.readyState === WebSocket.OPEN && this.isSilent && now - this.openedAt > SILENT_MS) this.giveUp();
     if (this.socket === null && now - this.openedAt > RETRY_MS) this.open();
     if (now - this.sentAt >= (this.isStill ? SIGN_MS : FILL_MS)) this.send();
+  }
+
+  // A socket whose network is gone stays open for minutes; requests find the box as soon as it is back.
+  giveUp() {
+    const gone = this.socket;
+    this.socket = null;
+    this.openedAt = performance.now();
+    gone.close();
   }
 
   send() {

@@ -2,7 +2,7 @@
 import { request } from "./box.js";
 import { ask, say } from "./device.js";
 import { byId } from "./elements.js";
-import { words } from "./words.js";
+import { translated, words } from "./words.js";
 
 const NS = "http://www.w3.org/2000/svg", MARGIN = 4;
 
@@ -20,7 +20,7 @@ export async function initPhones() {
 
 async function showCode(name) {
   const answer = await ask("/api/phones/code", { name });
-  if (answer.status !== 200) return say(answer.message || words("no_page"), true);
+  if (answer.status !== 200) return say(translated(answer.message) || words("no_page"), true);
   const { address, seconds, squares } = answer.value;
   byId("phone-code").hidden = false;
   byId("phone-code-said").textContent = words("phone_code_said", { name, minutes: seconds / 60 });

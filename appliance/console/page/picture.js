@@ -211,7 +211,7 @@ function handle(place, what) {
     isSending = false;
     ownUntil = performance.now() + OWN_MS;
     if (done) sent = [sent[0] + dx, sent[1] + dy];
-    else if (!from && ++misses === 3) rest();
+    else if (document.body.dataset.known !== "yes" || (!from && ++misses === 3)) rest();
   };
   button.addEventListener("pointerdown", (event) => {
     button.setPointerCapture(event.pointerId);

@@ -22,7 +22,7 @@ export function initProve() {
 export async function showProve() {
   isShown = true;
   const answer = await request("/api/prove");
-  if (answer.status !== 200) return showSentence(answer.message || words("no_page"));
+  if (answer.status !== 200) return showSentence(translated(answer.message) || words("no_page"));
   list(answer.value.proofs);
   goes = answer.value.show_goes;
   byId("prove-begin").textContent = words(goes ? "prove_stop_begin" : "prove_begin");
@@ -140,7 +140,7 @@ function list(proofs) {
 
 async function open(id) {
   const answer = await request(`/api/prove/${id}`);
-  if (answer.status !== 200) return say(answer.message || words("no_page"), true);
+  if (answer.status !== 200) return say(translated(answer.message) || words("no_page"), true);
   proof = answer.value;
   byId("prove-document").hidden = false;
   byId("prove-verdict").textContent = verdictOf(proof);

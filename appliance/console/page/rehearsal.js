@@ -10,7 +10,7 @@ import { initLearn, leaveLearn, showLearn } from "./learn.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
 import { twice } from "./hold.js";
-import { hasWords, number, words } from "./words.js";
+import { hasWords, number, translated, words } from "./words.js";
 
 const PHRASE_FADE_S = 1, LIVELINESS_FADE_S = 1, KEEPING_MS = 430_000;
 const SEEDS = 1_000_000; // six digits are easily noted down
@@ -78,7 +78,7 @@ async function keepCue(offerCopy) {
   byId("cue-said").textContent = words("change_runs");
   const answer = await request("/api/cue", { name: byId("cue-name").value }, KEEPING_MS);
   byId("cue-keep").disabled = false;
-  byId("cue-said").textContent = answer.status === 200 ? answer.value.message : answer.message || words("no_page");
+  byId("cue-said").textContent = translated(answer.status === 200 ? answer.value.message : answer.message) || words("no_page");
   if (answer.status === 200) offerCopy();
 }
 
@@ -86,8 +86,8 @@ async function keepCue(offerCopy) {
 async function danceCopy() {
   byId("cue-said").textContent = words("file_checking");
   const answer = await ask("/api/cue/dance", {}, KEEPING_MS);
-  const problems = answer.value?.problems?.map((one) => one.message).join(" ");
-  byId("cue-said").textContent = answer.status === 200 ? problems || answer.value.message : answer.message || words("no_page");
+  const problems = answer.value?.problems?.map((one) => translated(one.message)).join(" ");
+  byId("cue-said").textContent = problems || translated(answer.status === 200 ? answer.value.message : answer.message) || words("no_page");
 }
 
 // Away from the page no joint is held.

@@ -47,12 +47,13 @@ async function take(name) {
 async function sendFiles() {
   byId("update-form").hidden = true;
   let ready = null;
-  for (const file of [...byId("update-file").files].sort((one, other) => other.size - one.size)) {
+  const files = [...byId("update-file").files].sort((one, other) => other.size - one.size);
+  byId("update-file").value = ""; // else the same files could not be chosen again after the network was lost
+  for (const file of files) {
     const answer = await sent(file, "/api/update/file", say);
     if (answer.status !== 200) return refuse(answer);
     ready = JSON.parse(answer.message).ready;
   }
-  byId("update-file").value = "";
   if (ready) show(ready);
   else say(words("update_missing"));
   return undefined;

@@ -4,7 +4,7 @@ let english = {}, own = {}, patterns = [];
 export let language = "en", locale = "en"; // dates and numbers are written as this device does
 
 export async function loadWords(languages) {
-  const wished = [localStorage.getItem("language"), ...navigator.languages.map((one) => one.split("-")[0]), "en"];
+  const wished = [kept(), ...navigator.languages.map((one) => one.split("-")[0]), "en"];
   language = wished.find((one) => languages.includes(one)) ?? "en";
   locale = navigator.languages.find((one) => one.split("-")[0] === language) ?? language;
   english = await table("en");
@@ -13,6 +13,15 @@ export async function loadWords(languages) {
   document.documentElement.lang = language;
   for (const element of every("[data-words]")) element.textContent = words(element.dataset.words);
   for (const element of every("[data-label]")) element.setAttribute("aria-label", words(element.dataset.label));
+}
+
+// A browser that keeps nothing for pages refuses the question itself.
+function kept() {
+  try {
+    return localStorage.getItem("language");
+  } catch {
+    return null;
+  }
 }
 
 export function words(key, values = {}) {

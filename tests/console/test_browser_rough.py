@@ -1,0 +1,134 @@
+"""A browser that loses its network, cancels a question, chooses a file again, or keeps nothing for pages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, expect
+from playwright.sync_api import Page as Tab
+
+from tests.console.browser import LAPTOP, await_box, await_true, opened_context, press, unlock
+from tests.console.page import Page
+
+pytestmark = pytest.mark.realtime
+
+NO_PIN = "This needs the PIN. The box says it: bunraku console pin."
+READY = {"can": True, "stick": [], "ready": None, "installing": False}
+
+
+def opened(browser: Browser, page: Page, script: str = "", **options: Any) -> Iterator[Tab]:
+    """A tab on a page without a stage."""
+    context = opened_context(browser, **LAPTOP | options)
+    tab = context.new_page()
+    if script:
+        tab.add_init_script(script)
+    tab.goto(page.origin)
+    await_box(tab)
+    yield tab
+    context.close()
+
+
+@pytest.fixture
+def alone(browser: Browser, page: Page) -> Iterator[Tab]:
+    yield from opened(browser, page)
+
+
+def test_a_question_for_the_pin_that_is_cancelled_is_an_answer(alone: Tab) -> None:
+    """Else the button would say for ever that the file is being made."""
+    press(alone, '[data-page="box"]')
+    press(alone, "#help-make")
+    expect(alone.locator("#pin")).to_be_visible()
+    expect(alone.locator("#help-make")).to_be_disabled()
+    press(alone, "#pin-cancel")
+    expect(alone.locator("#help-make")).to_be_enabled()
+    expect(alone.locator("#help-said")).to_have_text(NO_PIN)
+
+
+def test_the_same_update_can_be_chosen_again_after_the_network_was_lost(
+    alone: Tab, page: Page, tmp_path: Path
+) -> None:
+    package = tmp_path / "bunraku_1_arm64.deb"
+    package.write_bytes(b"package")
+    sent: list[str] = []
+    alone.route("**/api/update", lambda route: route.fulfill(json=READY))
+    alone.route("**/api/update/file*", lambda route: (sent.append(route.request.url), route.abort()))
+    unlock(alone, page)
+    press(alone, '[data-page="box"]')
+    for times in (1, 2):
+        alone.locator("#update-file").set_input_files(package)
+        expect(alone.locator("#update-said")).to_contain_text("does not answer")
+        assert len(sent) == times
+        assert alone.evaluate("document.querySelector('#update-file').value") == "", "it would be no change"
+        alone.evaluate("document.querySelector('#update-said').textContent = ''")
+
+
+def test_a_choice_says_what_is_new_about_it_and_stays_the_same_button(alone: Tab) -> None:
+    alone.evaluate(
+        """async () => {
+          const { showChoices } = await import("/choices.js"), part = document.createElement("div");
+          const shown = (label) => showChoices(part, part, [{ name: "mine", label, now: false }], () => {});
+          shown("1 file");
+          const before = part.firstChild;
+          shown("2 files");
+          window.told = [part.firstChild === before, part.textContent];
+        }"""
+    )
+    assert alone.evaluate("told") == [True, "2 files"]
+
+
+def test_a_phone_whose_network_is_lost_without_a_word_asks_by_requests(alone: Tab) -> None:
+    """Its WebSocket stays open for minutes, and nothing of it arrives."""
+    readings: list[str] = []
+    answer = {"lamp": "none", "linked": True, "said": ""}
+    alone.route(
+        "**/api/phones/reading",
+        lambda route: (readings.append(route.request.url), route.fulfill(json=answer)),
+    )
+    alone.evaluate(
+        """async () => {
+          window.WebSocket = class extends EventTarget {
+            static OPEN = 1;
+            readyState = 1;
+            bufferedAmount = 0;
+            send() {}
+            close() { window.isGone = true; }
+          };
+          const { PhoneLink } = await import("/phone_link.js");
+          window.link = new PhoneLink("session");
+          link.take([1, 2, 3]);
+        }"""
+    )
+    assert not readings and not alone.evaluate("window.isGone ?? false")
+    await_true(alone, "window.isGone === true && link.answers > 0 && !link.isSilent")
+    assert readings
+    alone.evaluate("link.close()")
+
+
+def test_a_browser_that_keeps_nothing_for_pages_shows_the_page(browser: Browser, page: Page) -> None:
+    refuses = """Object.defineProperty(window, "localStorage", {
+      get() { throw new DOMException("The operation is insecure.", "SecurityError"); }
+    })"""
+    for tab in opened(browser, page, refuses, locale="de-DE"):
+        expect(tab.locator("#verdict")).to_contain_text("läuft keine Show")
+
+
+@pytest.mark.parametrize(
+    ("path", "which", "button", "said"),
+    [
+        ("**/api/logs", "box", "#logs-read", "#logs-said"),
+        ("**/api/prove", "prove", "", "#prove-said"),
+    ],
+)
+def test_why_something_cannot_be_had_is_said_in_the_reader_s_language(
+    browser: Browser, page: Page, path: str, which: str, button: str, said: str
+) -> None:
+    sentence = "Reading the log took too long. Try again."
+    for tab in opened(browser, page, locale="de-DE"):
+        tab.route(path, lambda route: route.fulfill(status=503, body=sentence))
+        press(tab, f'[data-page="{which}"]')
+        if button:
+            press(tab, button)
+        expect(tab.locator(said)).to_contain_text("Das Lesen des Protokolls dauerte zu lange.")
