@@ -16,7 +16,7 @@ from appliance.show_control.packet import Message
 
 FILE = "midi-bindings.json"
 MOST_BINDINGS = 256
-_LARGEST = 1 << 17
+_LARGEST = 1 << 19  # bytes: as many of the longest names fit, in any script
 _LONGEST_DEVICE = 64
 
 _KINDS = {0x8: "note", 0x9: "note", 0xB: "controller", 0xC: "program", 0xE: "pitch"}

@@ -15,7 +15,7 @@ from appliance.remote.midi_messages import MidiParser
 from appliance.remote.network_midi import NetworkMidi, commands_in
 from appliance.remote.raw_midi import RawMidi
 from appliance.remote.show_control_messages import command_of
-from appliance.show_control.midi_bindings import MidiBindings, Moved, checked, moved
+from appliance.show_control.midi_bindings import MOST_BINDINGS, MidiBindings, Moved, checked, moved
 from appliance.show_control.packet import Message
 from hw_sim.peers import HOST, free_ports
 from tests.system.processes import wait_until
@@ -69,6 +69,18 @@ def test_a_key_gives_its_command_once_when_it_is_pressed(tmp_path: Path) -> None
 def test_a_binding_that_cannot_be_is_refused(values: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         checked({**FADER, **values})
+
+
+def test_as_many_bindings_as_there_may_be_are_read_again(tmp_path: Path) -> None:
+    """Names in another script: JSON has six letters for each of theirs, and a file too large is none."""
+    longest = {"device": "ж" * 64, "kind": "note", "address": "/cue", "name": "ж" * 100}
+    many = [
+        checked({**longest, "channel": 1 + number // 128, "number": number % 128})
+        for number in range(MOST_BINDINGS)
+    ]
+    MidiBindings(tmp_path)._write(many[1:])
+    MidiBindings(tmp_path).bind(many[0])
+    assert len(MidiBindings(tmp_path).all) == MOST_BINDINGS
 
 
 def test_a_damaged_file_is_no_binding_and_is_written_anew(tmp_path: Path) -> None:
