@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import ipaddress
 import re
@@ -24,6 +25,16 @@ def listening(host: str, port: int) -> socket.socket:
         host = "0.0.0.0"
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     return socket.create_server((host, port), family=family, dualstack_ipv6=host == "::")
+
+
+def port_cure(error: OSError, section: str) -> str:
+    """The cure for a port that cannot be opened. section: of the box file."""
+    cures = {
+        errno.EADDRINUSE: "Is a second bunraku running? Stop it, or give another port",
+        errno.EADDRNOTAVAIL: "This machine does not have this address now. Give one that it has as host",
+        errno.EACCES: "Ports below 1024 are only for root. Give another port",
+    }
+    return f"{cures.get(error.errno or 0, 'Give another port')} under {section}: in the box file."
 
 
 def outward_host() -> str:

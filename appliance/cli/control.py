@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from appliance.box.runtime_folder import runtime_folder
+from appliance.box.served import port_cure
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
 from appliance.sensor.foreign.sources import SourceSettings
@@ -73,8 +74,8 @@ def open_control_port(control: ControlConfig) -> socket.socket:
 def _taken(control: ControlConfig, error: OSError) -> StageError:
     return StageError(
         f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "
-        "Commands could not arrive, so nothing is started. Is a second bunraku running? Stop it, or "
-        "give another port under control: in the box file, or `control: null` for none."
+        f"Commands could not arrive, so nothing is started. {port_cure(error, 'control')} Or write "
+        "`control: null` for none."
     )
 
 

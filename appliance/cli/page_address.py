@@ -7,7 +7,7 @@ import os
 import socket
 from typing import TYPE_CHECKING
 
-from appliance.box.served import listening, outward_host
+from appliance.box.served import listening, outward_host, port_cure
 from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def open_console_port(console: ConsoleConfig, or_any: bool = False) -> socket.so
             return listening(console.host, 0)
         raise StageError(
             f"TCP port {console.port} on {console.host} cannot be opened for the page ({error.strerror}). "
-            "Is a second bunraku running? Stop it, or give another port under console: in the box file."
+            f"{port_cure(error, 'console')}"
         ) from error
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import subprocess
 import sys
@@ -14,7 +15,9 @@ from appliance.cli import control
 from appliance.cli.control import begin_in, open_control_port
 from appliance.cli.doctor.host_view import HostView
 from appliance.cli.doctor.venue import ports
+from appliance.cli.page_address import open_console_port
 from appliance.show.box import BoxConfig
+from appliance.show.console import ConsoleConfig
 from appliance.show.control import ControlConfig
 from appliance.show.show import load_show
 from appliance.show_control.packet import messages_in
@@ -131,3 +134,18 @@ def test_the_box_is_known_by_what_runs_and_not_by_where_it_lies(
         found = next(iter(ports(HostView(box=box))))
         process.stdin.close()
     assert found.verdict == ("ok" if is_ours else "wrong"), found
+
+
+def test_what_to_do_about_a_port_fits_why_it_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A box file with the address that the router gave last year, or with a port of the system's."""
+
+    def refused(*_: object) -> socket.socket:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    with pytest.raises(StageError, match=r"does not have this address now.* under console:") as told:
+        open_console_port(ConsoleConfig(host="192.0.2.7", viewers=["10.0.0.0/8"]))
+    assert "second bunraku" not in str(told.value)
+    monkeypatch.setattr(control, "open_port", refused)
+    with pytest.raises(StageError, match=r"below 1024.* under control:") as told:
+        open_control_port(ControlConfig(host=HOST, port=514))
+    assert "second bunraku" not in str(told.value)
