@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -86,7 +88,8 @@ def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
     if begun_with:
         training.origin["from"] = begun_with
     if state is not None:
-        training.restore(state)
+        with _of_this_version(checkpoint):
+            training.restore(state)
     options.out.mkdir(parents=True, exist_ok=True)
     console.print(_plan(training, device), highlight=False)
     done = (
@@ -173,8 +176,9 @@ def _settings_and_source(
         if not checkpoint.exists():
             raise StudioError(f"{options.out} has no checkpoint.pt to resume. Omit --resume.")
         state = load_state(checkpoint)
-        settings = settings_from(state["settings"])
-        source = sources.remembered(state, options.recordings, checkpoint, options.reading)
+        with _of_this_version(checkpoint):
+            settings = settings_from(state["settings"])
+            source = sources.remembered(state, options.recordings, checkpoint, options.reading)
         _require_as_begun(options, settings, source)
         return _paced(settings, options), source, state
     if checkpoint.exists():
@@ -204,6 +208,18 @@ def _settings_and_source(
         options.recordings, options.catalogue, options.held_out, options.reading, options.keep
     )
     return _paced(settings, options), source, None
+
+
+@contextmanager
+def _of_this_version(checkpoint: Path) -> Iterator[None]:
+    """Raises StudioError where a checkpoint lacks what this version needs, or has what it does not know."""
+    try:
+        yield
+    except (KeyError, TypeError, RuntimeError) as error:
+        raise StudioError(
+            f"{checkpoint} is of another version of Bunraku, and --resume cannot continue it ({error}). "
+            "Continue it with that version, or begin in another --out."
+        ) from error
 
 
 def _require_as_begun(options: TrainOptions, settings: AnySettings, source: Sources) -> None:

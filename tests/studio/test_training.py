@@ -80,6 +80,21 @@ def test_interrupted_and_resumed_is_uninterrupted_bit_for_bit(
     assert one["history"][-1]["held_out_degrees"] == other["history"][-1]["held_out_degrees"]
 
 
+@pytest.mark.parametrize("part", ["settings", "batches"])
+def test_a_checkpoint_of_another_version_is_not_continued(
+    recordings: Path, puppet_checkpoint: Path, tmp_path: Path, part: str
+) -> None:
+    state = torch.load(puppet_checkpoint, weights_only=True)
+    if part == "settings":
+        state["settings"]["of_tomorrow"] = 1
+    else:
+        del state["batches"]
+    torch.save(state, tmp_path / "checkpoint.pt")
+    result = bunraku("train", "--resume", "--out", tmp_path, "--recordings", recordings, "--device", "cpu")
+    assert result.exit_code == 2
+    assert "is of another version of Bunraku" in " ".join(result.stderr.split())
+
+
 def test_a_strip_is_drawn_where_no_held_out_window_is_sound(recordings: Path, tmp_path: Path) -> None:
     dataset = load_dataset(recordings, Catalogue(mask={"sway_2": ((1.9, 2.1),)}))
     assert not len(windows(dataset.held_out, dataset.moving, window=128))
