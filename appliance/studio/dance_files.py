@@ -22,9 +22,14 @@ def write_dance(out: Path, dance: Recording, title: str, report: Mapping[str, An
 
 
 def write_recording(out: Path, dance: Recording) -> None:
-    """A BVH file as phrases have it, in a folder that need not exist yet."""
+    """A BVH file as phrases have it, whole, in a folder that need not exist yet. Raises OSError."""
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_bvh(out, dance, digits=PHRASE_DIGITS)
+    beside = out.with_name(f".{out.name}.part")
+    try:
+        write_bvh(beside, dance, digits=PHRASE_DIGITS)
+        beside.replace(out)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:

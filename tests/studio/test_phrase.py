@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
+from appliance.studio import dance_files
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.export.chosen_phrase import choose_phrase
@@ -335,3 +338,17 @@ def test_what_lies_between_two_capture_errors_may_be_a_few_frames(tmp_path: Path
         take.sound[[20, 24, 26]] = False
     chosen = choose_phrase(dataset)
     assert chosen is not None and chosen.from_s > 0.5
+
+
+def test_a_full_disk_leaves_the_phrase_that_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def half(path: Path, *_: object, **__: object) -> None:
+        path.write_text("HIERARCHY")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    (tmp_path / "phrase.bvh").write_text("the one before")
+    monkeypatch.setattr(dance_files, "write_bvh", half)
+    with pytest.raises(OSError, match="space"):
+        dance_files.write_recording(tmp_path / "phrase.bvh", swaying(1.0))
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["the one before"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -85,7 +84,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
         verdict = judge(coders["fp32"], coders["int8"], windows)
         say(verdict.sentence())
         times = {precision: median_ms(one, windows[0]) for precision, one in coders.items()}
-        shutil.copyfile(files[verdict.precision], request.out / "puppet.onnx")
+        files[verdict.precision].replace(request.out / "puppet.onnx")
     evaluation = evaluate(coder, judged_on, fitting_hop(coder, judged_on))
     names = sorted(take.name for take in judged_on)
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
