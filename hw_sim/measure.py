@@ -123,6 +123,7 @@ def measure(
         written.append(report / "measure.json")
         print(f"Picture: {draw_report(report / 'measure.png', evidence)}")
     for path in written:
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(figures, indent=2) + "\n")
     raise typer.Exit(0 if all(limit.holds for limit in limits) else FAILED)
 

@@ -45,7 +45,7 @@ def test_a_folder_is_removed_while_files_still_appear_in_it() -> None:
 def test_measures_writes_figures_and_picture_and_gives_a_verdict(tmp_path: Path) -> None:
     """The compiled firmware is the sensor; README.md measures with the emulated one."""
     show = write_show(tmp_path / "show", strings={})
-    figures_file, report = tmp_path / "figures.json", tmp_path / "report"
+    figures_file, report = tmp_path / "new" / "figures.json", tmp_path / "report"
     progress = tmp_path / "progress"
     done = measure(
         *("--show", str(show), "--seconds", "4", "--json", str(figures_file), "--report", str(report)),

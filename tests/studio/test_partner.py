@@ -192,7 +192,7 @@ def test_the_command_measures_beside_null_products_and_draws(
     (takes / "catalogue.yaml").write_text(
         'takes: {a: [a0, a1], b: [b0, b1]}\nheld_out: [b0]\nkeep: {"*": all}\n'
     )
-    show, out = write_show_with_sources(tmp_path / "show"), tmp_path / "duet.json"
+    show, out = write_show_with_sources(tmp_path / "show"), tmp_path / "figures" / "duet.json"
     options = ["--show", str(show), "--seconds", "10", "--out", str(out)]
     result = CliRunner().invoke(app, ["duet", str(takes), *options])
     assert result.exit_code == 0, result.output

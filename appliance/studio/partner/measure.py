@@ -100,6 +100,7 @@ def run(options: DuetOptions, device: str = "cpu") -> list[Row]:
     rows = list(_rows(network, partner, dataset, apart, options, console.print, duets))
     _print(rows)
     if options.out is not None:
+        options.out.parent.mkdir(parents=True, exist_ok=True)
         options.out.write_text(json.dumps([row.__dict__ for row in rows], indent=1))
         console.print("draws the first couple")
         draw_duets(options.out.with_suffix(".png"), duets, options.seconds)
