@@ -49,7 +49,7 @@ def read_csv(path: Path) -> Motion:
     """Columns w, x, y, z and one of time_s, sampled_s, sent_s, t: also what `bunraku emulate --log` wrote."""
     times_s: list[float] = []
     orientations: list[Quaternion] = []
-    with path.open(newline="", encoding="utf-8", errors="replace") as file:
+    with path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
         rows = csv.DictReader(file)
         columns = rows.fieldnames or []
         time_column = next((name for name in TIME_COLUMNS if name in columns), None)

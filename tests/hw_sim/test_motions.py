@@ -61,10 +61,11 @@ def test_what_cannot_be_moved_is_refused() -> None:
         motions.turning(seconds_per_turn=0)
 
 
-def test_a_trace_plays_there_and_back_without_a_jump(tmp_path: Path) -> None:
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_a_trace_plays_there_and_back_without_a_jump(encoding: str, tmp_path: Path) -> None:
     path = tmp_path / "trace.csv"
     rows = [f"{5 + n * 0.1},{','.join(map(str, motions.about((1, 0, 0), 0.1 * n)))}" for n in range(21)]
-    path.write_text("time_s,w,x,y,z\n" + "\n".join(rows) + "\n")
+    path.write_text("time_s,w,x,y,z\n" + "\n".join(rows) + "\n", encoding)
     motion = read_trace(path)
     assert motion(0.0) == pytest.approx((1, 0, 0, 0))
     assert motion(1.05) == pytest.approx(motions.about((1, 0, 0), 1.05), abs=1e-4)

@@ -29,12 +29,13 @@ def test_a_wrong_trace_is_told_with_its_line(tmp_path: Path, text: str, message:
         read_trace(file)
 
 
-def test_a_trace_is_read_at_the_ticks(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("first", "encoding"), [("seconds,w,x,y,z\n", "utf-8"), ("", "utf-8-sig")])
+def test_a_trace_is_read_at_the_ticks(first: str, encoding: str, tmp_path: Path) -> None:
     file = tmp_path / "trace.csv"
     times = np.arange(0, 2, 0.01)
     half = np.radians(45 * times)
     rows = [f"{t},{np.cos(h)},{np.sin(h)},0,0" for t, h in zip(times, half, strict=True)]
-    file.write_text("seconds,w,x,y,z\n" + "\n".join(rows) + "\n")
+    file.write_text(first + "\r\n".join(rows) + "\r\n\r\n", encoding)
     found = read_trace(file)
     assert len(found) == 100
     np.testing.assert_allclose(2 * np.degrees(np.arccos(found[:, 0])), 90 * np.arange(100) / FPS, atol=0.05)

@@ -17,6 +17,7 @@ from rich.table import Table
 from appliance.pictures.filmstrip import draw_strips
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
+from appliance.pose.foreign_file import opened_text
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.roles import held_joints
@@ -127,9 +128,9 @@ def read_trace(file: Path) -> Array:
     Raises StudioError with the line.
     """
     rows: list[list[float]] = []
-    with file.open(newline="") as lines:
+    with opened_text(file) as lines:
         for number, row in enumerate(csv.reader(lines), 1):
-            if number == 1 and row and not _is_number(row[0]):
+            if not row or (number == 1 and not _is_number(row[0])):
                 continue
             try:
                 values = [float(cell) for cell in row]
