@@ -14,8 +14,9 @@ from aiohttp import web
 
 from appliance.console.body import said
 from appliance.console.child import answer_of, output_of
-from appliance.console.push import PASSES, Neighbour, Passes, push, unchecked
+from appliance.console.push import PASSES, Neighbour, Passes, body_of, push, unchecked
 from appliance.console.stage_view import StageView
+from appliance.pose.foreign_file import plain_json
 
 SERVICE = "_bunraku._tcp"
 _BROWSE = ("avahi-browse", "--resolve", "--terminate", "--parsable", "--no-db-lookup", SERVICE)
@@ -136,12 +137,12 @@ async def _asked(session: aiohttp.ClientSession, one: Neighbour) -> dict[str, An
     }
     try:
         async with session.get(f"{one.origin}/status") as answer:
-            value = await answer.json() if (answer.content_length or 0) < _LARGEST else {}
+            value = plain_json(await body_of(answer, _LARGEST))
     except (aiohttp.ClientError, TimeoutError, ValueError):
         return reported
     if not (isinstance(value, dict) and isinstance(value.get("verdict"), dict)):
         return reported
-    status = value.get("status") or {}
+    status = found if isinstance(found := value.get("status"), dict) else {}
     return reported | {
         "verdict": value["verdict"],
         "show": status.get("show", ""),

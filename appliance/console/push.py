@@ -124,7 +124,7 @@ async def _post(
     """The object that is answered, and the cookie that is set; else what went wrong."""
     sent = {"Origin": to.origin, **(headers or {})}
     async with session.post(f"{to.origin}{path}", headers=sent, **body) as answer:
-        text = (await answer.content.read(_LARGEST_ANSWER)).decode(errors="replace")
+        text = (await body_of(answer, _LARGEST_ANSWER)).decode(errors="replace")
         if answer.status == 200:
             token = answer.cookies[COOKIE].value if COOKIE in answer.cookies else ""
             return dict(json.loads(text)), token
@@ -145,8 +145,18 @@ async def _authority(to: Neighbour) -> str:
         aiohttp.ClientSession(connector=aiohttp.TCPConnector(ssl=unchecked()), timeout=patience) as session,
         session.get(f"{to.origin}/bunraku.crt") as answer,
     ):
-        certificate = await answer.content.read(_LARGEST_ANSWER)
+        certificate = await body_of(answer, _LARGEST_ANSWER)
     return ssl.DER_cert_to_PEM_cert(certificate) if to.scheme == "https" else ""
+
+
+async def body_of(answer: aiohttp.ClientResponse, most: int) -> bytes:
+    """All of it, in however many parts it comes; of more than `most` bytes the first."""
+    body = b""
+    async for part in answer.content.iter_any():
+        body += part
+        if len(body) >= most:
+            break
+    return body[:most]
 
 
 def unchecked() -> ssl.SSLContext:

@@ -20,9 +20,9 @@ import yaml
 from aiohttp import web
 from aiohttp.test_utils import TestClient, TestServer
 
-from appliance.console.fleet import Neighbour, neighbours
+from appliance.console.fleet import Neighbour, asked, neighbours
 from appliance.console.metrics import metrics
-from appliance.console.push import PASSES
+from appliance.console.push import PASSES, REFUSED, Pass, Passes, push
 from appliance.console.venue import Venue
 from appliance.levers.status import Status
 from appliance.release.choice import CHOSEN, Choice, Pair
@@ -80,6 +80,56 @@ def test_a_box_that_is_found_is_asked_and_one_that_is_away_stays_in_the_list(
     assert [one["host"] for one in found] == ["a.local", "b.local"]
     assert found[0]["verdict"]["key"] == "stage_absent"
     assert "verdict" not in found[1]
+
+
+def test_an_answer_in_several_parts_is_read_to_its_end(tmp_path: Path) -> None:
+    """As a long refusal comes over a network; and no box takes the others out of the list."""
+    refusal = json.dumps({"problems": [{"message": "It is too slow."}] * 200}).encode()
+    passes = Passes(tmp_path / PASSES)
+    (tmp_path / "show.zip").write_bytes(b"packed")
+    said = {"verdict": {"key": "well"}, "status": {"show": "A", "cue": "storm"}}
+    bodies = {
+        "status": json.dumps(said).encode(),
+        "odd": b'{"verdict": {}, "status": [1]}',
+        "deep": b"[" * 9000,
+    }
+
+    async def answer(request: web.Request) -> web.StreamResponse:
+        response = web.StreamResponse()
+        await response.prepare(request)
+        body = refusal if request.method == "POST" else bodies[request.path.split("/")[1]]
+        for part in (body[:100], body[100:]):
+            await response.write(part)
+            await asyncio.sleep(0.05)
+        return response
+
+    async def main() -> None:
+        app = web.Application()
+        app.add_routes([web.post("/{path:.*}", answer), web.get("/{path:.*}", answer)])
+        async with TestServer(app) as server:
+            assert server.port is not None
+            one = Neighbour("a", "a.local", HOST, server.port)
+            passes.keep(one.key, Pass("token"))
+            pushed = await push(one, tmp_path / "show.zip", passes, "", "b")
+            assert (pushed.state, pushed.message[:30]) == (REFUSED, "It is too slow. It is too slow")
+            found = await asked(
+                [one, *(_At("a", "a.local", HOST, server.port, path) for path in ("odd", "deep"))]
+            )
+            assert [(one.get("verdict"), one.get("cue")) for one in found] == [
+                ({"key": "well"}, "storm"),
+                ({}, ""),
+                (None, None),
+            ]
+
+    asyncio.run(main())
+
+
+class _At(Neighbour):
+    """One whose page is below a path, which is its version here."""
+
+    @property
+    def origin(self) -> str:
+        return f"{super().origin}/{self.version}"
 
 
 def test_the_examples_for_monitoring_name_metrics_that_there_are() -> None:
