@@ -79,6 +79,26 @@ def test_a_choice_says_what_is_new_about_it_and_stays_the_same_button(alone: Tab
     assert alone.evaluate("told") == [True, "2 files"]
 
 
+def test_after_a_cue_that_was_called_again_go_calls_the_next(alone: Tab) -> None:
+    """The cue in force is tapped, because the dancer begins anew; GO calls it, and must go on then."""
+    said = alone.evaluate(
+        """async () => {
+          const { goOn, showCues } = await import("/cues.js"), own = window.fetch;
+          window.fetch = async () => new Response('{"done": true, "message": ""}');
+          const cues = ["calm", "storm", "end"].map((name) => ({ name, now: name === "calm" }));
+          const button = () => document.querySelector("#go-name").textContent, said = [];
+          showCues({ status: { cue: "calm" }, cues });
+          said.push(button());
+          document.querySelector("#cues button").click();
+          said.push(button());
+          await goOn();
+          window.fetch = own;
+          return [...said, button()];
+        }"""
+    )
+    assert said == ["storm", "calm", "storm"]
+
+
 def test_a_phone_whose_network_is_lost_without_a_word_asks_by_requests(alone: Tab) -> None:
     """Its WebSocket stays open for minutes, and nothing of it arrives."""
     readings: list[str] = []

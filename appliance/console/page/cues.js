@@ -18,7 +18,11 @@ export async function goOn() {
   const place = nextPlace(), now = performance.now();
   if (place < 0 || now - pressedAt < BOUNCE_MS) return;
   pressedAt = now;
-  await command("/cue", cues[place].name); // by the name that the button shows
+  const { name } = cues[place];
+  const done = await command("/cue", name); // by the name that the button shows
+  if (!done || name !== current || name !== standby) return;
+  standby = null; // the cue in force was called again: else GO would stay with it for ever
+  draw();
 }
 
 export function showCues(value) {
