@@ -289,7 +289,9 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
         stage.admission.sentence(),
     ]
     lines += stage.parts.complaints
-    lines += map(str, show.doubtful_hands())
+    lines += map(str, (*show.doubtful_hands(), *show.doubtful_strings()))
+    if (hours := stage.box.hours) is not None:
+        lines += hours.unknown_cues([cue.name for cue in show.config.cues])
     if emulate:
         lines.append(_REHEARSAL)
     else:

@@ -117,7 +117,7 @@ def _show(directory: Path) -> Iterator[Finding]:
             show.require_moving(joints)
         except ConfigError as error:
             yield from map(_error, error.problems)
-    for problem in show.doubtful_hands():
+    for problem in (*show.doubtful_hands(), *show.doubtful_strings()):
         yield Finding(problem.file, problem.line, problem.message, problem.cure, "warning")
     for name, path in show.phrases.items():
         yield from _phrase(show, name, path)

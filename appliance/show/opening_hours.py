@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import datetime
 import re
+from collections.abc import Sequence
 from typing import Annotated, Literal
 from zoneinfo import ZoneInfo
 
 from pydantic import AfterValidator, Field, model_validator
 
+from appliance.show.config_error import did_you_mean
 from appliance.show.section import Ipv4, Section, key, refusal
 
 DAYS = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
@@ -112,6 +114,17 @@ class HoursConfig(Section):
     quiet: list[QuietConfig] = key("Hours in which the strings are quieter.", [], length=(0, 8))
     attract: AttractConfig | None = key("Dances while nobody is there; null: the same as ever.", None)
     projectors: list[ProjectorPowerConfig] = key("Projectors to switch on and off.", [], length=(0, 8))
+
+    def unknown_cues(self, names: Sequence[str]) -> list[str]:
+        """A sentence for each cue that it calls and that a show with these cues lacks."""
+        attract = (self.attract.cue, self.attract.back) if self.attract is not None else ()
+        called = dict.fromkeys(filter(None, (self.open_cue, self.close_cue, *attract)))
+        return [
+            f"The opening hours call the cue '{cue}', which this show does not have: nothing changes then. "
+            f"{did_you_mean(cue, names)}"
+            for cue in called
+            if cue not in names
+        ]
 
     @model_validator(mode="after")
     def _some_time(self) -> HoursConfig:

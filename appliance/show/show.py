@@ -237,6 +237,19 @@ class Show:
         """Hands that do something else than leading the body: warnings."""
         return [*self._idle_hands(), *self._turning_the_figure()]
 
+    def doubtful_strings(self) -> list[Problem]:
+        """Cues in which the strings are to sound and that the show lacks: warnings."""
+        names = [cue.name for cue in self.config.cues]
+        return [
+            self.file.problem(
+                ("strings", "cues", place),
+                f"The strings are to sound in the cue '{cue}', which this show does not have.",
+                did_you_mean(cue, names),
+            )
+            for place, cue in enumerate(self.config.strings.cues if self.config.strings else ())
+            if cue not in names
+        ]
+
     def _turning_the_figure(self) -> list[Problem]:
         """Hands on the root, which all else hangs on: the network hardly minds where a figure faces."""
         skeleton = self.skeleton

@@ -12,6 +12,7 @@ from appliance.show.bundle import write_checksums
 from appliance.show.check import verify_bundle
 from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
+from appliance.show.opening_hours import HoursConfig
 from appliance.show.show import load_show
 from tests.show.conftest import recording, skeleton
 
@@ -198,3 +199,20 @@ def test_two_looks_of_one_name_are_refused(show_yaml: Callable[[str], Path]) -> 
     with pytest.raises(ConfigError, match="Two looks are called 'a'") as caught:
         load_show(show_yaml("name: x\nlooks:\n- {name: a}\n- {name: b}\n- {name: a}\n"))
     assert caught.value.line == 5
+
+
+def test_strings_and_opening_hours_that_name_no_cue_of_the_show_are_warned_of(
+    with_cues: Callable[[str], Path],
+) -> None:
+    """They would be silent, or change nothing, without a word."""
+    bundle = with_cues("  - {name: walk in}\n  - {name: duet}\nstrings: {cues: [duet, duett]}\n")
+    write_checksums(bundle)
+    found = [one for one in verify_bundle(bundle) if "strings" in one.message]
+    assert [one.level for one in found] == ["warning"]
+    assert "cue 'duett', which this show does not have" in found[0].message
+    assert (found[0].line, found[0].cure) == (FIRST_CUE + 2, "Did you mean 'duet'?")
+    hours = HoursConfig.model_validate(
+        {"open": [{"from": "10:00", "to": "18:00"}], "open_cue": "walk in", "attract": {"cue": "waiting"}}
+    )
+    (sentence,) = hours.unknown_cues(["walk in", "duet"])
+    assert sentence.startswith("The opening hours call the cue 'waiting'")
