@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import termios
 
 import pytest
+import serial
 
 from appliance.sensor.framing import frame
 from appliance.sensor.provisioning import wearable_console
@@ -69,6 +71,15 @@ def test_from_the_middle_of_a_packet_it_still_finds_the_wearable() -> None:
 
 def test_a_port_that_another_program_holds_is_said() -> None:
     with FakeWearable() as fake, WearableConsole(fake.port), pytest.raises(ConsoleError, match="in use"):
+        WearableConsole(fake.port)
+
+
+def test_a_cable_that_comes_loose_while_it_is_opened_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def pulled(port: serial.Serial) -> None:
+        raise termios.error(5, "Input/output error")
+
+    monkeypatch.setattr(serial.Serial, "_reset_input_buffer", pulled)
+    with FakeWearable() as fake, pytest.raises(ConsoleError, match="cannot be opened as a serial port"):
         WearableConsole(fake.port)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import re
 import secrets
+import termios
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -69,7 +70,8 @@ class WearableConsole:
         self._lines: deque[str] = deque()
         try:
             self._port = serial.Serial(device, BAUD, timeout=0.05, write_timeout=patience_s, exclusive=True)
-        except (OSError, ValueError) as error:  # pyserial's SerialException is an OSError
+        # SerialException is a subclass of OSError, termios.error is not: open() lets it through.
+        except (OSError, ValueError, termios.error) as error:
             raise ConsoleError(_cannot_open(device, error)) from None
 
     def __enter__(self) -> WearableConsole:
