@@ -133,6 +133,14 @@ class DatagramSender:
         self.sent += left
         self.dropped += len(datagrams) - left
 
+    @property
+    def source(self) -> tuple[str, int] | None:
+        """Address and port that its datagrams come from; None: it is not open."""
+        if self._socket is None:
+            return None
+        host, port = self._socket.getsockname()
+        return str(host), int(port)
+
     def close(self) -> None:
         if self._socket is not None:
             self._socket.close()

@@ -117,6 +117,10 @@ class Senders:
                 self._sent[place] = label.count
                 sender.send_datagrams((art_net_timecode.packed(label),), now)
 
+    def sent(self, address: tuple[str, int]) -> bool:
+        """Whether a datagram from there is one of these: broadcasts come back to this machine."""
+        return any(sender.source == address for _, sender in self._receivers)
+
     def close(self) -> None:
         for _, sender in self._receivers:
             sender.close()
@@ -359,6 +363,8 @@ class Remote:
             found = None if self._port is None else self._port.take()
             if found is None:
                 return
+            if self._senders.sent(found[1]):
+                continue
             with contextlib.suppress(ValueError):
                 if (label := art_net_timecode.label_in(found[0])) is not None:
                     self.follower.clock.hear(label, now)

@@ -65,6 +65,23 @@ def test_what_cannot_be_heard_is_told(tmp_path: Path) -> None:
     remote.close()
 
 
+def test_a_box_does_not_follow_the_code_that_it_sends_itself(tmp_path: Path) -> None:
+    """A broadcast comes back to the machine that sends it: the code never ended, and hid the desk's."""
+    (port,) = free_ports(1)
+    text = f"timecode: {{source: art-net, port: {port}, send: [{{host: {HOST}, port: {port}}}]}}\n"
+    remote = remote_of(tmp_path, text, [], Fallbacks(OF_THE_REMOTE))
+    states = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as desk:
+        for count in range(250):
+            if count < 25:
+                label = art_net_timecode.packed(at(3600.0 + count / 25, BY_NAME["25"]))
+                desk.sendto(label, (HOST, port))
+            remote.turn(100.0 + count / 25)
+            states.append(remote.report(100.0 + count / 25)["state"])
+    assert (states[24], states[-1]) == ("running", "absent")
+    remote.close()
+
+
 def test_a_motor_fader_follows_its_lever_but_not_the_hand_on_it(tmp_path: Path) -> None:
     desk, own = pty.openpty()
     tty.setraw(own)
