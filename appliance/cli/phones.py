@@ -97,7 +97,7 @@ def invitation(codes: JoinCodes, origin: str, name: str, with_picture: bool) -> 
     """Lines that let one phone be this sensor. Raises KeyError for another name, and OSError."""
     from appliance.console.phone_address import phone_address, squares
 
-    address = phone_address(origin, name, codes.new_code(name, time.time()))
+    address = phone_address(origin, name, codes.new_code(name, time.monotonic()))
     if with_picture:
         yield from _blocks(squares(address))
     yield f"A phone in this machine's network becomes {name} at {address}"

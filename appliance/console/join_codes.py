@@ -21,7 +21,9 @@ _LARGEST = 1 << 14
 
 @dataclass(frozen=True)
 class _Admission:
-    """A sensor's code and its phone. until: Unix seconds; digest: of the pass that the last code became."""
+    """A sensor's code and its phone. until: monotonic seconds, because the other clock may be set meanwhile;
+    digest: of the pass that the last code became.
+    """
 
     name: str
     code: str = ""
@@ -67,7 +69,7 @@ class JoinCodes:
         """The pass of the phone that has this code, which is used up with it; "": the code is not valid."""
         self._look()
         found = self._of.get(name)
-        if found is None or not found.code or now > found.until:
+        if found is None or not found.code or not 0.0 <= found.until - now < VALID_S + 1.0:
             return ""
         if not secrets.compare_digest(code.encode(errors="replace"), found.code.encode()):
             return ""

@@ -192,7 +192,7 @@ class Phones:
         values = await said(request)
         place = self._place(values.get("name"))
         try:
-            code = self._codes.new_code(place.name, time.time())
+            code = self._codes.new_code(place.name, time.monotonic())
         except (KeyError, OSError):
             raise web.HTTPServiceUnavailable(
                 text="No code can be kept in the runtime folder. Free memory there."
@@ -241,7 +241,7 @@ class Phones:
             headers = {"Retry-After": str(math.ceil(wait_s))}
             raise web.HTTPTooManyRequests(text="Too many wrong codes. Wait a minute.", headers=headers)
         try:
-            token = self._codes.use(name, code[:64], time.time())
+            token = self._codes.use(name, code[:64], time.monotonic())
         except OSError:
             raise web.HTTPServiceUnavailable(
                 text="No phone can be noted in the runtime folder. Free memory there."
