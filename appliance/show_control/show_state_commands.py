@@ -16,6 +16,7 @@ from appliance.levers.table import (
     CAMERA,
     CUE,
     GO_FADE_S,
+    GOAL,
     GOING,
     HAND,
     LEVERS,
@@ -144,6 +145,13 @@ def _points(show_state: ShowState, command: Command, facts: Facts | None, now: f
     return show_state.to(PATH_POINTS, command.values, now), PATH_POINTS.said(command.values, 0.0)
 
 
+def _goal(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    _require(GOAL, (), command, facts)
+    if len(command.values) == 1:
+        raise ValueError("/goal takes x and z in metres, or nothing: z is missing.")
+    return show_state.to(GOAL, command.values, now), GOAL.said(command.values, 0.0)
+
+
 def _again(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     if not any(source in danced(facts).phrases for source in MADE):
         raise ValueError("This show has no source that is made ahead: show.yaml names them under motion.")
@@ -173,6 +181,7 @@ OWN: dict[str, Declaration] = {
     "/cue": _cue,
     "/camera/look": _camera_of_look,
     "/hold": _hold,
+    "/goal": _goal,
     "/motion/path": _points,
     "/motion/again": _again,
     "/player/start": _start,

@@ -101,6 +101,8 @@ def test_a_puppet_goes_to_its_goal_and_stays_there(tmp_path: Path) -> None:
     for _ in range(100):
         night.dance(1)
         assert np.linalg.norm(night.parts.led.frame.root[[0, 2]] - goal) < 0.1
+    with pytest.raises(ValueError, match="z is missing"):
+        night.command("/goal", 3.0)
     night.command("/goal")
     before = night.parts.led.frame.root.copy()
     night.dance(50)
