@@ -33,7 +33,8 @@ def label_in(packet: bytes) -> Timecode | None:
 def open_port(host: str, port: int = PORT) -> socket.socket:
     """The port, shared with this box's own Art-Net wires, which send from it. Raises OSError.
 
-    Those are connected to their nodes, so that whatever comes from other machines comes here.
+    Those are connected to their nodes, so that whatever comes from other machines comes here; of a machine
+    that is such a node only broadcasts do.
     """
     one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
