@@ -63,9 +63,7 @@ _IDLE_S = 0.2  # how often the stage is looked for while no browser shows the da
 _NICER = 10
 _LAST_REQUESTS_S = 0.5
 _WAITING_CONNECTIONS = 256
-_NAMED_S = (
-    5.0  # how often the certificate is looked at: a network that comes after the page has an address too
-)
+_NAMED_S = 5.0  # how often the certificate is looked at: a network may come after the page
 
 
 def run_console(settings: Settings) -> int:
