@@ -25,18 +25,21 @@ from appliance.stage.stage_error import StageError
 
 FROM_PAGE = "page"  # the folder below /data/bunraku in which the page's box file arrives, as from a stick
 _EMPTY = "# The box file of this venue; for what it leaves out the box has values built in.\n"
+_CHANGED = "Another device has changed the box file meanwhile. Read it again, then change it."
 _AT_ONCE, _LATER = 0.0, float("inf")
 
 
 class Change(NamedTuple):
     """text: the whole file; values: (location, value) of keys to set in it; now: restart with it at once;
-    sure: what would shut people out, or let everybody in, was asked and answered.
+    sure: what would shut people out, or let everybody in, was asked and answered; read: the file as it was
+    when the browser read it, None: whatever it was.
     """
 
     text: str
     values: list[tuple[list[str | int], Any]]
     now: bool = False
     sure: bool = False
+    read: str | None = None
 
     def applied(self) -> str:
         """The text with the values. Raises ValueError."""
@@ -58,11 +61,15 @@ def reported(box: Path | None, chosen: Path | None) -> dict[str, Any]:
     config = load_box(place if place.exists() else None)
     return {
         "file": str(place),
-        "text": place.read_text(encoding="utf-8-sig") if place.exists() else _EMPTY,
+        "text": _text(place),
         "keys": [one._asdict() for one in venue_keys(config)],
         **_receivers(config),
         "at_once": chosen is not None,
     }
+
+
+def _text(place: Path) -> str:
+    return place.read_text(encoding="utf-8-sig") if place.exists() else _EMPTY
 
 
 def _receivers(config: BoxConfig) -> dict[str, Any]:
@@ -83,6 +90,8 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
     place = _place(box, chosen)
     if place is None:
         raise StageError("This box has no box file that could be changed.")
+    if wanted.read is not None and wanted.read != _text(place):
+        return {"problems": [{"line": 0, "message": _CHANGED}]}
     try:
         text = wanted.applied()
         config = _checked(place, text)

@@ -62,13 +62,14 @@ class Venue:
         return await self._done("box_file")
 
     async def _change(self, request: web.Request) -> web.Response:
-        values = await said(request, 2 * _LARGEST_FILE)
-        text, keys = values.get("text"), values.get("values", [])
+        values = await said(request, 4 * _LARGEST_FILE)
+        text, keys, read = values.get("text"), values.get("values", []), values.get("read")
         now, sure = values.get("now", False), values.get("sure", False)
         switches = isinstance(now, bool) and isinstance(sure, bool)
-        if not isinstance(text, str) or not switches or not _are_values(keys):
+        if not isinstance(text, str) or not switches or not _are_values(keys) or not _is_text(read):
             raise web.HTTPBadRequest(text="A change is a text, values of keys, and whether it counts now.")
-        wanted = {"text": text, "values": keys, "now": now and self._is_installed, "sure": sure}
+        now = now and self._is_installed
+        wanted = {"text": text, "values": keys, "now": now, "sure": sure, "read": read}
         return await self._done("change_box_file", change=wanted)
 
     async def _dance_again(self, request: web.Request) -> web.Response:
@@ -115,6 +116,10 @@ class Venue:
         if json.loads(answer).get("anew"):
             asyncio.get_running_loop().call_later(_ANSWERED_S, self._anew.touch)
         return web.Response(body=answer, content_type="application/json")
+
+
+def _is_text(read: object) -> bool:
+    return read is None or isinstance(read, str)
 
 
 def _are_values(values: object) -> bool:

@@ -33,3 +33,16 @@ def test_a_change_while_a_stick_is_checked_says_what_to_wait_for(
         assert capsys.readouterr().err == (
             "bunraku: The box is checking a show from a stick. Try again in a few minutes.\n"
         )
+
+
+def test_a_change_that_another_device_made_meanwhile_is_not_lost(tmp_path: Path) -> None:
+    box = tmp_path / "box.yaml"
+    box.write_text("limits: {tick_budget_ms: 10}\n")
+    read = box_file.reported(box, None)["text"]
+    first = box_file.Change(read, [(["control"], {"port": 9102})], read=read)
+    assert not box_file.change(box, None, first)["problems"]
+    written = box.read_text()
+    second = box_file.Change(read, [(["limits", "tick_budget_ms"], 12)], read=read)
+    (problem,) = box_file.change(box, None, second)["problems"]
+    assert "changed the box file meanwhile" in problem["message"] and box.read_text() == written
+    assert not box_file.change(box, None, second._replace(read=None))["problems"], "a program may do so"

@@ -94,6 +94,12 @@ def test_a_venue_changes_its_ports_and_a_mistake_has_its_line(tab: Tab, venue: t
     press(tab, "#file-check")
     expect(tab.locator("#file-said")).to_contain_text("counts from the next start")
     assert path.read_text() == before
+    others = f"{before}# by another device\n"
+    path.write_text(others)
+    press(tab, "#file-check")
+    expect(tab.locator("#file-problems")).to_contain_text("Another device has changed the box file")
+    assert path.read_text() == others
+    path.write_text(before)
 
 
 @ON_BOTH

@@ -143,7 +143,7 @@ async function save(now) {
   showSentence(words("file_checking"), []);
   const buttons = [byId("file-check"), byId("file-now")];
   for (const button of buttons) button.disabled = true;
-  const wanted = { text: byId("file-text").value, values: changed(), now };
+  const wanted = { text: byId("file-text").value, values: changed(), now, read: file.text };
   const sure = asked === JSON.stringify(wanted);  // the same once more answers its questions
   asked = "";
   const answer = await ask("/api/box/file", { ...wanted, sure }, CHECKED_WITHIN_MS);
@@ -155,7 +155,8 @@ async function save(now) {
     asked = JSON.stringify(wanted);
     return showSentence(words("file_sure"), asks.map((one) => ({ message: one })));
   }
-  if (!now) await readFile();
+  if (now) file.text = null; // the box starts anew: what it has now is this device's own change
+  else await readFile();
   return showSentence(translated(said), []);
 }
 
