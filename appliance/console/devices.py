@@ -13,7 +13,7 @@ from appliance.box.record import WholeFile
 from appliance.pose.foreign_file import plain_json
 
 DIGITS, LONG_DIGITS = 6, 10
-MOST_DEVICES = 32  # the one that was not seen for the longest time gives way
+MOST_DEVICES = 32  # beyond it the one that gave the PIN first gives way
 LONGEST_NAME = 40
 FREE_TRIES, PAUSE_S, LONGEST_PAUSE_S = 5, 60.0, 900.0
 MOST_WRONG = 1000  # wrong PINs of all addresses, in a day: then a million PINs are too few
