@@ -67,7 +67,7 @@ def _line(line: socket.SocketIO) -> str:
 class ProjectorPower:
     """One projector, in a thread that asks it again and again, so that it also follows a power cut.
 
-    wanted: True on, False off, None: as it is.
+    wanted: True on, False off, None: as it is. One that went off and is switched on by hand stays on.
     """
 
     def __init__(
@@ -77,14 +77,14 @@ class ProjectorPower:
         self.wanted: bool | None = None
         self.seen = Seen()
         self._port, self._password, self._look_s = port, password, look_s
-        self._now, self._is_over = threading.Event(), False
+        self._now, self._is_over, self._went_off = threading.Event(), False, False
         self._thread = threading.Thread(target=self._keep, name=f"projector {host}", daemon=True)
         self._thread.start()
 
     def want(self, on: bool) -> None:
         """Switch it, at once and from now on."""
         if on != self.wanted:
-            self.wanted = on
+            self.wanted, self._went_off = on, False
             self._now.set()
 
     def close(self) -> None:
@@ -103,14 +103,16 @@ class ProjectorPower:
         try:
             (answer,) = ask(self.host, self._port, self._password, "POWR ?")
             state = _STATES.get(answer, "unknown")
-            away = {True: "off", False: "on"}.get(self.wanted) if self.wanted is not None else None
-            if state == away:
-                ask(self.host, self._port, self._password, f"POWR {int(bool(self.wanted))}")
-                state = "warming" if self.wanted else "cooling"
+            wanted = self.wanted
+            if (state == "off" and wanted) or (state == "on" and wanted is False and not self._went_off):
+                ask(self.host, self._port, self._password, f"POWR {int(bool(wanted))}")
+                state = "warming" if wanted else "cooling"
+            self._went_off = self._went_off or (wanted is False and state == "off")
             errors = self._errors(state)
         except PjLinkError as error:
             return Seen(state, str(error))
         except OSError as error:
+            self._went_off = False  # after a power cut some go on by themselves
             return Seen(trouble=f"does not answer ({error.strerror or error})")
         faults = [name for name, level in zip(_ERRORS, errors, strict=False) if level == "2"]
         return Seen(state, f"reports a fault: {', '.join(faults)}" if faults else "")

@@ -265,6 +265,24 @@ def test_a_projector_that_tells_no_errors_in_standby_is_switched_on(projector: P
     power.close()
 
 
+def test_a_projector_that_is_switched_on_after_hours_stays_on(projector: Projector) -> None:
+    """By hand, for a rehearsal; the next change counts again."""
+    power = ProjectorPower(HOST, projector.port, look_s=0.05)
+    projector.state = "1"
+    power.want(False)
+    wait_until(lambda: projector.state == "2", lambda: str(power.seen))
+    projector.state = "0"
+    wait_until(lambda: power.seen.state == "off", lambda: str(power.seen))
+    projector.state = "1"
+    wait_until(lambda: power.seen.state == "on", lambda: str(power.seen))
+    time.sleep(0.2)
+    assert projector.state == "1"
+    power.want(True)
+    power.want(False)
+    wait_until(lambda: projector.state == "2", lambda: str(power.seen))
+    power.close()
+
+
 def test_a_greeting_that_is_cut_off_is_told_and_asked_again(projector: Projector) -> None:
     whole, projector.greeting = projector.greeting, b"PJLINK 1\r"
     power = ProjectorPower(HOST, projector.port, "secret", look_s=0.05)
