@@ -333,6 +333,15 @@ def test_many_zeros_are_counted_after_some(tmp_path: Path) -> None:
     assert said.count("taken as not seen") == 10 and "And 5 more such points and times." in said
 
 
+def test_a_bone_whose_ends_were_never_seen_together_has_a_length(tmp_path: Path) -> None:
+    meant = moved(body(), seconds=1.0)
+    hand = meant.skeleton.index("LeftHand")
+    holed = points_of(meant)
+    holed[:25, hand], holed[25:, meant.skeleton.parents[hand]] = np.nan, np.nan
+    found = imported(tmp_path, holed, meant.skeleton.names)[0]
+    assert np.isfinite(found.poses).all() and 0 < np.linalg.norm(found.skeleton.offsets[hand]) < 1
+
+
 def test_infinite_places_are_gaps(tmp_path: Path) -> None:
     meant = moved(body(), seconds=1.0)
     holed = points_of(meant)

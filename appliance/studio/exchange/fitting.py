@@ -63,8 +63,7 @@ def fit_skeleton(
     directions: (J, 3) where bones point at rest; left out: as in the first frame that has all the points.
     Several bones at one joint keep the angles that they mostly have.
     """
-    bones = points[:, 1:] - points[:, list(parents[1:])]
-    lengths = np.concatenate([[0.0], np.nanmedian(np.linalg.norm(bones, axis=-1), axis=0)])
+    lengths = np.concatenate([[0.0], _usual_lengths(points, parents)])
     whole = without_gaps(points)
     stands = directions is not None
     if directions is None:
@@ -92,8 +91,7 @@ def fit_skeleton(
 
 def like(model: Skeleton, points: Array) -> Skeleton:
     """The model with its bones as long as in points (N, J, 3) of the same joints."""
-    bones = points[:, 1:] - points[:, list(model.parents[1:])]
-    lengths = np.nanmedian(np.linalg.norm(bones, axis=-1), axis=0)
+    lengths = _usual_lengths(points, model.parents)
     offsets = np.array(model.offsets, dtype=np.float64)
     own = np.linalg.norm(offsets[1:], axis=-1)
     scale = np.where(own > 1e-9, lengths / np.where(own > 1e-9, own, 1.0), 1.0)
@@ -101,6 +99,20 @@ def like(model: Skeleton, points: Array) -> Skeleton:
     size = float(np.median(scale)) if len(scale) else 1.0
     ends = tuple((joint, (x * size, y * size, z * size)) for joint, (x, y, z) in model.ends)
     return Skeleton(model.names, model.parents, offsets, ends)
+
+
+def _usual_lengths(points: Array, parents: Sequence[int]) -> Array:
+    """(J - 1,): median lengths of bones in points (N, J, 3), over gaps where no frame has both ends."""
+
+    def lengths(places: Array) -> Array:
+        found: Array = np.linalg.norm(places[:, 1:] - places[:, list(parents[1:])], axis=-1)
+        return found
+
+    seen = lengths(points)
+    if (never := np.isnan(seen).all(axis=0)).any():
+        seen[:, never] = lengths(without_gaps(points))[:, never]
+    usual: Array = np.nanmedian(seen, axis=0)
+    return usual
 
 
 def children_of(parents: Sequence[int]) -> list[list[int]]:
