@@ -81,6 +81,8 @@ def test_lines_are_read_from_csv_and_svg(tmp_path: Path) -> None:
     table = tmp_path / "line.csv"
     table.write_text("x,y\n0.5, 1\n# a corner\n-2;0.25\n")
     np.testing.assert_allclose(read_line(table), [[0.5, 1], [-2, 0.25]])
+    table.write_text("0,5; 1\n-2;0,25\n", "utf-8-sig")  # as spreadsheets of many countries save it
+    np.testing.assert_allclose(read_line(table), [[0.5, 1], [-2, 0.25]])
     drawing = tmp_path / "line.svg"
     drawing.write_text(
         '<svg xmlns="http://www.w3.org/2000/svg" width="400" height="200" viewBox="-200 -100 400 200">'

@@ -8,6 +8,7 @@ import numpy as np
 
 from appliance.pose.foreign_file import opened
 from appliance.pose.quaternion import Array
+from appliance.studio.exchange.table_reading import separator_of
 from appliance.studio.studio_error import StudioError
 
 UNITS = 100.0  # units of map.svg for one unit of the map; its y points down
@@ -27,10 +28,11 @@ def read_line(file: Path) -> Array:
 
 
 def _of_csv(file: Path) -> Array:
-    """Lines 'x, y'; a first line of words and anything after a '#' are ignored."""
+    """Lines 'x, y', or 'x; y' with decimal commas; a first line of words and comments are left out."""
     points: list[tuple[float, float]] = []
-    for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
-        cells = line.partition("#")[0].replace(";", ",").split(",")
+    for number, line in enumerate(file.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 1):
+        mark = separator_of(line)
+        cells = [cell.replace(",", ".") for cell in line.partition("#")[0].split(mark)]
         if not "".join(cells).strip():
             continue
         try:
