@@ -108,6 +108,8 @@ def main() -> None:
     given = parser.parse_args()
     if (given.to is None) == (given.save is None):
         parser.error("give --to ADDRESS or --save FILE")
+    if given.save and not Path(given.save).resolve().parent.is_dir():
+        parser.error(f"there is no folder for {given.save}")
     find, sent, missed, frames = landmarker(given.model), 0, 0, list[dict[str, Any]]()
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     with contextlib.suppress(KeyboardInterrupt):

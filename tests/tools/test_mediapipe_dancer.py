@@ -102,3 +102,10 @@ def test_it_runs_by_itself_without_bunraku_or_mediapipe(tmp_path: Path) -> None:
         [sys.executable, "-I", "-S", str(script), "--help"], capture_output=True, text=True, cwd=tmp_path
     )
     assert done.returncode == 0 and "--camera" in done.stdout, done.stderr
+
+
+def test_a_file_for_which_there_is_no_folder_is_refused_before_the_video(tmp_path: Path) -> None:
+    script, out = ROOT / "tools" / "mediapipe_dancer.py", tmp_path / "no" / "dance.json"
+    asked = [sys.executable, str(script), "--camera", "dance.mp4", "--save", str(out)]
+    result = subprocess.run(asked, capture_output=True, text=True)
+    assert result.returncode == 2 and "there is no folder" in result.stderr
