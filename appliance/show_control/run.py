@@ -113,7 +113,7 @@ class ControlProcess:
 
         The clock is read after each datagram: this process may have been held up while it received one.
         """
-        self._foreign.take(self._monotonic())
+        self._guarded(lambda: self._foreign.take(self._monotonic()))
         taken = 0
         while taken < _AT_ONCE and (found := self._intake.take()) is not None:
             taken += 1
@@ -126,14 +126,18 @@ class ControlProcess:
             self.handler.handle_datagram(*found, now := self._monotonic())
             if now > ends_at:
                 break
-        try:
-            self._look_after()
-        except Exception as error:  # whatever the others publish: PANIC is heard
-            self.handler.note_failure("", error, self._monotonic())
-            time.sleep(_REST_S)
+        self._guarded(self._look_after)
         if message := self._failures(self._monotonic()):
             self._say(message)
         if taken == _AT_ONCE:
+            time.sleep(_REST_S)
+
+    def _guarded(self, step: Callable[[], None]) -> None:
+        """An error about data of other programs is noted, and PANIC is heard."""
+        try:
+            step()
+        except Exception as error:
+            self.handler.note_failure("", error, self._monotonic())
             time.sleep(_REST_S)
 
     def _look_after(self) -> None:

@@ -170,3 +170,16 @@ def test_another_show_does_not_get_what_was_declared_for_the_one_before(
         now = process.handler.show_state
         assert (now.show, now[ITERATIONS].value) == ("Another", (4, 3))
         assert now[ITERATIONS].generation == now.generation
+
+
+def test_an_error_about_a_foreign_sensor_is_told_and_commands_are_heard(
+    process: ControlProcess, asker: Asker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(now: float) -> None:
+        raise IndexError("list index out of range")
+
+    monkeypatch.setattr(process._foreign, "take", fails)
+    asker.tell("/ping")
+    process.turn()
+    assert asker.hear() == ["/pong"]
+    assert "IndexError" in process.handler.failure

@@ -91,7 +91,7 @@ class BoneSource:
             try:
                 turned = read_orientation("xyzw", arguments[1:8])
             except ValueError as error:
-                raise ValueError(f"{address} {arguments[0]}: {error}") from None
+                raise ValueError(f"{address} {arguments[0] if arguments else ''}: {error}") from None
             if address in (BONE, ROOT):
                 self._known[name] = now, turned
                 came |= name == self._bone

@@ -122,6 +122,17 @@ def test_a_bone_turns_with_the_bones_above_it() -> None:
     assert source.hear(frame[:2], 6.0) is None
 
 
+@pytest.mark.parametrize("address", ["/VMC/Ext/Root/Pos", "/VMC/Ext/Bone/Pos"])
+def test_a_message_of_vmc_without_arguments_is_refused_or_passed_over(address: str) -> None:
+    """The root's raised an IndexError, which ended show control."""
+    source = SourceSettings("hand", "vmc", bone="LeftLowerArm").source()
+    if address.endswith("Bone/Pos"):
+        assert source.hear([(address, [])], 0.0) is None
+        return
+    with pytest.raises(ValueError, match=address):
+        source.hear([(address, [])], 0.0)
+
+
 def test_a_tracker_has_its_orientation_in_the_room() -> None:
     source = SourceSettings("arm", "slimevr", bone="human://LEFT_HAND").source()
     frame = [bone("Hips", *LEFT_45), bone("human://LEFT_HAND", *LEFT_45, kind="Tra")]
