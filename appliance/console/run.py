@@ -130,7 +130,7 @@ async def _serve(settings: Settings) -> int:
         asyncio.create_task(phones.watch()),
         asyncio.create_task(night.watch()),
         *_reporting(folder, box, fallbacks),
-        *([] if context is None else [asyncio.create_task(_renew(context, settings))]),
+        *([] if context is None else [asyncio.create_task(_renew(context, settings, door))]),
         asyncio.create_task(stopped.wait()),
     ]
     ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -173,16 +173,21 @@ def _certificate(settings: Settings) -> Path:
     return certificate_in(Path(settings.devices).parent, names)
 
 
-async def _renew(context: ssl.SSLContext, settings: Settings) -> None:
-    """For the connections from now on; where none can be made, the one before goes on."""
+async def _renew(context: ssl.SSLContext, settings: Settings, door: Door) -> None:
+    """For the connections from now on; where none can be made, the one before goes on.
+
+    Not while a browser has the page open: it may have accepted that one, and would refuse another, PANIC too.
+    """
     served = -1
     while True:
+        await asyncio.sleep(_NAMED_S)
+        if len(door):
+            continue
         with contextlib.suppress(OSError):
             path = await asyncio.to_thread(_certificate, settings)
             if (made := path.stat().st_mtime_ns) != served:
                 context.load_cert_chain(path)
                 served = made
-        await asyncio.sleep(_NAMED_S)
 
 
 async def _pulse(notifier: Notifier, health: ProcessHealthWriter) -> None:

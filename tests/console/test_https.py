@@ -8,6 +8,7 @@ import json
 import re
 import socket
 import ssl
+import time
 from pathlib import Path
 
 import pytest
@@ -121,8 +122,12 @@ def test_a_network_that_comes_after_the_page_is_in_its_certificate(tmp_path: Pat
         command = [*BUNRAKU, "console", "--box", box_file]
         with Process(tmp_path / "page.txt", command) as process:
             wait_until(lambda: served(port), lambda: process.output)
-            Cable(box, f"{address}/24", phone, "10.77.0.2/24")
-            wait_until(trusts, lambda: process.output)
+            anyone = ssl._create_unverified_context()
+            with socket.create_connection((HOST, port)) as plain, anyone.wrap_socket(plain):
+                Cable(box, f"{address}/24", phone, "10.77.0.2/24")
+                time.sleep(12.0)
+                assert not trusts(), "a browser that has the page open keeps what it has accepted"
+            wait_until(trusts, lambda: process.output, lambda: time.sleep(10.0))
 
 
 def test_what_cannot_be_used_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
