@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -132,6 +133,8 @@ class TrainingLoop(ABC, Generic[Report]):
         partial = path.with_suffix(".partial")
         try:
             torch.save(self.state(), partial)
+            with partial.open("rb+") as written:
+                os.fsync(written.fileno())  # else a power cut may leave the new name without the content
             partial.replace(path)
         except (OSError, RuntimeError) as error:  # torch's writer says RuntimeError for a full disk
             partial.unlink(missing_ok=True)
