@@ -191,11 +191,12 @@ def test_the_prior_draws_the_latent_to_a_standard_gaussian(dancer: Dataset) -> N
 def test_a_checkpoint_is_on_the_disk_before_it_takes_the_place_of_the_one_before(
     dancer: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    synced: list[str] = []
-    monkeypatch.setattr(os, "fsync", lambda number: synced.append(os.readlink(f"/proc/self/fd/{number}")))
+    synced: list[Path] = []
+    opened = Path("/proc/self/fd")
+    monkeypatch.setattr(os, "fsync", lambda number: synced.append((opened / str(number)).readlink()))
     training = Training(dancer, replace(TINY, network="mlp"))
     training.save_checkpoint(tmp_path / "checkpoint.pt")
-    assert synced == [str(tmp_path / "checkpoint.partial")]
+    assert synced == [tmp_path / "checkpoint.partial"]
 
 
 def test_a_checkpoint_gives_the_averaged_network(dancer: Dataset, tmp_path: Path) -> None:
