@@ -8,7 +8,7 @@ import json
 import socketserver
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
@@ -147,8 +147,8 @@ def test_a_report_that_is_refused_is_a_fallback_until_it_arrives(
 def test_tries_come_ever_later_and_what_waits_is_bounded() -> None:
     tries: list[int] = []
 
-    def refused(reported: object) -> None:
-        tries.append(len(str(reported)))
+    def refused(reported: Mapping[str, Any]) -> None:
+        tries.append(len(reported["text"]))
         raise OSError("no route")
 
     async def look() -> list[float]:
