@@ -119,8 +119,9 @@ def test_a_taken_port_says_what_to_do_also_while_sensors_are_linked(link: Sensor
 
 
 def test_an_impossible_address_says_what_to_do() -> None:
-    with pytest.raises(PortError, match="cannot be opened"):
+    with pytest.raises(PortError, match="cannot be opened") as told:
         UdpIntake("no.such.host.invalid", 9750)
+    assert "second bunraku" not in str(told.value), "no other box has the port"
 
 
 def test_an_address_that_comes_later_is_listened_to(monkeypatch: pytest.MonkeyPatch) -> None:

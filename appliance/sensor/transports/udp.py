@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from typing import Any
 
+from appliance.box.served import port_cure
 from appliance.sensor import wire
 from appliance.sensor.transports.transport import LONGEST_STOP_S, Origin
 
@@ -223,8 +224,8 @@ def _prepare(one: socket.socket, buffer_bytes: int) -> bool:
 
 
 def _advice(host: str, port: int, error: Exception) -> str:
-    reason = (error.strerror if isinstance(error, OSError) else None) or error
+    known = error if isinstance(error, OSError) else OSError()
     return (
-        f"UDP port {port} on {host} cannot be opened for sensors ({reason}). Nothing dances. "
-        "Is a second bunraku running? Stop it, or give another port or host under sensors: udp: in box.yaml."
+        f"UDP port {port} on {host} cannot be opened for sensors ({known.strerror or error}). Nothing dances. "
+        f"{port_cure(known, 'sensors: udp')}"
     )
