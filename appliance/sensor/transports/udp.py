@@ -226,6 +226,6 @@ def _prepare(one: socket.socket, buffer_bytes: int) -> bool:
 def _advice(host: str, port: int, error: Exception) -> str:
     known = error if isinstance(error, OSError) else OSError()
     return (
-        f"UDP port {port} on {host} cannot be opened for sensors ({known.strerror or error}). Nothing dances. "
-        f"{port_cure(known, 'sensors: udp')}"
+        f"UDP port {port} on {host} cannot be opened for sensors ({known.strerror or error}). "
+        f"Nothing dances. {port_cure(known, 'sensors: udp')}"
     )
