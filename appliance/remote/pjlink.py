@@ -107,7 +107,8 @@ class ProjectorPower:
             if (state == "off" and wanted) or (state == "on" and wanted is False and not self._went_off):
                 ask(self.host, self._port, self._password, f"POWR {int(bool(wanted))}")
                 state = "warming" if wanted else "cooling"
-            self._went_off = self._went_off or (wanted is False and state == "off")
+            if wanted is False and state == "off":
+                self._went_off = True
             errors = self._errors(state)
         except PjLinkError as error:
             return Seen(state, str(error))

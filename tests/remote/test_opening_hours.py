@@ -267,10 +267,10 @@ def test_a_projector_that_tells_no_errors_in_standby_is_switched_on(projector: P
 
 def test_a_projector_that_is_switched_on_after_hours_stays_on(projector: Projector) -> None:
     """By hand, for a rehearsal; the next change counts again."""
-    power = ProjectorPower(HOST, projector.port, look_s=0.05)
     projector.state = "1"
+    power = ProjectorPower(HOST, projector.port, look_s=0.05)
     power.want(False)
-    wait_until(lambda: projector.state == "2", lambda: str(power.seen))
+    wait_until(lambda: power.seen.state == "cooling", lambda: str(power.seen))
     projector.state = "0"
     wait_until(lambda: power.seen.state == "off", lambda: str(power.seen))
     projector.state = "1"
