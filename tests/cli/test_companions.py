@@ -257,6 +257,8 @@ def test_a_show_control_that_hangs_is_started_again_and_told(tmp_path: Path) -> 
             "console": "appliance.console",
             "keeper": "keep",
         }
+        health = ProcessHealth(box.runtime)  # one that has not reported yet is not known to have been there
+        wait_until(lambda: kinds.keys() <= {one.process for one in health.members(time.monotonic())})
         stopped = {name: children_running(box.process.pid, kind)[0] for name, kind in kinds.items()}
         for process in stopped.values():
             os.kill(process, signal.SIGSTOP)
@@ -266,7 +268,6 @@ def test_a_show_control_that_hangs_is_started_again_and_told(tmp_path: Path) -> 
             assert f"hung: it gave no sign for {WATCHDOG_S[name]:g} s" in box.output
         print(f"All started again {time.monotonic() - began:.1f} s after they stood still.")
         wait_until(page.is_open)
-        health = ProcessHealth(box.runtime)
         wait_until(
             lambda: (
                 {DIED[name].name for name in kinds}
