@@ -10,6 +10,7 @@ import zipfile
 import zlib
 from pathlib import Path, PurePosixPath
 
+from appliance.box.durable import replacing
 from appliance.release.arrivals import SHOW
 from appliance.show.bundle import CHECKSUMS, LARGEST_FILE, MOST_FILES, SIGNATURE, bundle_files, unlisted_files
 from appliance.stage.stage_error import StageError
@@ -24,17 +25,14 @@ _DAMAGED = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, E
 
 def pack_show(show: Path, path: Path) -> None:
     """Write the zip file; it is complete or not there at all. Raises OSError."""
-    part = path.with_suffix(".part")
-    part.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    try:
-        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed:
-            for name in (*bundle_files(show), CHECKSUMS, SIGNATURE):
-                if (show / name).is_file():
-                    packed.write(show / name, Path(_STICK, SHOW, name))
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)  # else a full disk stays full
-        raise
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with (
+        replacing(path) as stream,
+        zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed,
+    ):
+        for name in (*bundle_files(show), CHECKSUMS, SIGNATURE):
+            if (show / name).is_file():
+                packed.write(show / name, Path(_STICK, SHOW, name))
 
 
 def unpack_show(path: Path, folder: Path) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from appliance.remote.midi_messages import MidiParser
 from appliance.sensor.transports.udp import bind_early
+from appliance.show_control.midi_bindings import LONGEST_DEVICE
 from appliance.show_control.port import Port
 
 _COMMAND = b"\xff\xff"
@@ -25,7 +26,6 @@ _SILENT_S = (
 )
 _FEEDBACK_S = 1.0
 _MOST_SESSIONS = 8
-_LONGEST_NAME = 64  # a binding takes no longer device
 _AT_ONCE = 64
 _BYTES = {0x8: 2, 0x9: 2, 0xA: 2, 0xB: 2, 0xC: 1, 0xD: 1, 0xE: 2}
 _SYSTEM_BYTES = {0xF1: 1, 0xF2: 2, 0xF3: 1}
@@ -127,7 +127,7 @@ class NetworkMidi:
                 return
             if is_new:
                 name = received[_HEAD.size :].partition(b"\0")[0].decode("utf-8", "replace")
-                name = "".join(filter(str.isprintable, name))[:_LONGEST_NAME]
+                name = "".join(filter(str.isprintable, name))[:LONGEST_DEVICE]
                 self._sessions[sender] = _Session(name or address[0], now)
             session = self._sessions[sender]
             session.heard_at = now

@@ -17,7 +17,7 @@ from appliance.show_control.packet import Message
 FILE = "midi-bindings.json"
 MOST_BINDINGS = 256
 _LARGEST = 1 << 19  # bytes: as many of the longest names fit, in any script
-_LONGEST_DEVICE = 64
+LONGEST_DEVICE = 64  # characters of its name
 
 _KINDS = {0x8: "note", 0x9: "note", 0xB: "controller", 0xC: "program", 0xE: "pitch"}
 _HALF = 0.5
@@ -98,7 +98,7 @@ def checked(values: dict[str, Any]) -> Binding:
         raise ValueError("This is no binding.") from None
     if one.kind not in _KINDS.values() or not 1 <= one.channel <= 16 or not 0 <= one.number <= 127:
         raise ValueError("This is no control of a MIDI device.")
-    if len(one.device) > _LONGEST_DEVICE or len(one.name) > LONGEST_NAME:
+    if len(one.device) > LONGEST_DEVICE or len(one.name) > LONGEST_NAME:
         raise ValueError("The name is too long.")
     bounds = range_of(one.address)
     if bounds is not None:
