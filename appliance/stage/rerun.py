@@ -99,8 +99,11 @@ class _RecordedLink(SensorLink):
     def __init__(self, sensors: Sequence[str], own: SensorLink) -> None:
         """own: the link of this box, which has its keys."""
         super().__init__({}, ())
-        self._sensors, self.lets_in = sensors, own.lets_in  # type: ignore[method-assign]
+        self._sensors, self._own = sensors, own
         self._asked: tuple[set[str], bool] = set(), False
+
+    def lets_in(self, sensor: str) -> bool:
+        return self._own.lets_in(sensor)
 
     def answers(self, sensor: str | int, done: bool) -> None:
         """Whether the sensors were there when a person asked for something."""

@@ -248,12 +248,12 @@ def test_a_box_that_follows_reports_no_sensors_and_ages_by_the_leaders_clock(
 ) -> None:
     """It hears them by the ticks of the leader: bunraku doctor told people to provision or charge them."""
     stage, reported = evening.stage, list[dict[str, Any]]()
-    stage.parts.link.lets_in = lambda sensor: True  # type: ignore[method-assign]
+    monkeypatch.setattr(stage.parts.link, "lets_in", lambda sensor: True)
     heard = Rerun(stage.tick, stage.wearing, list(stage.parts.worn)).heard
     heard.answers("left-wrist", False)
     stage.parts.link = heard
     stage.parts.worn["left-wrist"][0].take_reading(RAISED, 5000.0)
-    stage.paired = follower(ahead_s=-4000.0)  # type: ignore[assignment]
+    monkeypatch.setattr(stage, "paired", follower(ahead_s=-4000.0))
     monkeypatch.setattr(stage.parts.outputs, "publish_health", reported.append)
     stage._publish_health(1000.5)
     (health,) = reported
@@ -267,7 +267,7 @@ def test_a_box_that_follows_says_once_that_it_is_ready(
     """It looks at the network some hundred times a second, and each time the supervisor was told."""
     said = list[str]()
     monkeypatch.setattr(evening.stage.notifier, "ready", lambda: said.append("ready"))
-    evening.stage.paired = follower(ahead_s=0.0)  # type: ignore[assignment]
+    monkeypatch.setattr(evening.stage, "paired", follower(ahead_s=0.0))
     for _ in range(100):
         assert not evening.stage._may_dance(TickClock(monotonic=lambda: 0.0))
     assert said == ["ready"]
