@@ -122,18 +122,14 @@ def publish(
 
 def late_candidate_problems(show: Path, box: Path) -> list[str]:
     """As `candidate_problems`, while another show dances."""
-    return candidate_problems(show, box, LATE_CHECK_S)
+    return candidate_problems(show, box, is_late=True)
 
 
-def candidate_problems(show: Path, box: Path, seconds: float | None = None) -> list[str]:
-    """Why a show and a box file cannot be danced here; checked in a process that may crash or hang.
-
-    seconds: how long it may take; None: CHECK_S, as while a box starts.
-    """
+def candidate_problems(show: Path, box: Path, is_late: bool = False) -> list[str]:
+    """Why a show and a box file cannot be danced here; checked in a process that may crash or hang."""
     import subprocess
 
-    seconds = CHECK_S if seconds is None else seconds
-
+    seconds = LATE_CHECK_S if is_late else CHECK_S
     command = (sys.executable, "-m", "appliance.cli.candidate", str(show), str(box))
     try:
         done = subprocess.run(

@@ -14,7 +14,7 @@ from appliance.pose.foreign_file import plain_json
 
 LARGEST_REQUEST = 4096  # bytes
 _SENT_WITHIN_S, _FILE_WITHIN_S = 20.0, 900.0
-SILENT_S = 30.0  # without a byte for so long the sender is gone: a phone that left the network says nothing
+SILENT_S = 30.0  # a sender that sends no byte in this time has left the network
 PART = 1 << 20
 
 
