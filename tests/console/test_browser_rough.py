@@ -32,41 +32,41 @@ def opened(browser: Browser, page: Page, script: str = "", **options: Any) -> It
 
 
 @pytest.fixture
-def alone(browser: Browser, page: Page) -> Iterator[Tab]:
+def tab(browser: Browser, page: Page) -> Iterator[Tab]:
     yield from opened(browser, page)
 
 
-def test_a_question_for_the_pin_that_is_cancelled_is_an_answer(alone: Tab) -> None:
+def test_a_question_for_the_pin_that_is_cancelled_is_an_answer(tab: Tab) -> None:
     """Else the button would say for ever that the file is being made."""
-    press(alone, '[data-page="box"]')
-    press(alone, "#help-make")
-    expect(alone.locator("#pin")).to_be_visible()
-    expect(alone.locator("#help-make")).to_be_disabled()
-    press(alone, "#pin-cancel")
-    expect(alone.locator("#help-make")).to_be_enabled()
-    expect(alone.locator("#help-said")).to_have_text(NO_PIN)
+    press(tab, '[data-page="box"]')
+    press(tab, "#help-make")
+    expect(tab.locator("#pin")).to_be_visible()
+    expect(tab.locator("#help-make")).to_be_disabled()
+    press(tab, "#pin-cancel")
+    expect(tab.locator("#help-make")).to_be_enabled()
+    expect(tab.locator("#help-said")).to_have_text(NO_PIN)
 
 
 def test_the_same_update_can_be_chosen_again_after_the_network_was_lost(
-    alone: Tab, page: Page, tmp_path: Path
+    tab: Tab, page: Page, tmp_path: Path
 ) -> None:
     package = tmp_path / "bunraku_1_arm64.deb"
     package.write_bytes(b"package")
     sent: list[str] = []
-    alone.route("**/api/update", lambda route: route.fulfill(json=READY))
-    alone.route("**/api/update/file*", lambda route: (sent.append(route.request.url), route.abort()))
-    unlock(alone, page)
-    press(alone, '[data-page="box"]')
+    tab.route("**/api/update", lambda route: route.fulfill(json=READY))
+    tab.route("**/api/update/file*", lambda route: (sent.append(route.request.url), route.abort()))
+    unlock(tab, page)
+    press(tab, '[data-page="box"]')
     for times in (1, 2):
-        alone.locator("#update-file").set_input_files(package)
-        expect(alone.locator("#update-said")).to_contain_text("does not answer")
+        tab.locator("#update-file").set_input_files(package)
+        expect(tab.locator("#update-said")).to_contain_text("does not answer")
         assert len(sent) == times
-        assert alone.evaluate("document.querySelector('#update-file').value") == "", "it would be no change"
-        alone.evaluate("document.querySelector('#update-said').textContent = ''")
+        assert tab.evaluate("document.querySelector('#update-file').value") == "", "it would be no change"
+        tab.evaluate("document.querySelector('#update-said').textContent = ''")
 
 
-def test_a_choice_says_what_is_new_about_it_and_stays_the_same_button(alone: Tab) -> None:
-    alone.evaluate(
+def test_a_choice_says_what_is_new_about_it_and_stays_the_same_button(tab: Tab) -> None:
+    tab.evaluate(
         """async () => {
           const { showChoices } = await import("/choices.js"), part = document.createElement("div");
           const shown = (label) => showChoices(part, part, [{ name: "mine", label, now: false }], () => {});
@@ -76,12 +76,12 @@ def test_a_choice_says_what_is_new_about_it_and_stays_the_same_button(alone: Tab
           window.told = [part.firstChild === before, part.textContent];
         }"""
     )
-    assert alone.evaluate("told") == [True, "2 files"]
+    assert tab.evaluate("told") == [True, "2 files"]
 
 
-def test_after_a_cue_that_was_called_again_go_calls_the_next(alone: Tab) -> None:
+def test_after_a_cue_that_was_called_again_go_calls_the_next(tab: Tab) -> None:
     """The cue in force is tapped, because the dancer begins anew; GO calls it, and must go on then."""
-    said = alone.evaluate(
+    said = tab.evaluate(
         """async () => {
           const { goOn, showCues } = await import("/cues.js"), own = window.fetch;
           window.fetch = async () => new Response('{"done": true, "message": ""}');
@@ -99,15 +99,15 @@ def test_after_a_cue_that_was_called_again_go_calls_the_next(alone: Tab) -> None
     assert said == ["storm", "calm", "storm"]
 
 
-def test_a_phone_whose_network_is_lost_without_a_word_asks_by_requests(alone: Tab) -> None:
+def test_a_phone_whose_network_is_lost_without_a_word_asks_by_requests(tab: Tab) -> None:
     """Its WebSocket stays open for minutes, and nothing of it arrives."""
     readings: list[str] = []
     answer = {"lamp": "none", "linked": True, "said": ""}
-    alone.route(
+    tab.route(
         "**/api/phones/reading",
         lambda route: (readings.append(route.request.url), route.fulfill(json=answer)),
     )
-    alone.evaluate(
+    tab.evaluate(
         """async () => {
           window.WebSocket = class extends EventTarget {
             static OPEN = 1;
@@ -121,10 +121,10 @@ def test_a_phone_whose_network_is_lost_without_a_word_asks_by_requests(alone: Ta
           link.take([1, 2, 3]);
         }"""
     )
-    assert not readings and not alone.evaluate("window.isGone ?? false")
-    await_true(alone, "window.isGone === true && link.answers > 0 && !link.isSilent")
+    assert not readings and not tab.evaluate("window.isGone ?? false")
+    await_true(tab, "window.isGone === true && link.answers > 0 && !link.isSilent")
     assert readings
-    alone.evaluate("link.close()")
+    tab.evaluate("link.close()")
 
 
 def test_a_browser_that_keeps_nothing_for_pages_shows_the_page(browser: Browser, page: Page) -> None:
