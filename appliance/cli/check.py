@@ -104,6 +104,7 @@ def verified_parts(directory: Path, box_file: Path | None) -> tuple[StageParts, 
     _refuse_damage(directory)
     show = load_show(directory)
     _refuse_misfits(show, box)
+    _refuse_missing_secret(box)
     parts = assemble(show, without_ports(box))
     verdict = admission(parts, box)
     parts.close()
@@ -189,6 +190,15 @@ def _refuse_misfits(show: Show, box: BoxConfig) -> None:
     ]
     if problems:
         raise ConfigError(problems)
+
+
+def _refuse_missing_secret(box: BoxConfig) -> None:
+    """Raises ConfigError where a box of several lacks their secret: its stage would not start."""
+    for section in (box.pair, box.locked):
+        if section is not None:
+            from appliance.stage.paired import secret_in
+
+            secret_in(section.secret)
 
 
 def without_ports(box: BoxConfig) -> BoxConfig:

@@ -57,17 +57,23 @@ TOLERANCE_DEGREES = 0.5  # between processors of two kinds; beyond it the leader
 
 def settings_of(config: PairConfig) -> PairSettings:
     """From the box file. Raises ConfigError for a missing or malformed secret."""
-    try:
-        key = bytes.fromhex(config.secret.read_text().strip())
-    except (OSError, ValueError):
-        key = b""
-    if len(key) != KEY_BYTES:
-        words = f"There is no pair's secret in {config.secret}."
-        cure = f"Make it: bunraku pair secret {config.secret}; and copy it to the other box."
-        raise ConfigError([Problem(Path(config.secret), 0, words, cure)])
+    key = secret_in(config.secret)
     name = "the second box" if config.role == "first" else "the first box"
     where = config.host, config.port, tuple(config.peer)
     return PairSettings(name, config.role == "first", *where, key, config.silent_ms / 1000.0)
+
+
+def secret_in(path: Path) -> bytes:
+    """The secret of a pair, or of boxes in step. Raises ConfigError where it is missing or malformed."""
+    try:
+        key = bytes.fromhex(path.read_text().strip())
+    except (OSError, ValueError):
+        key = b""
+    if len(key) != KEY_BYTES:
+        words = f"There is no pair's secret in {path}."
+        cure = f"Make it: bunraku pair secret {path}; and copy it to the other box."
+        raise ConfigError([Problem(path, 0, words, cure)])
+    return key
 
 
 def fingerprint_of(show: Show, facts: dict[str, Any]) -> bytes:

@@ -111,6 +111,19 @@ def test_check_reads_a_box_file_against_the_show(tmp_path: Path, bunraku: Comman
     assert "box.yaml:4: The show has no fixture 'wahs'. Did you mean 'wash'?" in output
 
 
+@pytest.mark.parametrize("section", ["pair: {role: first, peer: [127.0.0.2]", "locked: {leader: 127.0.0.2"])
+def test_check_and_play_refuse_a_box_without_the_secret_of_its_pair(
+    section: str, tmp_path: Path, bunraku: Command
+) -> None:
+    text = f"control: null\nsensors: {{udp: null}}\n{section}, secret: pair.key}}"
+    show, box = packed_show(tmp_path), write_box(tmp_path, text)
+    for command in (("check", show), ("play", "--alone", "--show", show, "--seconds", "0.2")):
+        said = bunraku(*command, "--box", box, status=2).err
+        assert f"Make it: bunraku pair secret {tmp_path / 'pair.key'}" in said
+    (tmp_path / "pair.key").write_text("00" * 16)
+    assert "the bundle is whole" in bunraku("check", show, "--box", box).out
+
+
 def test_check_refuses_a_changed_file(tmp_path: Path, bunraku: Command) -> None:
     show = packed_show(tmp_path)
     (show / "phrase.bvh").write_text((show / "phrase.bvh").read_text() + "\n")
