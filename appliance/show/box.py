@@ -230,6 +230,8 @@ class BoxConfig(Section):
                 raise refusal(message, "Remove `control: null`.", at=at)
             ports = {self.control.port: "commands"}
             ports |= {} if self.sensors.udp is None else {self.sensors.udp.port: "wearables"}
+            ports |= {} if self.pair is None else {self.pair.port: "the other box"}
+            ports |= {} if self.locked is None else {port: "boxes in step" for _, port in self.locked.ends}
             if one.usual_port in ports:
                 message = f"Port {one.usual_port} hears {ports[one.usual_port]} already."
                 raise refusal(message, f"Give {one.name} another one.", at=(*at, "port"))

@@ -98,6 +98,18 @@ def test_everything_can_be_said(tmp_path: Path) -> None:
         ),
         ("control: null\nsensors: {foreign: [{name: a, from: gyrosc}]}", 2, ["Show control hears gyrosc"]),
         ("sensors: {foreign: [{name: a, from: gyrosc, port: 9002}]}", 1, ["hears commands already"]),
+        (
+            "pair: {role: first, peer: [127.0.0.2], secret: k}\n"
+            "sensors: {foreign: [{name: a, from: gyrosc}]}",
+            2,
+            ["Port 9760 hears the other box already", "Give a another one"],
+        ),
+        (
+            "locked: {leader: 127.0.0.2, secret: k}\n"
+            "sensors: {foreign: [{name: a, from: gyrosc, port: 9761}]}",
+            2,
+            ["Port 9761 hears boxes in step already"],
+        ),
         ("console: null\nsensors: {foreign: [{name: a, from: phone}]}", 2, ["serves no page"]),
         ("sensors: {serial: [{baud: 9600}]}", 1, ["'sensors.serial[0].device' is missing"]),
     ],
