@@ -280,11 +280,27 @@ def test_pages_that_messages_and_comments_name_exist() -> None:
     assert nowhere == {}
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "notebook.md"], ids=lambda p: p.name)
+def test_buttons_and_parts_of_the_page_are_called_as_they_are_there(page: Path) -> None:
+    words = json.loads((ROOT / "appliance/console/page/words/en.json").read_text("utf-8")).values()
+    known = "|".join(re.sub(r"\\\{name\\\}", r"[\\w-]+", re.escape(one)) for one in words)
+    text = "\n".join(line for _, line in prose(page.read_text("utf-8")))
+    named = {found.replace("\n", " ") for found in EMPHASISED.findall(re.sub(r"`[^`]*`", "", text))}
+    assert {one for one in named if not re.fullmatch(known, one)} - NOT_ON_THE_PAGE == set()
+
+
 TESTED_BY = re.compile(r"<!-- tested by ([^>]+) -->")
 IS_COMMAND = re.compile(
     r"\s*(?:\$ )?(?:sudo )?(bunraku(?:-[a-z-]+)?|make|apt|dd|oscsend|torchrun|arduino-cli|blender|nmcli"
     r"|systemctl|python|ffmpeg|journalctl|cp|mount)(?: +([a-z-]+))?"
 )
+EMPHASISED = re.compile(r"(?<![*\w])\*([A-Z][^*]+)\*(?!\*)")
+# Words of other programs and titles of papers; all others in italics are the page's.
+NOT_ON_THE_PAGE = {
+    *("Generic OSC", "Network Streamer", "OSC/VMC", "Position + Orientation (Quaternion)", "Quaternion"),
+    *("Use custom", "Question about a show", "Security", "Report a vulnerability", "Nulls:"),
+    *("Puppeteering an AI", "Beyond Imitation"),
+}
 UNTRIED = ("(not tried", "not tried:", "tried by hand")
 
 
