@@ -13,6 +13,7 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
+from appliance.body.mesh_file import MESH_FILE
 from appliance.box.pace import Pace
 from appliance.box.show_state import ShowStateReader
 from appliance.levers.table import CAMERA, LOOK
@@ -93,6 +94,7 @@ class Projector:
         self._drawn_show: ShownShow | None = None  # what the painter draws
         self._next_show: ShownShow | None = None  # waits for its painter
         self._is_black = False  # the display is, since that show waits
+        self._read: set[tuple[str, int]] = set()  # images that were sound, and when they were changed
         self._detail = DETAILS[0]
         self._test_card: Image | None = None
         self._test_card_of: tuple[object, ...] = ()
@@ -189,7 +191,9 @@ class Projector:
         first = self._reader.newest(now) if self._reader.generation != self._generation else None
         if first is not None and self._reader.facts is not None:
             self._generation = self._reader.generation
+            self.is_preparing = True  # large images take seconds to read
             self._switch_to(self._reader.facts)
+            self.is_preparing = False
 
     def _prepare(
         self,
@@ -271,7 +275,7 @@ class Projector:
                 f"{error} The audience sees the built-in looks. Correct the show, then start the stage again."
             )
             looks, cards = looks_by_name(()), cards_by_name(())
-        names = [*(look.image or look.video for look in looks.values())]
+        names = [MESH_FILE, *(look.image or look.video for look in looks.values())]
         names += [card.image for card in cards.values()]
         names += [card.font for card in cards.values()]
         changed = tuple(_changed_at(directory / name) for name in names if name is not None)
@@ -282,8 +286,10 @@ class Projector:
         usable = dict(looks)
         for name, look in looks.items():
             try:
-                if look.image is not None:
-                    read_image(look.image)
+                if look.image is None or (image := (look.image, _changed_at(Path(look.image)))) in self._read:
+                    continue
+                read_image(look.image)
+                self._read.add(image)
             except OSError as error:
                 self._say(
                     f"{look.image} cannot be read as an image ({error}). The audience sees the look '{name}' "
@@ -295,7 +301,7 @@ class Projector:
 
 @dataclass(frozen=True)
 class ShownShow:
-    """The projector's view of a show. changed_at: of its images and fonts."""
+    """The projector's view of a show. changed_at: of its body, images and fonts."""
 
     skeleton: Skeleton
     looks: Looks

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,9 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from PIL import Image
 
+from appliance.body.mesh_file import MESH_FILE
 from appliance.box.show_state import ShowStateReader, ShowStateWriter
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import GOING, LOOK, MASTER
@@ -18,6 +21,7 @@ from appliance.projector.alignment import Alignment
 from appliance.projector.context import offscreen
 from appliance.projector.controls import Controls
 from appliance.projector.loop import Projector
+from appliance.projector.picture.image_file import read_image
 from appliance.show.look import STYLES
 from appliance.show.projector import ProjectorConfig
 from tests.bundles import write_show
@@ -177,6 +181,35 @@ def test_looks_that_were_changed_are_taken_by_the_next_stage(evening: Evening) -
     evening.begin()
     evening.colour(0.5)
     assert TellingPainter.made == 2 and not evening.said
+
+
+def test_a_body_that_was_changed_is_taken_by_the_next_stage(evening: Evening) -> None:
+    (evening.show / MESH_FILE).write_bytes(b"one body")
+    for made in (1, 1, 2):
+        if made == 2:
+            os.utime(evening.show / MESH_FILE, ns=(1, 1))
+        evening.begin()
+        evening.colour(0.5)
+        assert TellingPainter.made == made
+
+
+def test_large_images_are_read_once_and_their_reading_is_no_hung_display(
+    evening: Evening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Image.new("RGB", (2, 2)).save(evening.show / "set.png")
+    with (evening.show / "show.yaml").open("a") as file:
+        file.write("looks: [{name: set, image: set.png}]\n")
+    prepares: list[bool] = []
+
+    def noted(path: str) -> object:
+        prepares.append(evening.projector.is_preparing)
+        return read_image(path)
+
+    monkeypatch.setattr("appliance.projector.loop.read_image", noted)
+    for _ in range(2):
+        evening.begin()
+        evening.colour(0.5)
+    assert prepares == [True] and not evening.projector.is_preparing
 
 
 def test_a_show_broken_since_the_start_is_reported_and_shown_in_built_in_looks(evening: Evening) -> None:
