@@ -17,6 +17,7 @@ _SETTLE_S = 0.08  # a box hears the other one within that time
 _FORWARDS_S = 32.0  # IEEE 802.1D: a switch may pass nothing on for two times 15 s after a cable came in
 _ON_THE_WAY_S = 0.02  # a datagram from an unknown link, so soon after the cable was out, came by the cable
 _FIND_EACH_S = 0.25
+_Network = tuple[int, int]  # its address and its mask, as the kernel has them
 
 
 class Carrier:
@@ -37,7 +38,7 @@ class Carrier:
         self._receivers = [one for one in receivers if not ipaddress.IPv4Address(one).is_loopback]
         self._routes, self._folder, self._peers = routes, cards, peers
         self._beside: list[str] = []  # addresses of the other box that other cards lead to
-        self._cards: list[Path] = []
+        self._cards: dict[Path, _Network] = {}
         self.is_out, self.is_up = False, not self._receivers
         self._find_at = self._changed_at = float("-inf")
 
@@ -45,14 +46,32 @@ class Carrier:
         """Once a tick: some 10 microseconds."""
         if not self._receivers:
             return
-        if not self._cards and now >= self._find_at:
+        if now >= self._find_at:
             self._find_at = now + _FIND_EACH_S
-            self._cards = [self._folder / one / "carrier" for one in cards_to(self._receivers, self._routes)]
-            self._beside = [one for one in self._peers if self.is_apart([one])]
+            self._find()
         was_out, self.is_up = self.is_out, any(map(_is_up, self._cards))
         self.is_out = bool(self._cards) and not self.is_up
         if was_out is not self.is_out:
             self._changed_at = now
+
+    def _find(self) -> None:
+        """Find the cards once; of an adapter that was unplugged the one that leads to the same network now.
+
+        While it is away the kernel would send to the receivers by any card that leads elsewhere.
+        """
+        lost = [card for card in self._cards if not card.parent.exists()]
+        if self._cards and not lost:
+            return
+        networks = _networks_to(self._receivers, self._routes)
+        found = {self._folder / name / "carrier": network for name, network in networks.items()}
+        if lost:
+            gone = {self._cards[card] for card in lost}
+            found = {card: network for card, network in found.items() if network in gone}
+            if not found:
+                return
+            found |= {card: network for card, network in self._cards.items() if card not in lost}
+        self._cards = found
+        self._beside = [one for one in self._peers if self.is_apart([one])]
 
     def is_apart(self, peers: Sequence[str]) -> bool:
         """Whether datagrams to these addresses leave by other cards than those to the receivers."""
@@ -91,17 +110,24 @@ def receivers_of(outputs: OutputsConfig) -> Iterator[str]:
 
 def cards_to(addresses: Iterable[str], routes: Path = _ROUTES) -> list[str]:
     """Names of the network cards by which datagrams to these addresses leave, each once."""
+    return [*_networks_to(addresses, routes)]
+
+
+def _networks_to(addresses: Iterable[str], routes: Path) -> dict[str, _Network]:
+    """The cards by their names, each with the network in which it finds such an address."""
     try:
         rows = [line.split() for line in routes.read_text().splitlines()[1:]]
     except OSError:
-        return []
-    found: dict[str, None] = {}
+        return {}
+    found: dict[str, _Network] = {}
     for address in addresses:
         (number,) = struct.unpack("=I", socket.inet_aton(address))
-        ways = [(int(row[7], 16), row[0]) for row in rows if number & int(row[7], 16) == int(row[1], 16)]
+        ways = [(row[0], (int(row[1], 16), int(row[7], 16))) for row in rows]
+        ways = [(name, network) for name, network in ways if number & network[1] == network[0]]
         if ways:
-            found[max(ways, key=lambda way: way[0].bit_count())[1]] = None
-    return [*found]
+            name, network = max(ways, key=lambda way: way[1][1].bit_count())
+            found[name] = network
+    return found
 
 
 def _is_up(card: Path) -> bool:

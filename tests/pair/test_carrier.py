@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -14,11 +15,14 @@ NEVER = float("-inf")
 
 @pytest.fixture
 def routes(tmp_path: Path) -> Path:
-    rows = [("eth1", "00000000", "00000000"), ("eth0", "00004D0A", "00FFFFFF")]
     path = tmp_path / "route"
+    write_routes(path, ("eth1", "00000000", "00000000"), ("eth0", "00004D0A", "00FFFFFF"))
+    return path
+
+
+def write_routes(path: Path, *rows: tuple[str, str, str]) -> None:
     lines = ["\t".join([name, network, *"00000", mask, "0"]) for name, network, mask in rows]
     path.write_text("\n".join(["Iface\tDestination", *lines]) + "\n")
-    return path
 
 
 def plugged(folder: Path, card: str, text: str) -> None:
@@ -86,6 +90,27 @@ def test_a_follower_whose_cable_comes_back_leaves_a_switch_time_to_forward(
     carrier.look(2.0)
     assert not carrier.knows_silence(20.0, 0.5) and carrier.knows_silence(20.0, 19.9)
     assert carrier.knows_silence(40.0, 0.5)
+
+
+def test_an_adapter_of_another_name_takes_the_place_of_the_one_that_was_unplugged(
+    routes: Path, tmp_path: Path
+) -> None:
+    """Null: any card that seems to lead there; the kernel sends by the default route meanwhile."""
+    default = ("eth1", "00000000", "00000000")
+    plugged(tmp_path, "eth0", "1")
+    plugged(tmp_path, "eth1", "1")
+    carrier = Carrier(["10.77.0.9"], routes, tmp_path)
+    carrier.look(1.0)
+    assert carrier.is_up
+    shutil.rmtree(tmp_path / "eth0")
+    write_routes(routes, default)
+    carrier.look(2.0)
+    carrier.look(3.0)
+    assert carrier.is_out
+    plugged(tmp_path, "enx1", "1")
+    write_routes(routes, default, ("enx1", "00004D0A", "00FFFFFF"))
+    carrier.look(4.0)
+    assert carrier.is_up and not carrier.is_out and not carrier.may_speak(4.0, 2.0)
 
 
 def test_one_of_two_cables_is_enough(routes: Path, tmp_path: Path) -> None:
