@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
@@ -31,15 +31,18 @@ _FADE_S = 5.0  # for the strings
 class Memory(NamedTuple):
     """Outlives the process, not the power: what it did last stays done, and what people did since too.
 
-    is_open: whether it opened or closed, None: neither yet; stands: the show has stopped since; ends: the cue
-    of the end was called.
-    loud: the strings before the quiet hours, None outside of them. before: the cue before nobody was there.
+    is_open: whether it opened or closed, None: neither yet; goes: the show is to go on, and has not yet;
+    stands: the show has stopped since; ends: the cue of the end was called.
+    loud: the strings before the quiet hours, None outside of them. fades: from which strings to which, until
+    they have changed. before: the cue before nobody was there.
     """
 
     is_open: bool | None = None
+    goes: bool = False
     stands: bool = False
     ends: bool = False
     loud: float | None = None
+    fades: Sequence[float] = ()
     before: str | None = None
 
 
@@ -97,14 +100,17 @@ class Caretaker:
     def _open_and_close(self, state: ShowState, wall: float) -> None:
         is_open, before = self._hours.is_open(wall), self._memory.is_open
         if is_open != before:
-            self._memory = self._memory._replace(is_open=is_open, stands=False, ends=False)
+            goes = is_open and before is not None and not state.panic  # at power-on the show runs already
+            self._memory = self._memory._replace(is_open=is_open, goes=goes, stands=False, ends=False)
             if is_open:
                 self._watch_anew(state)
-            if is_open and before is not None and not state.panic:  # at power-on the show runs already
-                self._give(("/go",))
-                if self._config.open_cue:
-                    self._give(("/cue", self._config.open_cue))
-        elif not is_open and not self._memory.stands:  # again, until show control is there to hear it
+            if goes:
+                self._open()
+        elif self._memory.goes and (state.going or state.panic):
+            self._memory = self._memory._replace(goes=False)
+        elif self._memory.goes:  # again, until show control is there to hear it
+            self._open()
+        elif not is_open and not self._memory.stands:  # again too
             self._memory = self._memory._replace(stands=not state.going)
             if state.going:
                 self._give(("/stop",))
@@ -112,6 +118,11 @@ class Caretaker:
             self._memory = self._memory._replace(ends=True)
             if self._config.close_cue:
                 self._give(("/cue", self._config.close_cue))
+
+    def _open(self) -> None:
+        self._give(("/go",))
+        if self._config.open_cue:
+            self._give(("/cue", self._config.open_cue))
 
     def _watch_anew(self, state: ShowState) -> None:
         """A new day: nobody was missed yet, and yesterday's cue only counts while its stand-in is there."""
@@ -121,13 +132,15 @@ class Caretaker:
             self._memory = self._memory._replace(before=None)
 
     def _quieten(self, state: ShowState, wall: float) -> None:
-        most, loud = self._hours.strings(wall), self._memory.loud
+        most, loud, strings = self._hours.strings(wall), self._memory.loud, state[STRINGS].value
         if most < 1.0 and loud is None:
-            self._memory = self._memory._replace(loud=state[STRINGS].value)
-            self._give(("/strings", min(most, state[STRINGS].value), _FADE_S))
+            self._memory = self._memory._replace(loud=strings, fades=[strings, min(most, strings)])
         elif most == 1.0 and loud is not None:
-            self._memory = self._memory._replace(loud=None)
-            self._give(("/strings", loud, _FADE_S))
+            self._memory = self._memory._replace(loud=None, fades=[strings, loud])
+        elif self._memory.fades and self._memory.fades[0] != strings:
+            self._memory = self._memory._replace(fades=[])
+        if self._memory.fades and self._memory.fades[0] != self._memory.fades[1]:
+            self._give(("/strings", self._memory.fades[1], _FADE_S))  # again, until it is heard
 
     def _attract(self, state: ShowState, somebody: bool, now: float) -> None:
         attract = self._config.attract

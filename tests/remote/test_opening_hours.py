@@ -137,6 +137,42 @@ def test_a_stop_that_nobody_hears_is_given_again(tmp_path: Path) -> None:
     assert len(house.until("01T08:02")) == 1
 
 
+def test_an_opening_that_nobody_hears_is_given_again(tmp_path: Path) -> None:
+    house = House(tmp_path, hours_of(open_cue="walk in"), "01T09:00")
+    house.until("01T09:59")
+    house.hears = False
+    house.until("01T10:00")
+    house.restart()
+    opens = [("/go",), ("/cue", "walk in")]
+    assert house.until("01T10:01", 1.0)[:4] == [*opens, *opens]
+    house.hears = True
+    assert house.until("01T10:02") == opens
+    house.state = house.state.to(GOING, 0.0)  # by hand
+    assert house.until("01T10:30") == []
+
+
+def test_an_opening_that_is_not_heard_does_not_lift_a_panic(tmp_path: Path) -> None:
+    house = House(tmp_path, hours_of(), "01T09:00")
+    house.until("01T09:59")
+    house.hears = False
+    assert house.until("01T10:01") == [("/go",)] * 5
+    house.state, house.hears = ShowState(panic=True, settings=house.state.settings), True
+    assert house.until("01T10:30") == []
+
+
+def test_quiet_hours_that_nobody_hears_are_given_again(tmp_path: Path) -> None:
+    house = House(tmp_path, hours_of(quiet=[{"from": "22:00", "to": "01:00", "strings": 0.2}]), "05T21:59")
+    house.state, house.hears = house.state.to(STRINGS, 0.7), False
+    assert house.until("05T22:01")[:2] == [("/strings", 0.2, 5.0)] * 2
+    house.restart()
+    house.hears = True
+    assert house.until("05T22:10") == [("/strings", 0.2, 5.0)]
+    house.hears = False
+    assert house.until("06T01:01")[:2] == [("/strings", 0.7, 5.0)] * 2
+    house.state = house.state.to(STRINGS, 0.5)  # by hand
+    assert house.until("06T01:10") == []
+
+
 def test_quiet_hours_and_the_loudness_before_them(tmp_path: Path) -> None:
     config = hours_of(quiet=[{"from": "22:00", "to": "01:00", "strings": 0.2}])
     house = House(tmp_path, config, "05T20:00")
@@ -190,6 +226,7 @@ class Projector:
     def __init__(self, password: str = "") -> None:
         self.state, self.errors, self.commands, self._password = "0", "000000", [], password  # type: ignore[var-annotated]
         self.tells_errors = True  # also in standby
+        self.connections, self.ends_each = 0, False
         self.greeting = b"PJLINK 1 498e4a67\r" if password else b"PJLINK 0\r"
         self._listening = socket.create_server((HOST, 0))
         self.port = self._listening.getsockname()[1]
@@ -201,6 +238,7 @@ class Projector:
                 one, _ = self._listening.accept()
             except OSError:
                 return
+            self.connections += 1
             with one, one.makefile("rwb", buffering=0) as line:
                 line.write(self.greeting)
                 received = b""
@@ -209,6 +247,8 @@ class Projector:
                     if byte == b"\r":
                         line.write(self._answer(received[:-1].decode()))
                         received = b""
+                        if self.ends_each:
+                            break
 
     def _answer(self, command: str) -> bytes:
         digest = hashlib.md5(f"498e4a67{self._password}".encode()).hexdigest() if self._password else ""
@@ -262,6 +302,27 @@ def test_a_projector_that_tells_no_errors_in_standby_is_switched_on(projector: P
     wait_until(lambda: projector.state == "3", lambda: str(power.seen))
     projector.state = "1"
     wait_until(lambda: power.seen == Seen("on", ""), lambda: str(power.seen))
+    power.close()
+
+
+def test_a_projector_is_asked_and_switched_by_one_connection_a_look(projector: Projector) -> None:
+    """Also where it refuses to tell its errors: a second connection is refused by many for seconds."""
+    projector.tells_errors = False
+    power = ProjectorPower(HOST, projector.port, look_s=3600.0)
+    wait_until(lambda: power.seen == Seen("off", ""), lambda: str(power.seen))
+    assert projector.connections == 1
+    power.want(True)
+    wait_until(lambda: power.seen == Seen("warming", ""), lambda: str(power.seen))
+    assert projector.connections == 2
+    assert projector.commands == [f"%1{one}" for one in ("POWR ?", "ERST ?", "POWR ?", "POWR 1", "ERST ?")]
+    power.close()
+
+
+def test_a_projector_that_ends_the_connection_after_each_answer_is_switched(projector: Projector) -> None:
+    projector.ends_each = True
+    power = ProjectorPower(HOST, projector.port, look_s=3600.0)
+    power.want(True)
+    wait_until(lambda: power.seen == Seen("warming", ""), lambda: str(power.seen))
     power.close()
 
 
