@@ -41,6 +41,7 @@ class _Session:
     name: str
     heard_at: float
     parser: MidiParser = field(default_factory=MidiParser)
+    is_open: bool = False  # its clock was set, or MIDI came
     data: Address | None = None
     feedback_at: float = 0.0
     sent: int = 0
@@ -122,6 +123,8 @@ class NetworkMidi:
         if command == b"IN":
             *_, token, sender = _HEAD.unpack_from(received)
             is_new = sender not in self._sessions
+            if is_new and one is self._sockets[0]:
+                self._make_room()
             if is_new and (len(self._sessions) >= _MOST_SESSIONS or one is not self._sockets[0]):
                 self._put(one, address, self._command(b"NO", token))
                 return
@@ -139,12 +142,18 @@ class NetworkMidi:
             session_of = self._sessions.get(sender)
             if session_of is None:
                 return
-            session_of.heard_at = now
+            session_of.heard_at, session_of.is_open = now, True
             if count == 0:
                 answer = _CLOCK.pack(_COMMAND, b"CK", self._own, 1, first, _ticks(now), 0)
                 self._put(one, address, answer)
         elif command == b"BY":
             self._sessions.pop(_HEAD.unpack_from(received)[-1], None)
+
+    def _make_room(self) -> None:
+        """Where all places are taken, the oldest invitation that led to nothing makes room."""
+        waiting = [sender for sender, session in self._sessions.items() if not session.is_open]
+        if waiting and len(self._sessions) >= _MOST_SESSIONS:
+            del self._sessions[min(waiting, key=lambda sender: self._sessions[sender].heard_at)]
 
     def _midi(self, received: bytes, now: float) -> Iterator[tuple[str, bytes]]:
         if len(received) < _RTP.size + 1:
@@ -153,6 +162,7 @@ class NetworkMidi:
         session = self._sessions.get(sender)
         if first >> 6 != 2 or kind & 0x7F != _PAYLOAD_TYPE or session is None:
             return
+        session.is_open = True
         if now >= session.feedback_at and session.data is not None:  # lets the sender shorten its journal
             session.feedback_at = now + _FEEDBACK_S
             feedback = _FEEDBACK.pack(_COMMAND, b"RS", self._own, sequence, 0)

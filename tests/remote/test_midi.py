@@ -146,8 +146,8 @@ def test_a_cable_that_is_unplugged_is_opened_again(tmp_path: Path) -> None:
 class Computer:
     """The side that opens a session, as macOS does: invitation to both ports, clock, MIDI."""
 
-    def __init__(self, port: int) -> None:
-        self.port, self.token, self.own = port, 0x1234, 0xCAFE
+    def __init__(self, port: int, own: int = 0xCAFE) -> None:
+        self.port, self.token, self.own = port, 0x1234, own
         self.sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
         first = free_ports(1)[0]
         for place, one in enumerate(self.sockets):
@@ -194,6 +194,34 @@ def test_a_session_by_network_as_a_computer_opens_it() -> None:
     assert computer.sockets[0].recv(100)[:4] == b"\xff\xffRS"
     assert list(midi.messages(now + 91.0)) == []  # the clock was not set for too long
     assert midi.names == ()
+    midi.close()
+
+
+def test_invitations_that_lead_to_nothing_make_room() -> None:
+    """Null: sessions in use do not, and the ninth is refused."""
+    port = free_ports(1)[0]
+    midi = NetworkMidi(HOST, port, "Bunraku")
+
+    def invited(own: int, now: float) -> Computer:
+        computer = Computer(port, own)
+        computer.say(b"IN", 0)
+        assert list(midi.messages(now)) == []
+        return computer
+
+    in_use = [invited(number, 1.0) for number in range(7)]
+    for computer in in_use:
+        clock = struct.pack(">2s2sIB3x3Q", b"\xff\xff", b"CK", computer.own, 0, 777, 0, 0)
+        computer.sockets[1].sendto(clock, (HOST, port + 1))
+        assert list(midi.messages(1.0)) == []
+    first, second = invited(100, 2.0), invited(101, 3.0)
+    assert [one.sockets[0].recv(100)[2:4] for one in (first, second)] == [b"OK", b"OK"]
+    first.say(b"IN", 1)
+    second.say(b"IN", 1)
+    assert list(midi.messages(3.0)) == []
+    assert [one.sockets[1].recv(100)[2:4] for one in (first, second)] == [b"NO", b"OK"]
+    second.midi(b"\x03\x90\x3c\x40")
+    assert len(list(midi.messages(3.0))) == 1
+    assert invited(102, 4.0).sockets[0].recv(100)[2:4] == b"NO"
     midi.close()
 
 
