@@ -13,6 +13,7 @@ from appliance.sensor.transports.udp import bind_early
 _OP_TIMECODE = 0x9700
 _HEAD = struct.pack("<8sH", ID, _OP_TIMECODE)
 _LENGTH = 19
+_STREAM = 13  # place of StreamId, which was a filler of 0 before Art-Net 4 had it
 
 
 def packed(label: Timecode) -> bytes:
@@ -21,8 +22,11 @@ def packed(label: Timecode) -> bytes:
 
 
 def label_in(packet: bytes) -> Timecode | None:
-    """The label of a packet; None: it is another one. Raises ValueError for a label that does not exist."""
-    if len(packet) < _LENGTH or not packet.startswith(_HEAD):
+    """The label of a packet; None: it is another one, or of another stream than the master, which is 0.
+
+    Raises ValueError for a label that does not exist.
+    """
+    if len(packet) < _LENGTH or not packet.startswith(_HEAD) or packet[_STREAM] != 0:
         return None
     frames, seconds, minutes, hours, kind = packet[14:_LENGTH]
     if kind >= len(RATES):

@@ -48,6 +48,8 @@ def test_art_net_as_the_standard_has_it() -> None:
     assert packet == b"Art-Net\0\x00\x97\x00\x0e\x00\x00" + bytes([24, 58, 59, 23, 1])
     assert art_net_timecode.label_in(packet) == label
     assert art_net_timecode.label_in(b"Art-Net\0\x00\x50" + bytes(20)) is None  # ArtDmx
+    assert art_net_timecode.label_in(packet[:13] + b"\1" + packet[14:]) is None  # StreamId: not the master
+    assert art_net_timecode.label_in(packet[:12] + b"\1" + packet[13:]) == label  # a filler is not looked at
     with pytest.raises(ValueError, match="no timecode"):
         art_net_timecode.label_in(packet[:14] + bytes([25, 58, 59, 23, 1]))
 
