@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -39,7 +39,8 @@ from appliance.console.learning import (
 from appliance.console.proving import Proving
 from appliance.pose.foreign_file import stored_json
 from appliance.release.choice import box_of
-from appliance.show.box import load_box
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.config_error import ConfigError
 from appliance.stage.stage_error import StageError
 
 NICE = 19
@@ -88,8 +89,10 @@ def main(given: Sequence[str]) -> int:
     end_with_parent()
     give_way(NICE)
     named = {name: Path(path) for name, path in zip(given[::2], given[1::2], strict=True)}
-    path = box_of(named.get("--box"), named.get("--chosen"))
-    config = load_box(path)
+    found = _readable_box(named)
+    if found is None:
+        return 0
+    path, config = found
     learning = Learning(devices_file_made(config).parent / FOLDER)
     if learning.wanted() is None:
         return 0
@@ -101,6 +104,25 @@ def main(given: Sequence[str]) -> int:
         learning.end()  # else systemd would begin it again and again
         learning.report(state="failed", message=str(error))
         refuse(error)
+
+
+def _readable_box(named: Mapping[str, Path]) -> tuple[Path | None, BoxConfig] | None:
+    """The box file, once it can be read: a learner that ended here would be started again at once, for ever.
+
+    None: stopped before.
+    """
+    said = ""
+    with stop_signals() as is_stopped:
+        while not is_stopped():
+            try:
+                path = box_of(named.get("--box"), named.get("--chosen"))
+                return path, load_box(path)
+            except ConfigError as error:
+                if str(error) != said:
+                    said = str(error)
+                    _print(f"Learning waits: the box file cannot be read.\n{said}")
+            time.sleep(_LOOK_S)
+    return None
 
 
 class Learner:
@@ -127,6 +149,7 @@ class Learner:
         with stop_signals() as self._is_stopped:
             try:
                 require_studio()
+                self._learning.move_aside()
                 while not self._trained():
                     self._await_rest()
                 result = self._checked()
@@ -233,15 +256,14 @@ class Learner:
             return {"share": 0.0, "degrees": None}
 
     def _report(self, **state: Any) -> None:
-        """Write what changed; else only a sign of life."""
+        """Write what changed."""
+        if state == self._state:
+            return
         with contextlib.suppress(OSError):
-            if state == self._state:
-                self._learning.report()
-            else:
-                self._learning.report(**state)
-                if state["state"] != self._state.get("state") and "share" in state:
-                    self._say(f"{_STATES[state['state']]} ({100 * state['share']:.0f} % trained)")
-                self._state = state
+            self._learning.report(**state)
+            if state["state"] != self._state.get("state") and "share" in state:
+                self._say(f"{_STATES[state['state']]} ({100 * state['share']:.0f} % trained)")
+            self._state = state
 
     def _say_result(self, result: dict[str, Any]) -> None:
         for one in result["figures"]:

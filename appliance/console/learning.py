@@ -6,9 +6,7 @@ It is on the disk: what was begun goes on after a power cut.
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +20,6 @@ STUDIO_MISSING = (
     "Learning needs the studio, which is not installed on this box: pip install bunraku-studio. The dance "
     "needs no studio: train on another machine, and bring the show on a stick."
 )
-_SILENT_S = 120.0  # a step of a large network on a slow machine, with the checkpoint after it, takes less
 
 
 class Wanted(NamedTuple):
@@ -46,16 +43,28 @@ class Learning:
         self._wanted, self._progress = folder / "wanted.json", folder / "progress.json"
 
     def begin(self, wanted: Wanted) -> None:
-        """Write the request, after the last learned show was deleted, or moved aside if this begins with it.
+        """Write the request, and delete the last learned show, or move it aside if this begins with it.
 
-        Raises OSError.
+        Raises OSError. After a power cut in between nothing is wanted and the show is there, or `move_aside`
+        ends what was begun.
         """
-        shutil.rmtree(self.before, ignore_errors=True)
+        with suppress(FileNotFoundError):
+            shutil.rmtree(self.before)
         if wanted.begins_with == str(self.show):
-            self.show.rename(self.before)
-            wanted = wanted._replace(begins_with=str(self.before))
+            self.want(wanted)
+            self.move_aside()
+            return
+        self.report(state="ended")  # half of a show is not offered
         shutil.rmtree(self.show, ignore_errors=True)
         self.want(wanted)
+
+    def move_aside(self) -> None:
+        """Move the last learned show aside where the request still begins with it. Raises OSError."""
+        wanted = self.wanted()
+        if wanted is not None and wanted.begins_with == str(self.show):
+            if self.show.exists():
+                self.show.rename(self.before)
+            self.want(wanted._replace(begins_with=str(self.before)))
 
     def playable(self) -> Path | None:
         """The show that was learned last, once it has passed its check."""
@@ -63,7 +72,6 @@ class Learning:
 
     def want(self, wanted: Wanted) -> None:
         """Write the request. Raises OSError."""
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.report(state="waits")
         write_whole(self._wanted, json.dumps(wanted._asdict()).encode())
 
@@ -85,11 +93,9 @@ class Learning:
             self._wanted.unlink(missing_ok=True)
 
     def report(self, **values: object) -> None:
-        """The progress from now on; without values only a sign of life. Raises OSError."""
-        if values:
-            write_whole(self._progress, json.dumps(values).encode())
-        else:
-            os.utime(self._progress)
+        """The progress from now on. Raises OSError."""
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_whole(self._progress, json.dumps(values).encode())
 
     def reported(self) -> dict[str, Any]:
         """The progress; {} before the first."""
@@ -97,10 +103,3 @@ class Learning:
             return dict(stored_json(self._progress))
         except (OSError, ValueError, TypeError):
             return {}
-
-    def is_silent(self) -> bool:
-        """Whether nobody works on what is wanted."""
-        try:
-            return time.time() - self._progress.stat().st_mtime > _SILENT_S
-        except OSError:
-            return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from appliance.box.durable import write_whole
 from appliance.cli import learn
 from appliance.cli.learn import Learner
 from appliance.cli.learned import figures_of, sentence_of
@@ -233,6 +235,73 @@ def test_without_the_studio_it_says_what_to_install(tmp_path: Path, monkeypatch:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert Learner(learning, lambda: False).run() == 1
     assert learning.reported() == {"state": "failed", "message": STUDIO_MISSING}
+
+
+def test_a_broken_box_file_is_said_once_and_learning_goes_on_when_it_is_mended(tmp_path: Path) -> None:
+    """An end would be answered by systemd with another start, for ever."""
+    box_file = tmp_path / "box.yaml"
+    whole = f"runtime: {tmp_path / 'run'}\nstate: {tmp_path / 'state'}\n"
+    box_file.write_text(whole + "colour: red\n")
+    command = [sys.executable, "-m", "appliance.cli.learn", "--box", str(box_file)]
+    learner = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert learner.stdout is not None
+    assert "the box file cannot be read" in learner.stdout.readline()
+    assert "Unknown key 'colour'" in learner.stdout.readline()
+    with pytest.raises(subprocess.TimeoutExpired):
+        learner.wait(2.0)
+    box_file.write_text(whole)
+    assert learner.wait(30.0) == 0, "nothing is wanted here"
+    assert "the box file cannot be read" not in learner.stdout.read()
+
+
+@pytest.mark.parametrize("cut", ["rename", "second request"])
+def test_a_power_cut_as_learning_begins_loses_no_show(
+    cut: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = Box(tmp_path, monkeypatch, report_of("default", tmp_path))
+    box.learning.show.mkdir(parents=True)
+    (box.learning.show / "checkpoint.pt").touch()
+    with monkeypatch.context() as patched:
+        written: list[Path] = []
+
+        def lost(self: Path, target: Path) -> None:
+            raise KeyboardInterrupt
+
+        def written_once(path: Path, content: bytes, private: bool = False) -> None:
+            if path.name == "wanted.json" and path in written:
+                raise KeyboardInterrupt
+            written.append(path)
+            write_whole(path, content, private)
+
+        if cut == "rename":
+            patched.setattr(Path, "rename", lost)
+        else:
+            patched.setattr("appliance.console.learning.write_whole", written_once)
+        with pytest.raises(KeyboardInterrupt):
+            box.learning.begin(Wanted("takes", 60.0, str(box.learning.show)))
+    box.let_end()
+    assert box.run() == 0
+    train, _ = box.begun()
+    assert train[train.index("--from") + 1] == str(box.learning.before) and "--resume" not in train
+    assert (box.learning.before / "checkpoint.pt").exists()
+
+
+def test_a_power_cut_while_the_last_show_is_deleted_offers_no_half_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learning = Learning(tmp_path)
+    learning.report(state="learned")
+    learning.show.mkdir()
+    assert learning.playable() == learning.show
+
+    def cut(folder: Path, **_: object) -> None:
+        if folder == learning.show:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(shutil, "rmtree", cut)
+    with pytest.raises(KeyboardInterrupt):
+        learning.begin(Wanted("takes"))
+    assert learning.playable() is None and learning.wanted() is None
 
 
 def test_other_recordings_are_refused_while_some_are_learned(tmp_path: Path, bunraku: Command) -> None:
