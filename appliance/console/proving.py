@@ -27,17 +27,22 @@ class Wanted(NamedTuple):
 
 
 class Proving:
-    """`wanted` is there while something is proven: its removal ends that. `progress`: JSON, one a line."""
+    """`wanted` is there while something is proven: its removal ends that. `progress`: JSON, one a line.
+    `sign`: its time is the last sign of life, in monotonic seconds: a clock that is set moves all others.
+    """
 
     def __init__(self, runtime: Path) -> None:
         self._runtime = runtime
         self.folder = runtime / FOLDER
         self._wanted, self.progress = self.folder / "wanted", self.folder / "progress"
+        self._sign = self.folder / "sign"
 
     def want(self, wanted: Wanted) -> None:
         """Begin: an empty progress, then the request. Raises OSError."""
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.progress.write_bytes(b"")
+        self._sign.touch(mode=0o600)
+        self.report()
         part = self.folder / ".wanted"
         part.write_text(json.dumps(wanted._asdict()))
         part.replace(self._wanted)
@@ -62,13 +67,13 @@ class Proving:
         if values:
             with self.progress.open("a") as stream:
                 stream.write(json.dumps(values) + "\n")
-        else:
-            os.utime(self.progress)
+        now = time.monotonic()
+        os.utime(self._sign, (now, now))
 
     def is_silent(self) -> bool:
         """Whether what is wanted gives no sign any more."""
         try:
-            return time.time() - self.progress.stat().st_mtime > _SILENT_S
+            return time.monotonic() - self._sign.stat().st_mtime > _SILENT_S
         except OSError:
             return True
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,23 @@ def test_what_is_wanted_is_one_of_two_things(tmp_path: Path, said: str) -> None:
     assert proving.wanted() is None
     proving.end()
     assert proving.wanted() is None and not proving.show_goes()
+
+
+def test_a_prover_is_silent_by_a_clock_that_nobody_sets(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proving = Proving(tmp_path)
+    assert proving.is_silent()
+    proving.want(Wanted("doctor", 30))
+    proving.report(share=0.5)
+    now, wall = time.monotonic(), time.time()
+    monkeypatch.setattr(time, "time", lambda: wall + 7200.0)
+    assert not proving.is_silent()
+    monkeypatch.setattr(time, "time", lambda: wall - 7200.0)
+    monkeypatch.setattr(time, "monotonic", lambda: now + 31.0)
+    assert proving.is_silent()
+    proving.report()
+    assert not proving.is_silent()
 
 
 @pytest.mark.parametrize(
