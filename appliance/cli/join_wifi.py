@@ -19,9 +19,11 @@ from typing import NamedTuple
 
 from appliance.box.child import finished
 from appliance.box.durable import write_whole
+from appliance.pose.foreign_file import TooLargeError, content
 from appliance.release.choice import RUN
 from appliance.release.wifi import NAME, PROFILE, WifiFile, is_filled_in, profile, read_wifi, unescaped
 from appliance.show.config_error import ConfigError
+from appliance.show.yaml_file import MAX_BYTES
 
 MESSAGE_FILE = "wifi.txt"  # in the run folder: what went wrong, for the test card and the doctor
 NETWORK_FILE = "access-point.txt"  # there too: the box's own network and its password, for the test card
@@ -78,21 +80,20 @@ def _own_network(path: Path) -> str:
 
 def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
     """The fault as a message; empty if all is well or no Wi-Fi is asked for."""
-    arrived = next((path for path in (one / NAME for one in places.arrivals) if _asks(path)), None)
     saved = places.saved / NAME
-    path = arrived or saved
-    if not _asks(path):
-        return ""
-    try:
-        content = path.read_bytes()  # once: its stick may be pulled while the network is looked for
-        wifi = read_wifi(path)
-    except OSError as error:
+    read = ((path, _content(path)) for path in (*(one / NAME for one in places.arrivals), saved))
+    try:  # each is read once: its stick may be pulled while the network is looked for
+        path, data = next(((path, data) for path, data in read if data), (saved, b""))
+        if not data:
+            return ""
+        wifi = read_wifi(path, data)
+    except TooLargeError as error:
         return f"{NAME} cannot be read ({error.strerror}). The box keeps the network from before."
     except ConfigError as error:
         message = str(error).replace(f"{path.parent}/", "")  # the wall has room for little
         return f"{message}\nThe box keeps the network from before."
     name_box(wifi.hostname)
-    is_new = not saved.is_file() or saved.read_bytes() != content
+    is_new = not saved.is_file() or saved.read_bytes() != data
     try:
         if is_new:
             write_whole(places.saved / "country", f"COUNTRY={wifi.country}\n".encode())
@@ -108,14 +109,19 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
         _made(places, wifi, card, is_new, run) if wifi.access_point else _joined(places, wifi, is_new, run)
     )
     if is_new and not (message and wifi.access_point):
-        write_whole(saved, content, private=True)
+        write_whole(saved, data, private=True)
     return message
 
 
-def _asks(path: Path) -> bool:
-    with contextlib.suppress(OSError):
-        return is_filled_in(path.read_text("utf-8", "replace"))
-    return False
+def _content(path: Path) -> bytes:
+    """The file, if it asks for a network; empty if not, or if it cannot be read. Raises TooLargeError."""
+    try:
+        data = content(path, MAX_BYTES)
+    except TooLargeError:
+        raise
+    except OSError:
+        return b""
+    return data if is_filled_in(data.decode("utf-8", "replace")) else b""
 
 
 def _card(cards: Path, wait: Wait) -> str:

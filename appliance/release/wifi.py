@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from appliance.show.section import Section, key, refusal
 from appliance.show.validation import validated
-from appliance.show.yaml_file import read_yaml
+from appliance.show.yaml_file import parsed_yaml
 
 NAME = "bunraku-wifi.yaml"
 PROFILE = "wifi.nmconnection"
@@ -82,9 +82,9 @@ class WifiFile(Section):
         return self
 
 
-def read_wifi(path: Path) -> WifiFile:
-    """The file. Raises ConfigError with file, line, what is wrong and what to do."""
-    return validated(WifiFile, read_yaml(path), {})
+def read_wifi(path: Path, content: bytes) -> WifiFile:
+    """The file's content. Raises ConfigError with file, line, what is wrong and what to do."""
+    return validated(WifiFile, parsed_yaml(path, content), {})
 
 
 def is_filled_in(text: str) -> bool:

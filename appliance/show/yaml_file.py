@@ -57,7 +57,12 @@ def read_yaml(path: Path, inside: Path | None = None) -> YamlFile:
 
     Raises ConfigError: file missing or unreadable, not YAML, a key written twice, anchors, too large.
     """
-    text = _read_text(path, inside)
+    return parsed_yaml(path, _read(path, inside))
+
+
+def parsed_yaml(path: Path, data: bytes) -> YamlFile:
+    """The same of a file that was read already: its name is for the messages."""
+    text = _text(path, data)
     file = YamlFile(path)
     problems: list[Problem] = []
     try:
@@ -75,14 +80,17 @@ def read_yaml(path: Path, inside: Path | None = None) -> YamlFile:
     return file
 
 
-def _read_text(path: Path, inside: Path | None) -> str:
+def _read(path: Path, inside: Path | None) -> bytes:
     try:
         if inside is not None:
             require_inside(path, inside)
-        data = content(path, MAX_BYTES)
+        return content(path, MAX_BYTES)
     except OSError as error:
         why = f"The file cannot be read ({error.strerror})."
         raise ConfigError([Problem(path, 0, why, "Check its name and place.")]) from None
+
+
+def _text(path: Path, data: bytes) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

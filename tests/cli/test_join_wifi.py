@@ -9,10 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from appliance.cli import join_wifi as join_wifi_module
 from appliance.cli.console import card_lines
 from appliance.cli.join_wifi import MESSAGE_FILE, NETWORK_FILE, Places, join_wifi
+from appliance.pose.foreign_file import content
 from appliance.release.wifi import NAME, PROFILE
+from appliance.show import yaml_file
 from appliance.show.box import BoxConfig
+from appliance.show.yaml_file import MAX_BYTES
 
 GOOD = "country: DE\nname: hall\npassword: correct horse\nhostname: puppet\n"
 AP = GOOD + "access_point: yes\nchannel: 11\n"
@@ -108,6 +112,33 @@ def test_a_stick_that_is_pulled_while_its_network_is_looked_for_has_done_its_wor
     box.named = ""
     box.power_on()
     assert box.named == "puppet"
+
+
+def test_a_file_is_read_once(box: Box, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is kept is what was applied, though a stick is written to meanwhile."""
+    stick = box.folder / "stick" / NAME
+    stick.write_text(GOOD)
+    looks = list[bytes]()
+
+    def content_once(path: Path, largest: int) -> bytes:
+        data = content(path, largest)
+        looks.append(data)
+        stick.write_text(GOOD.replace("hall", "elsewhere"))
+        return data
+
+    monkeypatch.setattr(join_wifi_module, "content", content_once)
+    monkeypatch.setattr(yaml_file, "content", content_once)
+    assert box.power_on() == 0 and looks == [GOOD.encode()]
+    assert (box.folder / "kept" / NAME).read_text() == GOOD
+    assert "id=wifi" in (box.folder / "kept" / PROFILE).read_text()
+    ssid = "".join(f"{byte};" for byte in b"hall")
+    assert f"ssid={ssid}" in (box.folder / "kept" / PROFILE).read_text()
+
+
+def test_a_file_without_end_is_refused(box: Box) -> None:
+    (box.folder / "boot" / NAME).write_text(GOOD + "#\n" * MAX_BYTES)
+    assert box.power_on() == 1
+    assert "it is larger than 256 kB" in box.output and "keeps the network from before" in box.output
 
 
 def test_a_fault_is_said_with_its_line_and_the_network_before_stays(box: Box) -> None:

@@ -14,23 +14,21 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "deploy" / "image" / "bunraku-wi
 GOOD = {"country": "DE", "name": "stage net", "password": "correct horse"}
 
 
-def written(folder: Path, text: str) -> Path:
-    path = folder / "bunraku-wifi.yaml"
-    path.write_text(text)
-    return path
+def read(text: str) -> WifiFile:
+    return read_wifi(Path("/media/bunraku/bunraku-wifi.yaml"), text.encode())
 
 
 def keyfile(wifi: WifiFile) -> configparser.ConfigParser:
-    read = configparser.ConfigParser(interpolation=None, delimiters=("=",))
-    read.read_string(profile(wifi))
-    return read
+    parser = configparser.ConfigParser(interpolation=None, delimiters=("=",))
+    parser.read_string(profile(wifi))
+    return parser
 
 
-def test_the_example_asks_for_nothing_and_is_sound_once_its_number_signs_are_gone(tmp_path: Path) -> None:
+def test_the_example_asks_for_nothing_and_is_sound_once_its_number_signs_are_gone() -> None:
     example = EXAMPLE.read_text()
     assert not is_filled_in(example)
     keys = [line.removeprefix("# ") for line in example.splitlines() if line.partition(":")[0] in _COMMENTED]
-    wifi = read_wifi(written(tmp_path, "\n".join(keys)))
+    wifi = read("\n".join(keys))
     assert (wifi.country, wifi.access_point, wifi.channel) == ("DE", True, 6)
     assert len(keys) == len(WifiFile.model_fields), "the example has every key"
 
@@ -70,8 +68,8 @@ def test_the_same_network_keeps_its_profile_and_another_one_has_its_own() -> Non
     assert one == again != other
 
 
-def test_norway_is_a_country(tmp_path: Path) -> None:
-    assert read_wifi(written(tmp_path, "country: NO\nname: hall\npassword: correct horse\n")).country == "NO"
+def test_norway_is_a_country() -> None:
+    assert read("country: NO\nname: hall\npassword: correct horse\n").country == "NO"
 
 
 @pytest.mark.parametrize(
@@ -88,11 +86,9 @@ def test_norway_is_a_country(tmp_path: Path) -> None:
         ("country: DE\nname: \u201chall\u201d\npassword: \u00fcmlaut-12\n", 3, "A password has", ""),
     ],
 )
-def test_a_fault_is_named_with_its_line_and_its_cure(
-    tmp_path: Path, text: str, line: int, message: str, cure: str
-) -> None:
+def test_a_fault_is_named_with_its_line_and_its_cure(text: str, line: int, message: str, cure: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        read_wifi(written(tmp_path, text))
+        read(text)
     assert caught.value.problems[-1].line == line, str(caught.value)
     assert message in str(caught.value)
     assert cure in str(caught.value)
