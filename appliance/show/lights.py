@@ -21,7 +21,15 @@ from appliance.show.fixture_profile import (
 )
 from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, Pair, RuleConfig
 from appliance.show.section import Section, key, part, refusal, refuse_repeats
-from appliance.show.venue_lights import MAX_FIXTURES, UNIVERSE_CHANNELS, Address, Metres, Pose, Universe
+from appliance.show.venue_lights import (
+    MAX_FIXTURES,
+    UNIVERSE_CHANNELS,
+    Address,
+    Degrees,
+    Metres,
+    Pose,
+    Universe,
+)
 
 
 class FixtureConfig(Section):
@@ -40,7 +48,7 @@ class FixtureConfig(Section):
         (0.0, 3.0, 0.0),
     )
     pose: Pose = key("Hanging from a bar, or standing on its base.", "hanging")
-    turn: Metres = key(
+    turn: Degrees = key(
         "Its rotation from there, in degrees: yaw about the vertical, pitch about x, roll about z.",
         (0.0, 0.0, 0.0),
     )

@@ -12,7 +12,10 @@ MAX_FIXTURES = 2048
 UNIVERSE_CHANNELS = 512
 Universe = Annotated[int, Field(ge=0, le=63999)]
 Address = Annotated[int, Field(ge=1, le=UNIVERSE_CHANNELS)]
-Metres = Annotated[tuple[float, float, float], Field(strict=False)]
+_Metre = Annotated[float, Field(ge=-1000, le=1000)]  # a stadium has 300
+_Degree = Annotated[float, Field(ge=-360, le=360)]
+Metres = Annotated[tuple[_Metre, _Metre, _Metre], Field(strict=False)]
+Degrees = Annotated[tuple[_Degree, _Degree, _Degree], Field(strict=False)]
 Pose = Literal["hanging", "standing"]
 
 
@@ -24,7 +27,7 @@ class VenuePlaceConfig(Section):
     address: Address | None = key("Its first channel here.", None)
     place: Metres | None = key("Where it is here, metres (x, y, z).", None)
     pose: Pose | None = key("Hanging or standing here.", None)
-    turn: Metres | None = key("How it is turned here: yaw, pitch, roll in degrees.", None)
+    turn: Degrees | None = key("How it is turned here: yaw, pitch, roll in degrees.", None)
 
 
 class VenueLightsConfig(Section):

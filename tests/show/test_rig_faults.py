@@ -74,6 +74,8 @@ def test_the_files_are_sound_without_the_faults(bundle: Path) -> None:
         ("universe: 1", "universe: -1", 10, ["is -1, out of range"]),
         ("address: 101", "address: 513", 15, ["is 513, out of range", "Write 1 to 512."]),
         ("address: 101", "address: 0", 15, ["is 0, out of range"]),
+        ("address: 101", "address: 101\n      place: [0, 3, 1001]", 16, ["is 1001, out of range"]),
+        ("address: 101", "address: 101\n      turn: [400, 0, 0]", 16, ["is 400, out of range"]),
         ("address: 101", "address: 512", 15, ["'wash' takes", "a universe has 512"]),
         ("address: 101", "address: 2", 12, ["'spot left' and 'wash' are both on channel 2"]),
         ("name: wash", "name: spot left", 12, ["Two fixtures are called 'spot left'"]),
