@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import socket
 import threading
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 PORT = 4352
@@ -20,6 +22,10 @@ class PjLinkError(Exception):
     """The projector does not answer, or refuses; the message is a clause about it."""
 
 
+class _EndedError(PjLinkError):
+    """The connection is over."""
+
+
 class Seen(NamedTuple):
     """state: off, on, cooling, warming, or unknown; trouble: a clause, "" where all is well."""
 
@@ -29,6 +35,16 @@ class Seen(NamedTuple):
 
 def ask(host: str, port: int, password: str | None, *commands: str) -> list[str]:
     """The answers to commands like 'POWR ?', in one connection. Raises PjLinkError, OSError."""
+    with _opened(host, port, password) as answer_to:
+        return [answer_to(command) for command in commands]
+
+
+@contextlib.contextmanager
+def _opened(host: str, port: int, password: str | None) -> Iterator[Callable[[str], str]]:
+    """A connection, as a function from a command to its answer. Both raise PjLinkError, OSError.
+
+    After one that is refused the connection takes the next.
+    """
     with socket.create_connection((host, port), _WITHIN_S) as one, one.makefile("rwb", buffering=0) as line:
         greeting = _line(line).split()
         if greeting[:1] != ["PJLINK"] or len(greeting) < 2:
@@ -40,8 +56,9 @@ def ask(host: str, port: int, password: str | None, *commands: str) -> list[str]
             if password is None:
                 raise PjLinkError("asks for a password")
             digest = hashlib.md5((greeting[2] + password).encode(), usedforsecurity=False).hexdigest()
-        found = []
-        for command in commands:
+
+        def answer_to(command: str) -> str:
+            nonlocal digest
             line.write(f"{digest}%1{command}\r".encode())
             digest = ""  # once a connection
             answer = _line(line)
@@ -50,8 +67,27 @@ def ask(host: str, port: int, password: str | None, *commands: str) -> list[str]
             value = answer.partition("=")[2]
             if value in _REFUSED:
                 raise PjLinkError(_REFUSED[value])
-            found.append(value)
-        return found
+            return value
+
+        yield answer_to
+
+
+@contextlib.contextmanager
+def _kept_open(host: str, port: int, password: str | None) -> Iterator[Callable[[str], str]]:
+    """One connection for all commands: many take no second one for some seconds. Some end it after each."""
+    with contextlib.ExitStack() as connection:
+        answer_to = connection.enter_context(_opened(host, port, password))
+
+        def answer_again_to(command: str) -> str:
+            nonlocal answer_to
+            try:
+                return answer_to(command)
+            except (ConnectionError, _EndedError):
+                connection.close()
+                answer_to = connection.enter_context(_opened(host, port, password))
+                return answer_to(command)
+
+        yield answer_again_to
 
 
 def _line(line: socket.SocketIO) -> str:
@@ -59,7 +95,7 @@ def _line(line: socket.SocketIO) -> str:
     while not received.endswith(b"\r"):
         byte = line.read(1)
         if not byte or len(received) > _LONGEST:
-            raise PjLinkError("ends the connection")
+            raise _EndedError("ends the connection")
         received += byte
     return received[:-1].decode("ascii", "replace")
 
@@ -101,15 +137,15 @@ class ProjectorPower:
     def _look(self) -> Seen:
         state = "unknown"
         try:
-            (answer,) = ask(self.host, self._port, self._password, "POWR ?")
-            state = _STATES.get(answer, "unknown")
-            wanted = self.wanted
-            if (state == "off" and wanted) or (state == "on" and wanted is False and not self._went_off):
-                ask(self.host, self._port, self._password, f"POWR {int(bool(wanted))}")
-                state = "warming" if wanted else "cooling"
-            if wanted is False and state == "off":
-                self._went_off = True
-            errors = self._errors(state)
+            with _kept_open(self.host, self._port, self._password) as answer_to:
+                state = _STATES.get(answer_to("POWR ?"), "unknown")
+                wanted = self.wanted
+                if (state == "off" and wanted) or (state == "on" and wanted is False and not self._went_off):
+                    answer_to(f"POWR {int(bool(wanted))}")
+                    state = "warming" if wanted else "cooling"
+                if wanted is False and state == "off":
+                    self._went_off = True
+                errors = _errors(answer_to, state)
         except PjLinkError as error:
             return Seen(state, str(error))
         except OSError as error:
@@ -118,11 +154,12 @@ class ProjectorPower:
         faults = [name for name, level in zip(_ERRORS, errors, strict=False) if level == "2"]
         return Seen(state, f"reports a fault: {', '.join(faults)}" if faults else "")
 
-    def _errors(self, state: str) -> str:
-        """A digit for each of _ERRORS; "" from one that does not tell them unless it is on."""
-        try:
-            return ask(self.host, self._port, self._password, "ERST ?")[0]
-        except PjLinkError:
-            if state == "on":
-                raise
-            return ""
+
+def _errors(answer_to: Callable[[str], str], state: str) -> str:
+    """A digit for each of _ERRORS; "" from one that does not tell them unless it is on."""
+    try:
+        return answer_to("ERST ?")
+    except PjLinkError:
+        if state == "on":
+            raise
+        return ""
