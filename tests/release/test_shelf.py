@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
+import re
 import subprocess
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +16,11 @@ from appliance.release.adoption import adopt
 from appliance.release.arrivals import Arrival, look
 from appliance.release.choice import EMBEDDED_SHOW
 from appliance.release.shelf import NoRoomError, Shelf, UnreadableError
+from appliance.show.box import load_box
 from tests.release.venue import Venue, dancing
+
+_ROOT = Path(__file__).resolve().parents[2]
+_ACCESS_POINT = _ROOT / "deploy/system/usr/sbin/bunraku-access-point"
 
 
 def test_a_stick_that_is_pulled_while_it_is_read_is_looked_at_again(venue: Venue) -> None:
@@ -85,3 +92,16 @@ def test_without_a_data_partition_the_show_dances_from_memory(venue: Venue) -> N
     venue.places.data.symlink_to("/nowhere/at/all")
     venue.bring(venue.stick, "spring")
     assert dancing(venue.look()) == "spring"
+
+
+def test_the_first_box_file_lets_a_phone_of_the_box_s_own_wifi_open_the_page(venue: Venue) -> None:
+    page = (_ROOT / "docs/raspberry-pi.md").read_text("utf-8")
+    written = re.search(r"```yaml\n(.+?)```", page, re.DOTALL)
+    own = re.search(r"ipv4\.addresses ([\d./]+)", (_ACCESS_POINT).read_text())
+    assert written and own
+    venue.bring(venue.boot, "spring", textwrap.dedent(written[1]))
+    console = load_box(venue.look().choice.complete().first.box).console
+    assert console and console.https and console.host == "::"
+    for phone in (ipaddress.ip_interface(own[1]).ip + 1, ipaddress.ip_address("fe80::1")):
+        networks = map(ipaddress.ip_network, console.viewers)
+        assert any(phone in one for one in networks), phone
