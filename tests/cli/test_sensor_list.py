@@ -19,7 +19,7 @@ from rich.console import Console
 from appliance.cli.sensors.control_client import ControlClient, Roll
 from appliance.cli.sensors.table import SensorTable
 from appliance.sensor.keys import create_keys, load_keys
-from appliance.sensor.wire import IS_NDOF
+from appliance.sensor.wire import IS_NDOF, SIGNAL_SHIFT
 from appliance.show_control.sensor_roster import RosterLine
 from appliance.stage.sensor_lines import roster_lines
 from tests.cli.running_box import LEFT, RunningBox
@@ -60,6 +60,23 @@ def test_a_drift_taken_out_and_the_time_that_a_battery_lasts_are_shown() -> None
     console.print(SensorTable([line]))
     shown = console.export_text()
     assert "-23°" in shown and "12 %, 45 min" in shown
+
+
+def test_the_page_on_sensors_has_the_columns_that_are_printed() -> None:
+    line = RosterLine(
+        *("left-wrist", "1a2b3c4d", "linked", "192.168.4.7:2390", 50.0, 0.012, 0.0042, 0.013, 87, 0b00111100),
+        *(6 << SIGNAL_SHIFT, "1.0.0", "", "taken", ""),
+    )
+    console = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
+    console.print(SensorTable([line]))
+    headings = re.split(r"\s{2,}", console.export_text().splitlines()[0].strip())
+    page = (Path(__file__).resolve().parents[2] / "docs" / "sensors.md").read_text("utf-8")
+    printed = re.search(r"(?m)^name  +state .+$", page)
+    assert printed and re.split(r"\s{2,}", printed[0]) == headings
+    explained = re.findall(
+        r"`([a-z ]+)`", "".join(re.findall(r"(?m)^\| (`[a-z ]+`(?:, `[a-z ]+`)*) \|", page))
+    )
+    assert {*headings} - {*explained} == {"name", "firmware", "id"}
 
 
 def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
