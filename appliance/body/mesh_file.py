@@ -27,6 +27,7 @@ from appliance.body.body_mesh import SPACING, body_mesh
 from appliance.body.skinning import MOVERS, Baked, BodyMesh
 from appliance.pose.foreign_file import content, require_inside
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.whole_file import written_whole
 
 MESH_FILE = "body.npz"
 MODEL = 6  # another number where sculpture, surface, weights or `bake` change: files of before are made again
@@ -80,10 +81,8 @@ def write_mesh(
         return False
     surface = _packed(body_mesh(skeleton) if model is None else model())
     arrays = surface | _packed_bake(surface)
-    written = folder / f".{MESH_FILE}.new"
-    with written.open("wb") as stream:
-        np.savez_compressed(stream, key=np.array(mesh_key(skeleton)), source=np.array(source), **arrays)
-    written.replace(folder / MESH_FILE)
+    with written_whole(folder / MESH_FILE) as written:
+        np.savez_compressed(written, key=np.array(mesh_key(skeleton)), source=np.array(source), **arrays)
     return True
 
 

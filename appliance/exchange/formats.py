@@ -12,6 +12,7 @@ from appliance.exchange.tables import write_csv, write_npz
 from appliance.pose.bvh import write_bvh
 from appliance.pose.plain_names import changed_names, plain_names
 from appliance.pose.recording import Recording
+from appliance.pose.whole_file import written_whole
 
 _WRITERS: dict[str, Callable[[Path, Recording], None]] = {
     ".glb": write_glb,
@@ -31,17 +32,13 @@ def write_recording(path: Path, recording: Recording) -> str:
         raise ExchangeError(path, "The recording has no frames: nothing was written.")
     names = recording.skeleton.names
     recording = replace(recording, skeleton=replace(recording.skeleton, names=plain_names(names)))
-    beside = path.with_name(f".{path.stem}.part{ending}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
+        with written_whole(path) as beside:
             if ending == ".bvh":
                 write_bvh(beside, recording)
             else:
                 _WRITERS[ending](beside, recording)
-            beside.replace(path)
-        finally:
-            beside.unlink(missing_ok=True)
     except OSError as error:
         raise ExchangeError(
             path, f"The file cannot be written ({error.strerror or error}). Name another place."

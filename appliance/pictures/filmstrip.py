@@ -17,6 +17,7 @@ from appliance.pictures.filmstrip_stage import IVORY, MARGIN_PX, SLATE, VERMILIO
 from appliance.pose.correctable_error import CorrectableError
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.whole_file import written_whole
 
 INK, FAINT = "#efe6d8", "#9a948c"
 COLUMNS = 10
@@ -150,7 +151,8 @@ def draw_rows(
     path.parent.mkdir(parents=True, exist_ok=True)
     with every_script():
         _write(axes, stage, title, coloured)
-        canvas(figure).print_png(path)
+        with written_whole(path) as beside:
+            canvas(figure).print_png(beside)
     return path
 
 

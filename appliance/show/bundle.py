@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from appliance.pose.foreign_file import content, opened, require_inside
+from appliance.pose.whole_file import write_text_whole
 from appliance.show.config_error import Problem, nearest
 
 CHECKSUMS = "SHA256SUMS"
@@ -92,15 +93,13 @@ def bundle_bytes(directory: Path) -> int:
     return sum((directory / name).lstat().st_size for name in bundle_files(directory))
 
 
-def write_checksums(directory: Path) -> Path:
+def write_checksums(directory: Path) -> None:
     """Write SHA256SUMS over all files of the bundle, in the form that `sha256sum --check` reads.
 
     Raises OSError where one of them cannot be part of a show.
     """
     lines = [f"{_sha256(directory, name)}  {name}\n" for name in bundle_files(directory)]
-    written = directory / f".{CHECKSUMS}.new"
-    written.write_text("".join(lines), encoding="utf-8")
-    return written.replace(directory / CHECKSUMS)
+    write_text_whole(directory / CHECKSUMS, "".join(lines))
 
 
 def checksum_problems(directory: Path) -> list[Problem]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -14,6 +13,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import torch
 from torch import Tensor, nn
 
+from appliance.pose.whole_file import written_whole
 from appliance.studio.processes import Processes
 from appliance.studio.studio_error import StudioError
 
@@ -130,14 +130,10 @@ class TrainingLoop(ABC, Generic[Report]):
 
     def save_checkpoint(self, path: Path) -> None:
         """Write the whole state; the old file stays until the new one is complete. Raises StudioError."""
-        partial = path.with_suffix(".partial")
         try:
-            torch.save(self.state(), partial)
-            with partial.open("rb+") as written:
-                os.fsync(written.fileno())  # else a power cut may leave the new name without the content
-            partial.replace(path)
+            with written_whole(path) as beside:
+                torch.save(self.state(), beside)
         except (OSError, RuntimeError) as error:  # torch's writer says RuntimeError for a full disk
-            partial.unlink(missing_ok=True)
             kept = "The one before is kept: make" if path.exists() else "Make"
             message = f"{path}: the checkpoint cannot be written; is the disk full?"
             raise StudioError(f"{message} {kept} room, then continue with --resume.") from error

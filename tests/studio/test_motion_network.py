@@ -95,9 +95,10 @@ def test_an_improviser_that_was_not_exported_as_trained_is_refused(
     improviser = Improviser(MovesShape(8, 6, 4, 4, 24), 12, 1, 2).requires_grad_(False)
     improviser.scale.learn(torch.randn(200, 12))
     monkeypatch.setattr(export, "FARTHEST", 0.01)  # a fault of the graph: its moves hardly move
+    (tmp_path / "improviser.onnx").write_bytes(b"the one before")
     with pytest.raises(StudioError, match="differs from the trained one"):
         export_improviser(improviser, untrained("mlp", 8), NAMES, tmp_path)
-    assert not (tmp_path / "improviser.onnx").exists()
+    assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"the one before"]
 
 
 WITHOUT_TORCH = """

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn
 from torch import nn
 
 from appliance.pose.counted import counted
+from appliance.pose.whole_file import write_text_whole
 from appliance.studio.autoencoder.training import Report, Training
 from appliance.studio.data.dataset import window_starts
 from appliance.studio.evaluation.coders import TorchCoder
@@ -82,9 +83,7 @@ class TrainingRun:
             "parameters": parameters(self.training.autoencoder.network),
             "history": [asdict(line) for line in self.training.history],
         }
-        partial = self.folder / ".training.json"
-        partial.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-        partial.replace(self.folder / "training.json")
+        write_text_whole(self.folder / "training.json", json.dumps(record, indent=1) + "\n")
 
 
 def run_shown(

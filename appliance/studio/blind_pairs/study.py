@@ -15,6 +15,7 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
+from appliance.pose.whole_file import write_text_whole
 from appliance.studio.blind_pairs.votes import packed_key
 from appliance.studio.data.catalogue import find_catalogue, recordings_in
 from appliance.studio.data.dataset import FPS
@@ -62,7 +63,7 @@ def write_study(options: StudyOptions) -> None:
     data = json.dumps(facts, separators=(",", ":")).replace("</", "<\\/")
     template = resources.files("appliance.studio.blind_pairs").joinpath("study.html").read_text("utf-8")
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(template.replace("/*DATA*/", data), encoding="utf-8")
+    write_text_whole(options.out, template.replace("/*DATA*/", data))
 
 
 def _dances(path: Path, options: StudyOptions) -> list[Recording]:

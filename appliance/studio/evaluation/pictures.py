@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from appliance.pictures.filmstrip import draw_filmstrip
 from appliance.pose.recording import Recording
+from appliance.pose.whole_file import written_whole
 from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.evaluation.coders import Coder
 
@@ -137,7 +138,6 @@ def dressed(axes: Any) -> Any:
 def save(figure: Any, path: Path) -> Path:
     """Write a PNG atomically: a viewer may have the old one open."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    with partial.open("wb") as stream:
-        figure.savefig(stream, format="png", facecolor=BACKDROP)
-    return partial.replace(path)
+    with written_whole(path) as beside:
+        figure.savefig(beside, format="png", facecolor=BACKDROP)
+    return path

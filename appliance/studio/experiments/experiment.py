@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.roles import held_joints
 from appliance.show.show import load_show
+from appliance.studio.dance_files import write_report
 from appliance.studio.data.catalogue import recordings_in
 from appliance.studio.data.dataset import FPS, Take, load_folder
 from appliance.studio.data.remembered import remembered_reading
@@ -104,9 +104,7 @@ def run(options: ExperimentOptions) -> None:
             advance("drawing")
     if options.pictures:
         draw_claims(options.out / "experiments.png", TITLE, found, figure_2, nulls)
-    (options.out / "experiments.json").write_text(
-        json.dumps(_report(coders, excerpts, joints, found, nulls), indent=1) + "\n"
-    )
+    write_report(options.out / "experiments.json", _report(coders, excerpts, joints, found, nulls))
     write_page(
         options.out / "experiments.html",
         TITLE,

@@ -8,6 +8,7 @@ import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from appliance.pose.whole_file import write_text_whole
 from appliance.studio.experiments.claims import Claim, times, verdict, worth
 from appliance.studio.experiments.excerpts import Excerpt
 
@@ -40,9 +41,10 @@ def write_page(
         parts += [f"<h3>{html.escape(name)}</h3>", *(_claim(one) for one in claims)]
     for heading, files in pictures.items():
         parts += [f"<h2>{html.escape(heading)}</h2>", *map(_picture, files)] if files else []
-    path.write_text(
+    write_text_whole(
+        path,
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{_STYLE}</style></head>\n<body>\n" + "\n".join(parts) + "\n</body></html>\n"
+        f"<style>{_STYLE}</style></head>\n<body>\n" + "\n".join(parts) + "\n</body></html>\n",
     )
 
 

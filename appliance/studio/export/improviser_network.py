@@ -12,6 +12,7 @@ from torch import Tensor, nn
 
 from appliance.dancer.material.improviser_network import ImproviserNetwork
 from appliance.dancer.material.improvising import BEFORE, FARTHEST, MOVE, improvised
+from appliance.pose.whole_file import written_whole
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.export.graph import Graph, Layers
 from appliance.studio.export.motion_network import (
@@ -35,15 +36,16 @@ def export_improviser(
 ) -> Path:
     """Write the networks' file, weights in 16 bits. Raises StudioError where it is not the trained one."""
     path = folder / FILE
-    write_improviser_network(improviser, autoencoder, joints, path)
     generator = torch.Generator().manual_seed(1)
     shape = improviser.shape
     inside = 0.5 * torch.randn(2, BEFORE + MOVE, shape.inside, generator=generator)
     heard = improviser.scale.features(inside)
     trained = improviser.improvise(heard, _CHECKED_MOVES, 0.0, 1)
-    played = improvised(ImproviserNetwork(path, joints), heard.numpy(), _CHECKED_MOVES, 0.0, 1)
-    apart = improviser.scale.inside(trained) - improviser.scale.inside(torch.from_numpy(played))
-    require_as_trained(path, "improviser", float(apart.abs().mean()), _ROUNDING)
+    with written_whole(path) as written:
+        write_improviser_network(improviser, autoencoder, joints, written)
+        played = improvised(ImproviserNetwork(written, joints), heard.numpy(), _CHECKED_MOVES, 0.0, 1)
+        apart = improviser.scale.inside(trained) - improviser.scale.inside(torch.from_numpy(played))
+        require_as_trained("improviser", float(apart.abs().mean()), _ROUNDING)
     return path
 
 

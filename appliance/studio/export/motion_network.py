@@ -13,6 +13,7 @@ import torch
 from onnx import TensorProto, helper, numpy_helper
 
 from appliance.dancer.material.motion_network import MotionNetwork, map_facts
+from appliance.pose.whole_file import written_whole
 from appliance.studio.autoencoder import networks
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import Dataset
@@ -33,19 +34,19 @@ def export_motion(coder: TorchCoder, dataset: Dataset, model: str, folder: Path)
     """Write the network's file, weights in 16 bits. Raises StudioError where it is not the trained one."""
     path = folder / FILES[model]
     ground = _map(coder.autoencoder, dataset) if model == "pose" else ""
-    write_motion_network(coder.autoencoder, coder.joints, path, ground)
     few = torch.randn(4, coder.autoencoder.shape.latent, generator=torch.Generator().manual_seed(1))
     with torch.no_grad():
         trained = coder.autoencoder.decode_raw(few).numpy()
-    played = MotionNetwork(path, coder.joints).decode(few.numpy())
-    require_as_trained(path, "network", float(np.abs(played - trained).max()), _ROUNDING)
+    with written_whole(path) as written:
+        write_motion_network(coder.autoencoder, coder.joints, written, ground)
+        played = MotionNetwork(written, coder.joints).decode(few.numpy())
+        require_as_trained("network", float(np.abs(played - trained).max()), _ROUNDING)
     return path
 
 
-def require_as_trained(path: Path, name: str, difference: float, most: float) -> None:
-    """Remove a file that differs more from what was trained. Raises StudioError then."""
+def require_as_trained(name: str, difference: float, most: float) -> None:
+    """Raises StudioError for a file that differs more from what was trained."""
     if not difference <= most:
-        path.unlink()
         raise StudioError(
             f"The exported {name} differs from the trained one by {difference:.1g}. No file was written. "
             "This is a bug in the export: report it."

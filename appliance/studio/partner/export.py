@@ -12,6 +12,7 @@ from torch import nn
 
 from appliance.dancer.material.improviser_network import ImproviserNetwork
 from appliance.dancer.material.partner_network import LED_STEPS, SEEN, PartnerNetwork
+from appliance.pose.whole_file import written_whole
 from appliance.studio.export.graph import Graph, Layers
 from appliance.studio.export.motion_network import Port, checked_model, require_as_trained, sizes_of
 from appliance.studio.partner.training import EMBEDDING, FLOW_STEPS, Answers, Partner, Scale, times_of
@@ -24,7 +25,6 @@ def export_partner(partner: Partner, network: ImproviserNetwork, path: Path) -> 
     """Write the networks' file, weights in 8 bits. Raises StudioError where it is not what was trained."""
     for part in partner:
         part.cpu().eval()
-    write_partner_network(partner, network, path)
     generator, scale = torch.Generator().manual_seed(1), partner.answers.scale
     led, moves = (
         scale.middle + torch.randn(size, network.features, generator=generator) / scale.scale
@@ -39,16 +39,18 @@ def export_partner(partner: Partner, network: ImproviserNetwork, path: Path) -> 
             partner.answers(moves[None], led[None], who, heard, noise),
             partner.answers(moves[None], led[None], who, 0 * heard, noise),
         )
-    played = PartnerNetwork(path, network.joints)
     known = moves.numpy(), led.numpy(), who[0].numpy()
-    found = (
-        played.scores(known[1], known[0][None]),
-        played.natural(known[0][None], known[2]),
-        played.answers(*known, noise.numpy()),
-        played.answers(known[0], None, known[2], noise.numpy()),
-    )
-    apart = max(float(np.abs(own.numpy() - other).mean()) for own, other in zip(trained, found, strict=True))
-    require_as_trained(path, "partner", apart, _ROUNDING)
+    with written_whole(path) as written:
+        write_partner_network(partner, network, written)
+        played = PartnerNetwork(written, network.joints)
+        found = (
+            played.scores(known[1], known[0][None]),
+            played.natural(known[0][None], known[2]),
+            played.answers(*known, noise.numpy()),
+            played.answers(known[0], None, known[2], noise.numpy()),
+        )
+        apart = (float(np.abs(own.numpy() - other).mean()) for own, other in zip(trained, found, strict=True))
+        require_as_trained("partner", max(apart), _ROUNDING)
 
 
 def write_partner_network(partner: Partner, network: ImproviserNetwork, path: Path) -> None:

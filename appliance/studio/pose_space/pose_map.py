@@ -17,7 +17,9 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
+from appliance.pose.whole_file import write_text_whole
 from appliance.studio.comparison.alignment import align
+from appliance.studio.dance_files import write_report
 from appliance.studio.data.dataset import FPS
 from appliance.studio.evaluation.nearest import without_heading
 from appliance.studio.opened_model import open_either
@@ -79,7 +81,7 @@ def run(options: MapOptions) -> None:
     }
     if len(paths) == 2:
         report["apart"] = _compare(options.out, recordings, paths, moving)
-    (options.out / "map.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    write_report(options.out / "map.json", report)
     for projection in found:
         console.print(_continuity(projection), highlight=False)
     if not any(one.name.startswith("UMAP") for one in found):
@@ -132,12 +134,12 @@ def _write_sheet(path: Path, picture: Path, frame: tuple[float, float, float, fl
     left, right, bottom, top = (UNITS * edge for edge in frame)
     box = f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}"
     pixels = base64.b64encode(picture.read_bytes()).decode()
-    path.write_text(
+    write_text_whole(
+        path,
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{right - left:.2f}" height="{top - bottom:.2f}" '
         f'viewBox="{box}">\n<title>Draw one line over this map: bunraku path --draw</title>\n'
         f'<image x="{left:.2f}" y="{-top:.2f}" width="{right - left:.2f}" height="{top - bottom:.2f}" '
         f'preserveAspectRatio="none" href="data:image/png;base64,{pixels}"/>\n</svg>\n',
-        encoding="utf-8",
     )
 
 
@@ -171,7 +173,7 @@ def _write_page(
     facts = {"bones": bones, "fps": FPS / every, "known": known, "dances": dances}
     data = json.dumps(facts).replace("</", "<\\/")
     template = resources.files("appliance.studio.pose_space").joinpath("map.html").read_text("utf-8")
-    path.write_text(template.replace("/*DATA*/", data), encoding="utf-8")
+    write_text_whole(path, template.replace("/*DATA*/", data))
 
 
 def _in_three(points: Array) -> list[list[float]]:

@@ -6,7 +6,6 @@ from stillness to a body torn apart.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from rich.table import Table
 from appliance.pictures.filmstrip import Strip, draw_strips
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.losses import divergence
+from appliance.studio.dance_files import write_report
 from appliance.studio.data.dataset import FPS, Dataset, Take, window_starts
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.evaluation.dance_figures import degrees_apart, energy
@@ -69,7 +69,7 @@ def report(autoencoder: Autoencoder, dataset: Dataset, folder: Path, console: Co
     """Measure, print, write report.json and variations.png."""
     takes = dataset.measured_on(autoencoder.shape.window)
     found = sweep(autoencoder, dataset, takes, console)
-    (folder / "report.json").write_text(json.dumps({"variations": asdict(found)}, indent=1) + "\n", "utf-8")
+    write_report(folder / "report.json", {"variations": asdict(found)})
     with doing("drawing variations.png", console):
         _draw(folder / "variations.png", autoencoder, dataset, takes)
     Console().print(table(found))
