@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,14 +18,14 @@ from appliance.pose import quaternion
 from appliance.pose.body_facts import fronts, sampled_positions
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.reading_options import ReadingOptions
-from appliance.show.bundle import default_show_path
-from appliance.show.check import verify_bundle
+from appliance.show.bundle import bundle_files, default_show_path, write_checksums
+from appliance.show.check import not_as_packed, verify_bundle
 from appliance.show.show import load_show
 from appliance.studio.data.catalogue import Catalogue, recordings_in
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.data.remembered import Remembered, reading_facts
 from appliance.studio.evaluation.findings import few_data
-from appliance.studio.export import gate
+from appliance.studio.export import gate, release
 from appliance.studio.export.packing import write_show_yaml
 from tests.studio.conftest import Said, bunraku
 from tests.studio.tiny import swaying, write_recordings
@@ -159,6 +160,64 @@ def test_export_keeps_what_the_artist_wrote(trained: Trained, tmp_path: Path) ->
     assert read_bvh(out / "phrase.bvh").seconds == pytest.approx(2.0)
     assert "contains a recording" not in said(result)
     assert verify_bundle(out) == []
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize("step", ["evaluate", "own_answer", "draw_report"])
+def test_an_export_that_is_interrupted_leaves_the_show_that_was_there(
+    step: str, trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    show = shutil.copytree(trained[0], tmp_path / "show")
+    (show / "puppet.onnx").write_bytes(b"another network")
+    write_checksums(show)
+    before = {name: (show / name).read_bytes() for name in bundle_files(show)}
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(release, step, interrupted)
+    result = bunraku("export", show / "checkpoint.pt", "--out", show)
+    assert result.exit_code, said(result)
+    assert {name: (show / name).read_bytes() for name in bundle_files(show)} == before
+    assert not_as_packed(show) == "" and not list(show.glob(".export-*"))
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_ctrl_c_while_the_files_are_replaced_waits_for_the_checksums(
+    trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    show = shutil.copytree(trained[0], tmp_path / "show")
+    (show / "answer.png").write_bytes(b"of the dancer before")
+    (show / "puppet.onnx").write_bytes(b"another network")
+    write_checksums(show)
+    replace_file, moved = Path.replace, list[str]()
+
+    def replace(file: Path, target: Path) -> Path:
+        if file.parent.name == "show" and file.parent != show:
+            moved.append(target.name)
+            if len(moved) == 2:
+                signal.raise_signal(signal.SIGINT)
+        return replace_file(file, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    result = bunraku("export", show / "checkpoint.pt", "--out", show, "--name", "Other", "--hand", "head")
+    assert result.exit_code == 0, said(result)
+    assert "puppet.onnx" in moved and "show.yaml" not in moved
+    assert "show.yaml stays as it is: --name and --hand are for a new one" in said(result)
+    assert verify_bundle(show) == [] and not (show / "answer.png").exists()
+
+
+def test_a_wrong_hand_or_phrase_is_refused_before_anything_is_measured(
+    trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(release, "judge", lambda *_: pytest.fail("it measured first"))
+    for option, value, named in (
+        ("--hand", "tail", "No hand can hold 'tail'"),
+        ("--phrase", "no.bvh", "no.bvh"),
+    ):
+        result = bunraku("export", trained[0], "--out", tmp_path / "show", option, value)
+        assert result.exit_code == 2 and named in said(result)
+    assert not (tmp_path / "show" / "puppet.onnx").exists()
 
 
 @pytest.mark.usefixtures("unmeasured")

@@ -16,18 +16,20 @@ from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import write_checksums
+from appliance.studio.autoencoder.training_run import stop_signals
 
+SKELETON, PHRASE, SHOW = "skeleton.bvh", "phrase.bvh", "show.yaml"
 PHRASE_DIGITS = 4  # in degrees and centimetres: finer than any eye or projector resolves
 
 
 def write_skeleton(folder: Path, skeleton: Skeleton, still_pose: NDArray[np.floating]) -> Path:
     """skeleton.bvh: the hierarchy and one frame, the pose in which the still joints stand."""
     rest = Recording(skeleton, still_pose[None], np.zeros((1, 3)), 50.0)
-    write_bvh(folder / "skeleton.bvh", rest)
-    return folder / "skeleton.bvh"
+    write_bvh(folder / SKELETON, rest)
+    return folder / SKELETON
 
 
-def write_phrase(folder: Path, phrase: Recording, name: str = "phrase.bvh") -> Path:
+def write_phrase(folder: Path, phrase: Recording, name: str = PHRASE) -> Path:
     """A phrase at 50 Hz."""
     write_bvh(folder / name, replace(phrase.resampled(50.0), fps=50.0), digits=PHRASE_DIGITS)
     return folder / name
@@ -44,12 +46,12 @@ def write_show_yaml(
 
     phrase: what phrase.bvh is, in words.
     """
-    path = folder / "show.yaml"
+    path = folder / SHOW
     if not path.exists():
         text = f"name: {_flow(name)}\n"
         if acknowledgement:
             text += yaml.safe_dump({"acknowledgement": acknowledgement}, allow_unicode=True, width=100)
-        text += _SHOW.replace("PHRASE", " ".join(phrase.split()))
+        text += _TEMPLATE.replace("PHRASE", " ".join(phrase.split()))
         text = text.replace("HANDS", "\n".join(_hand(hand) for hand in hands))
         path.write_text(text.replace("HELD", _flow([hand["joint"] for hand in hands])), encoding="utf-8")
     return path
@@ -69,7 +71,7 @@ def _flow(value: Any) -> str:
     return dumped.removesuffix("\n").removesuffix("\n...")
 
 
-_SHOW = """
+_TEMPLATE = """
 dancer:
   network: puppet.onnx
   coding_iterations: 10        # more: away from the phrase, towards the dancer's habits
@@ -111,7 +113,23 @@ cues:                          # /cue opening, or /cue alone for the next one; w
 """
 
 
+def write_surface(folder: Path) -> None:
+    """The surface of the body whose skeleton is in the bundle."""
+    write_body(folder, with_stance(read_bvh(folder / SKELETON)))
+
+
 def seal(folder: Path) -> None:
     """Write the body's surface, then the checksums over all that is in the bundle."""
-    write_body(folder, with_stance(read_bvh(folder / "skeleton.bvh")))
+    write_surface(folder)
     write_checksums(folder)
+
+
+def put_in_place(made: Path, folder: Path) -> None:
+    """Replace files of a bundle by those in another folder, and write its checksums.
+
+    A first Ctrl-C is not obeyed meanwhile: a box refuses a network beside the checksums of another one.
+    """
+    with stop_signals():
+        for file in made.iterdir():
+            file.replace(folder / file.name)
+        write_checksums(folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
+from appliance.body.mesh_file import MESH_FILE
+from appliance.exchange.glb_body import BODY_FILE
 from appliance.pose import quaternion
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
@@ -41,6 +44,7 @@ SHORT_PHRASE_S = 20.0  # a held-out excerpt shorter than this gives way to a lon
 HANGING_DEGREES = 80.0  # below horizontal: a hanging arm does not touch the hip
 LEVEL_DEGREES = 45.0  # above horizontal: a bone that points further up is no arm
 _PHRASE_OF_ITS_OWN = "Its own: bunraku improvise CHECKPOINT --out FILE, then bunraku export --phrase FILE."
+ANSWER = "answer.png"  # there only if the answer to a hand was measured
 FIRST_HANDS = ("left upper arm", "left forearm", "left hand", "right upper arm", "head")
 
 
@@ -59,7 +63,24 @@ class Request:
 
 
 def release(request: Request, dataset: Dataset, console: Console) -> dict[str, Any]:
-    """Write the whole bundle and return its report. Raises StudioError if export and training differ."""
+    """Write the whole bundle and return its report. Raises StudioError if export and training differ.
+
+    Its files take the place of those in `out` once all are made: after an error or Ctrl-C nothing is changed.
+    """
+    request.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".export-", dir=request.out) as folder:
+        made = Path(folder) / "show"
+        made.mkdir()
+        report = _make(request, dataset, made, console)
+        if not (made / ANSWER).exists():
+            (request.out / ANSWER).unlink(missing_ok=True)
+        packing.put_in_place(made, request.out)
+    print_answer(console, report["puppetry"])
+    return report
+
+
+def _make(request: Request, dataset: Dataset, folder: Path, console: Console) -> dict[str, Any]:
+    """Write what is new in the bundle into a folder; its report."""
 
     def say(message: str) -> None:
         console.print(message, highlight=False)
@@ -74,9 +95,10 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
         )
     places = [dataset.skeleton.index(name) for name in coder.joints]
     judged_on = dataset.measured_on()
-    request.out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".export-", dir=request.out) as folder:
-        files = _export_both(coder, state["settings"]["network"], Path(folder))
+    joint, doubt = first_hand(dataset.skeleton, coder.joints, request.hand)
+    given = None if request.phrase is None else _given_phrase(request.phrase, coder, dataset)
+    with tempfile.TemporaryDirectory(dir=folder.parent) as networks:
+        files = _export_both(coder, state["settings"]["network"], Path(networks))
         coders = {precision: OnnxCoder(file) for precision, file in files.items()}
         windows = sample_windows(judged_on, places)
         difference = _difference(coder, coders["fp32"], windows)
@@ -84,37 +106,41 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
         verdict = judge(coders["fp32"], coders["int8"], windows)
         say(verdict.sentence())
         times = {precision: median_ms(one, windows[0]) for precision, one in coders.items()}
-        files[verdict.precision].replace(request.out / "puppet.onnx")
+        files[verdict.precision].replace(folder / "puppet.onnx")
     evaluation = evaluate(coder, judged_on, fitting_hop(coder, judged_on))
     names = sorted(take.name for take in judged_on)
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
     report[KEY] = reading_facts(request.source.catalogue)
     say("Measuring whether the body answers a hand.")
     error = report["degrees"]["1"]["mean"]
-    report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png", error, state["step"], console)
-    packing.write_skeleton(request.out, dataset.skeleton, _shown_pose(dataset))
+    report["puppetry"] = own_answer(coder, dataset, folder / ANSWER, error, state["step"], console)
+    packing.write_skeleton(folder, dataset.skeleton, _shown_pose(dataset))
     about = "what the show starts from; another: bunraku export --phrase FILE"
-    if request.phrase is not None:
-        packing.write_phrase(request.out, _given_phrase(request.phrase, coder, dataset))
+    if request.phrase is not None and given is not None:
+        packing.write_phrase(folder, given)
         about = f"made of {request.phrase.name}"
-    elif not (request.out / "phrase.bvh").exists():
+    elif not (request.out / packing.PHRASE).exists():
         phrase, about, report["phrase"] = _own_phrase(dataset)
-        packing.write_phrase(request.out, phrase)
+        packing.write_phrase(folder, phrase)
         say(f"phrase.bvh is {about}. The bundle contains a recording. {_PHRASE_OF_ITS_OWN}")
         about = f"{about}. {_PHRASE_OF_ITS_OWN}"
-    joint, doubt = first_hand(dataset.skeleton, coder.joints, request.hand)
-    if doubt:
-        say(doubt)
-    hand: dict[str, Any] = {"sensor": "left-wrist", "joint": joint}
-    hanging = hanging_orientation(dataset.skeleton, hand["joint"])
-    if hanging is not None:
-        hand["at_neutral"] = hanging
-    packing.write_show_yaml(request.out, name, [hand], request.source.catalogue.acknowledgement, about)
-    (request.out / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    if not (request.out / packing.SHOW).exists():
+        if doubt:
+            say(doubt)
+        hand: dict[str, Any] = {"sensor": "left-wrist", "joint": joint}
+        hanging = hanging_orientation(dataset.skeleton, hand["joint"])
+        if hanging is not None:
+            hand["at_neutral"] = hanging
+        packing.write_show_yaml(folder, name, [hand], request.source.catalogue.acknowledgement, about)
+    elif request.name or request.hand:
+        say(f"{request.out / packing.SHOW} stays as it is: --name and --hand are for a new one.")
+    (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     shown = _longest_sound_take(judged_on)
-    draw_report(request.out / "report.png", name, report, evaluation, coder, shown)
-    packing.seal(request.out)
-    print_answer(console, report["puppetry"])
+    draw_report(folder / "report.png", name, report, evaluation, coder, shown)
+    for name in (BODY_FILE, MESH_FILE):
+        if (request.out / name).is_file():
+            shutil.copyfile(request.out / name, folder / name)
+    packing.write_surface(folder)
     return report
 
 
