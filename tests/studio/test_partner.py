@@ -158,6 +158,17 @@ def test_recordings_without_couples_are_refused_with_the_cure(tmp_path: Path) ->
     assert "No couple is kept apart" in result.output and "catalogue.yaml" in result.output
 
 
+def test_couples_that_are_too_short_to_be_measured_get_no_verdict(tmp_path: Path) -> None:
+    takes = write_recordings(tmp_path / "takes", count=4, seconds=10.0)
+    (takes / "catalogue.yaml").write_text(
+        'takes: {a: [sway_0, sway_1], b: [sway_2, sway_3]}\nheld_out: [sway_2]\nkeep: {"*": all}\n'
+    )
+    show = write_show_with_sources(tmp_path / "show")
+    result = CliRunner().invoke(app, ["duet", str(takes), "--show", str(show)])
+    assert result.exit_code == 2, result.output
+    assert "Couples shorter than 11 s cannot be measured: b." in " ".join(result.output.split())
+
+
 @pytest.mark.parametrize(
     ("partner", "message"),
     [

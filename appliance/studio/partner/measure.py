@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.show.show import Show, load_show
+from appliance.studio.dance_files import write_report
 from appliance.studio.data.dataset import FPS, Dataset, Take, load_folder
 from appliance.studio.data.jumps import runs
 from appliance.studio.data.mirror import mirror_pairs
@@ -35,6 +36,7 @@ from appliance.studio.partner.export import FILE, export_partner
 from appliance.studio.partner.training import train
 from appliance.studio.studio_error import StudioError
 
+LEAST_S = 11.0  # shorter couples are alike by chance
 LEAST_TICKS = 200  # length of a stretch from which accord is learned
 COPY_LATE = 25  # ticks by which the null product copies
 FOLLOWS_NAME, STRANGERS_NAME = "follow 1, lead 0", "the same beside dancers of other couples (null)"
@@ -89,6 +91,13 @@ def run(options: DuetOptions, device: str = "cpu") -> list[Row]:
             "No couple is kept apart: two recordings of one take that the catalogue holds out. List takes "
             "and held_out in catalogue.yaml (docs/training.md)."
         )
+    short = [one.take for one, _ in apart if one.recording.seconds < LEAST_S]
+    apart = [both for both in apart if both[0].take not in short]
+    if short:
+        message = f"Couples shorter than {LEAST_S:g} s cannot be measured: {', '.join(short)}."
+        if not apart:
+            raise StudioError(f"{message} Hold longer ones out.")
+        console.print(message, highlight=False)
     network = _improviser(show)
     if options.minutes or options.steps:
         _train(network, dataset, show.directory / FILE, options, console, device)
@@ -101,7 +110,7 @@ def run(options: DuetOptions, device: str = "cpu") -> list[Row]:
     _print(rows)
     if options.out is not None:
         options.out.parent.mkdir(parents=True, exist_ok=True)
-        options.out.write_text(json.dumps([row.__dict__ for row in rows], indent=1))
+        write_report(options.out, [row.__dict__ for row in rows])
         console.print("draws the first couple")
         draw_duets(options.out.with_suffix(".png"), duets, options.seconds)
         console.print(
@@ -146,7 +155,7 @@ def _train(
     dancers = 4 if dataset.mirrors else 2
     partner = train(network, training, apart, dancers, seconds, steps, device, options.seed, console.print)
     export_partner(partner, network, path)
-    console.print(f"{path} is written.")
+    console.print(f"{path} is written. For a box: bunraku pack {shlex.quote(str(path.parent))}.")
 
 
 def _rows(
@@ -188,7 +197,8 @@ def _rows(
                 for name, value in limb_figures(one, two, limbs).items()
                 if name.startswith("energy")
             ]
-            energy = float(np.mean(energies))
+            known = [value for value in energies if np.isfinite(value)]  # not of limbs that always stand
+            energy = float(np.mean(known)) if known else float("nan")
         # The first of a couple leads in every other duet; in all where there is one for each couple.
         roles = [n % 2 if len(both) == len(couples) else 0 for n in range(len(both))]
         accord = [accords[role](*one) for role, one in zip(roles, both, strict=True)]
