@@ -16,13 +16,13 @@ from appliance.projector.moment import Moment, PuppetMoment
 from appliance.projector.picture.camera import view
 from appliance.projector.picture.poses import poses_of
 from appliance.projector.picture.renderer import Renderer
-from appliance.projector.picture.scene import Easel, Scene, direction
+from appliance.projector.picture.scene import MELT_ROUND_S, TIME_ROUND_S, Easel, Scene, direction
 from appliance.projector.picture.shadow import Shadow
 from appliance.projector.picture.wall import DETAILS, FLAT, Wall
 from appliance.projector.still import moment_of
-from appliance.show.look import LookConfig
+from appliance.show.look import STYLES, CameraConfig, LookConfig, Style
 from appliance.show.projector import ProjectorConfig
-from tests.projector.golden_looks import AT_S
+from tests.projector.golden_looks import AT_S, renderer
 from tests.projector.stage_double import pixels
 
 SIZE = 640, 360
@@ -110,3 +110,22 @@ def test_a_fast_limb_of_ink_runs_dry_and_the_rest_stays_as_it_is(
     assert (changed > 25).sum() > 40
     dark = sharp.max(axis=2) < 90
     assert changed[dark].mean() < 6, "a trunk that hardly moves"
+
+
+@pytest.mark.parametrize("melt", [0.0, 1.0])
+@pytest.mark.parametrize("style", STYLES)
+def test_nothing_jumps_after_an_hour_when_the_shaders_time_begins_anew(
+    style: Style, melt: float, gl: moderngl.Context, dance: Recording
+) -> None:
+    """It wrapped at 4096 s once: haze, dust and a molten surface were elsewhere in the next picture."""
+    look = LookConfig(name="x", style=style, melt=melt, fog=1.0, camera=CameraConfig(move="still"))
+    now = moment_of(dance, AT_S)
+
+    def at(made: Renderer, time_s: float) -> np.ndarray:
+        trail_times = [time + time_s - now.time_s for time in now.trail_times]
+        return picture(gl, made, replace(now, time_s=time_s, trail_times=trail_times), "x")
+
+    with renderer(gl, dance.skeleton, {"x": look}) as made:
+        for anew_s in (4096.0, TIME_ROUND_S, 51 * MELT_ROUND_S):
+            earlier, before, after = (at(made, anew_s + step) for step in (-0.03, -0.01, 0.01))
+            assert np.abs(after - before).mean() < 2.0 * np.abs(before - earlier).mean() + 0.2

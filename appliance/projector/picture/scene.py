@@ -40,6 +40,8 @@ WIDER, SPREAD_STEP, MOST_SPREAD = 1.2, 0.5, 5.0  # in a figure height from the m
 KEY_FROM, KEY_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor
 SHUTTER = 0.5  # rows of poses for which the shutter is open: 12 ms
 MOST_MOMENTS, BLUR_STEP = 4, 5.0  # pixels from one moment to the next
+TIME_ROUND_S = 1000.0  # shaders' time begins anew: all that drifts, runs or sways comes round in it
+MELT_ROUND_S = 20.0 * math.pi  # the same for the waves of a molten surface
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
 LUMP = 0.2  # and a wholly amorphous one beyond that
 
@@ -69,7 +71,8 @@ class Scene:
             "spread": self.spread,
             "stands": self._stands,
             "aspect": self.aspect,
-            "time": self.time_s % 4096.0,
+            "time": self.time_s % TIME_ROUND_S,
+            "time_round": TIME_ROUND_S,
         }
 
     @property
@@ -204,7 +207,7 @@ class Easel:
     def melt(self, share: float, time_s: float) -> None:
         """How amorphous figures are from now on, 0 to 1; time_s moves their surface."""
         root = tuple(self.bind_positions[0].tolist())
-        self._melt = {"melt": share, "melt_time": time_s % 4096.0, "bind_root": root}
+        self._melt = {"melt": share, "melt_time": time_s % MELT_ROUND_S, "bind_root": root}
 
     def weigh(self, of: Callable[[Poses], Floats]) -> None:
         """Bring a number of each joint onto the GPU, in place of how far it follows. of: a figure's poses."""

@@ -14,6 +14,7 @@ uniform float pixels;
 uniform float rows;
 uniform float row_s;
 uniform float time;
+uniform float time_round;  // seconds after which time begins anew
 uniform float loose_share;
 uniform float fog;
 uniform float focus;
@@ -35,7 +36,8 @@ vec3 place_at(float back) {
 void main() {
     bool loose = in_chance.x < loose_share;
     float life = (rows - 3.0) * (0.35 + 0.65 * in_chance.y);
-    float back = loose ? fract(time / (life * row_s) + in_chance.z) * life : 0.0;
+    float lives = round(time_round / (life * row_s));  // whole ones, so that no grain jumps then
+    float back = loose ? fract(time / time_round * lives + in_chance.z) * life : 0.0;
     int row = int(back);
     vec3 place = place_at(back), before = place_at(back + 1.5);
     vec3 velocity = (place - before) / (1.5 * row_s);
