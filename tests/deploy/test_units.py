@@ -169,6 +169,18 @@ def test_the_keeper_outlasts_an_orderly_end_of_all_others() -> None:
     assert longest_s < END_S < stops_s["bunraku-keeper.service"]
 
 
+def test_the_page_on_units_has_each_of_them_with_its_times() -> None:
+    page = (SYSTEM.parents[1] / "docs" / "units.md").read_text("utf-8")
+    rows = re.findall(r"(?m)^\| `(bunraku-\w+)` \| .+? \| (\S+).*? \| (\S+).*? \|", page)
+    assert sorted(f"{name}.service" for name, *_ in rows) == SERVICES
+    for name, watchdog, pause in rows:
+        said = settings(f"{name}.service")
+        times = said.get("WatchdogSec") or said.get("TimeoutStartSec") or ["-"]
+        pauses = said["RestartSec"] if "Restart" in said else ["-"]
+        for shown, meant in ((watchdog, times[0]), (pause, pauses[0])):
+            assert shown == meant == "-" or float(shown) == seconds(meant), name
+
+
 def test_the_target_starts_everything_that_is_there_at_power_on() -> None:
     wanted = re.findall(r"^Wants=(.*)$", (UNITS / "bunraku.target").read_text(), re.MULTILINE)
     by_paths = {f"bunraku-{name}" for name in ("anew", "learn", "prove", "update")}
