@@ -280,6 +280,14 @@ def test_pages_that_messages_and_comments_name_exist() -> None:
     assert nowhere == {}
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_of_source_that_pages_name_exist(page: Path) -> None:
+    folders = ("appliance", "deploy", "firmware", "hw_sim", "tests", "tools", "distributions")
+    known = [f"/{path.relative_to(ROOT)}" for folder in folders for path in (ROOT / folder).rglob("*.*")]
+    named = set(SOURCE.findall(page.read_text("utf-8")))
+    assert {one for one in named if not any(path.endswith(f"/{one}") for path in known)} == set()
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if page.name != "notebook.md"], ids=lambda p: p.name)
 def test_buttons_and_parts_of_the_page_are_called_as_they_are_there(page: Path) -> None:
     words = json.loads((ROOT / "appliance/console/page/words/en.json").read_text("utf-8")).values()
@@ -294,6 +302,7 @@ IS_COMMAND = re.compile(
     r"\s*(?:\$ )?(?:sudo )?(bunraku(?:-[a-z-]+)?|make|apt|dd|oscsend|torchrun|arduino-cli|blender|nmcli"
     r"|systemctl|python|ffmpeg|journalctl|cp|mount)(?: +([a-z-]+))?"
 )
+SOURCE = re.compile(r"`([\w./-]+\.(?:py|js|cpp|h|sh|ino))`")
 EMPHASISED = re.compile(r"(?<![*\w])\*([A-Z][^*]+)\*(?!\*)")
 # Words of other programs and titles of papers; all others in italics are the page's.
 NOT_ON_THE_PAGE = {
