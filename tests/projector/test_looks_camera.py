@@ -10,7 +10,7 @@ import pytest
 
 from appliance.pose.recording import Recording
 from appliance.projector.moment import Moment
-from appliance.projector.picture.camera import CuedCamera, View, view
+from appliance.projector.picture.camera import CuedCamera, View, Ways, view
 from appliance.projector.picture.poses import poses_of
 from appliance.projector.still import moment_of
 from appliance.show.look import CameraConfig
@@ -132,6 +132,30 @@ def test_fades_from_place_to_place_the_short_way(dance: Recording) -> None:
     before, now = CameraConfig(move="still", angle_deg=170.0), CameraConfig(move="still", angle_deg=-170.0)
     ends = [np.degrees(view(before, now, mix, 0.0, poses, 1.5).azimuth) for mix in (0.0, 0.5, 1.0)]
     assert ends == pytest.approx([170.0, 180.0, 190.0])
+
+
+@pytest.mark.parametrize("by_cue", [False, True])
+def test_a_circling_camera_fades_without_a_jump_to_its_other_side(dance: Recording, by_cue: bool) -> None:
+    """Where the two places come to lie opposite each other in mid-fade, the other way round gets shorter."""
+    poses = poses_of(moment_of(dance, 20.0), moment_of(dance, 20.0).puppets[0], HEIGHT, SOLE)
+    orbit, still = CameraConfig(move="orbit", period_s=20.0), CameraConfig(move="still")
+    for begins_s in range(20):
+        ways, backs = Ways(), []
+        for mix in np.linspace(0.0, 1.0, 8 * 60 + 1).tolist():
+            time_s = begins_s + 8.0 * mix
+            if by_cue:
+                cued = CuedCamera({}, {"move": "still"}, mix)
+                backs.append(view(orbit, orbit, 1.0, time_s, poses, 1.5, cued, ways).back)
+            else:
+                backs.append(view(orbit, still, mix, time_s, poses, 1.5, ways=ways).back)
+        assert np.linalg.norm(np.diff(backs, axis=0), axis=1).max() < 0.05
+
+
+def test_a_fade_that_takes_over_from_another_goes_the_short_way() -> None:
+    ways = Ways()
+    assert ways("look", 3.0, 0.5) == pytest.approx(3.0)
+    assert ways("look", 3.3, 0.6) == pytest.approx(3.3)  # the long way now, without a jump
+    assert ways("look", -0.2, 0.1) == pytest.approx(-0.2)
 
 
 def test_a_cue_moves_the_camera_whatever_the_look(dance: Recording) -> None:

@@ -82,6 +82,25 @@ class CuedCamera(NamedTuple):
 NOT_CUED = CuedCamera({}, {}, 1.0)
 
 
+class Ways:
+    """Which way round a camera goes from one angle to another: the short one at first, then on that way.
+
+    Both ends may circle meanwhile; the other way round becoming the shorter one would be a jump.
+    """
+
+    def __init__(self) -> None:
+        self._before: dict[str, tuple[float, float]] = {}
+
+    def __call__(self, name: str, radians: float, share: float) -> float:
+        """The way of a fade of that name that is `share` over, from what it was a picture ago; less of it
+        over than then: another fade."""
+        way, done = self._before.get(name, (0.0, 0.0))
+        way = way if share >= done else 0.0
+        way += (radians - way + np.pi) % (2 * np.pi) - np.pi
+        self._before[name] = (way, share) if share < 1.0 else (0.0, 0.0)
+        return way
+
+
 def view(
     before: CameraConfig,
     now: CameraConfig,
@@ -90,13 +109,22 @@ def view(
     poses: Poses,
     aspect: float,
     cued: CuedCamera = NOT_CUED,
+    ways: Ways | None = None,
 ) -> View:
-    """The camera at time_s; mix 0: as in `before`, 1: as in `now`; aspect: the picture's width / height."""
+    """The camera at time_s; mix 0: as in `before`, 1: as in `now`; aspect: the picture's width / height;
+    ways: of the pictures before this one, None: it is alone."""
+    ways = ways or Ways()
+
+    def between(name: str, a: _Stand, b: _Stand, share: float) -> _Stand:
+        """From one stand to another."""
+        mixed = [first + ease(share) * (second - first) for first, second in zip(a, b, strict=True)]
+        return _Stand(a.azimuth + ease(share) * ways(name, b.azimuth - a.azimuth, share), *mixed[1:])
+
     left, reached = (
-        _between(_stand(before, time_s, changes), _stand(now, time_s, changes), ease(mix))
-        for changes in (cued.before, cued.now)
+        between(name, _stand(before, time_s, changes), _stand(now, time_s, changes), mix)
+        for name, changes in (("left", cued.before), ("reached", cued.now))
     )
-    stand = _between(left, reached, ease(cued.mix))
+    stand = between("cued", left, reached, cued.mix)
     slope = float(np.tan(stand.lens / 2))
     slopes = (slope * aspect, slope) if aspect >= 1 else (slope, slope / aspect)
     distance = 0.5 / (stand.figure * min(slopes[1], UPRIGHT * slopes[0]))
@@ -125,13 +153,6 @@ def _stand(config: CameraConfig, time_s: float, changes: Changes) -> _Stand:
         azimuth += np.radians(config.sweep_deg) * np.sin(turn)
         elevation += np.radians(0.12 * config.sweep_deg) * np.sin(0.618 * turn)
     return _Stand(float(azimuth), float(elevation), np.radians(config.lens_deg), config.figure, config.follow)
-
-
-def _between(a: _Stand, b: _Stand, share: float) -> _Stand:
-    """From one stand to another, the short way round."""
-    way = (b.azimuth - a.azimuth + np.pi) % (2 * np.pi) - np.pi
-    mixed = [first + share * (second - first) for first, second in zip(a, b, strict=True)]
-    return _Stand(a.azimuth + share * way, *mixed[1:])
 
 
 def _limited(value: float, limit: float) -> float:

@@ -11,7 +11,7 @@ import moderngl
 from appliance.pose.ease import ease
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.moment import Moment
-from appliance.projector.picture.camera import NOT_CUED, CuedCamera, view
+from appliance.projector.picture.camera import NOT_CUED, CuedCamera, Ways, view
 from appliance.projector.picture.looks.cloud import Cloud
 from appliance.projector.picture.looks.ink import Ink
 from appliance.projector.picture.looks.lines import Lines
@@ -44,8 +44,8 @@ class Renderer:
     """Owns what the looks need on the GPU; draws any of them into a framebuffer, or right onto the wall.
 
     looks: by name, at least one, in the show's order; show: its folder, which has the body's surface.
-    The same moment makes the same picture, whatever was drawn before; with keeps_strokes ink's paper also
-    shows the strokes of the pictures before it.
+    The same moment makes the same picture, whatever was drawn before, but for the way round that the camera
+    goes in a fade; with keeps_strokes ink's paper also shows the strokes of the pictures before it.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Renderer:
         show: Path | None = None,
         keeps_strokes: bool = False,
     ) -> None:
-        self._looks = looks
+        self._looks, self._ways = looks, Ways()
         self._easel = Easel(ctx, skeleton, show)
         styles = dict.fromkeys(look.style for look in looks.values())
         self._styles: dict[Style, _Look] = {
@@ -84,7 +84,7 @@ class Renderer:
         each = [poses_of(moment, puppet, easel.height, easel.sole) for puppet in moment.puppets]
         poses = together(each)
         wall = target if isinstance(target, Wall) else flat(target)
-        seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect, cued)
+        seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect, cued, self._ways)
         melt = before.melt + ease(mix) * (now.melt - before.melt)
         scene = Scene(moment.time_s, seen, poses, wall.aspect, melt)
         easel.melt(melt, moment.time_s)
