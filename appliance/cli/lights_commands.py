@@ -9,7 +9,14 @@ from typing import Annotated
 
 import typer
 
-from appliance.cli.options import BoxFile, ChosenFile, ShowFolder, command_group, is_for_subcommand
+from appliance.cli.options import (
+    BoxFile,
+    ChosenFile,
+    ShowFolder,
+    ThisBoxFile,
+    command_group,
+    is_for_subcommand,
+)
 from appliance.release.choice import box_of
 from appliance.show.asked_for import require_wires
 from appliance.show.bundle import named_show
@@ -40,7 +47,7 @@ def light(
 @lights.command("test")
 def walk_through(
     show: ShowFolder = None,
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     fixture: Annotated[list[str] | None, typer.Option(help="This fixture alone; repeatable.")] = None,
     attribute: Annotated[str | None, typer.Option(help="This attribute alone; `aim` for heads.")] = None,
     seconds: Annotated[float, typer.Option(min=0.1, max=600, help="How long each attribute moves.")] = 3.0,
