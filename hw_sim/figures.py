@@ -21,6 +21,7 @@ from hw_sim.latency import (
     sounded_ms,
     steps,
     transport,
+    watched_steps,
 )
 from hw_sim.probe import Run
 
@@ -47,6 +48,7 @@ class Evidence:
     free: Run
     power_ons: Run
     restarts: Sequence[Restart]
+    switched_on: int = 0  # how often the sensor was switched on, and off again before the run ended
     firmware: bool = False  # the compiled firmware was the sensor, and joined a simulated Wi-Fi each time
     light: Run | None = None  # with a projector on a screen that was watched
     light_dance: Run | None = None  # the same with a hand that dances
@@ -94,7 +96,7 @@ def _light(run: Run | None, dance: Run | None) -> dict[str, Any]:
     rate = (len(seen) - 1) / (seen[-1] - seen[0]) if len(seen) > 1 else 0.0
     found = response_ms(standing, run.pictures)
     return {
-        "hand_to_light_ms": percentiles(found, FEW),
+        "hand_to_light_ms": percentiles(found, FEW, watched_steps(standing, run.pictures) - len(found)),
         "dance_to_light_ms": lag_ms(_danced(dance), dance.pictures),
         "pictures_a_second": round(rate, 1),
         "light_steps": len(found),
@@ -127,11 +129,13 @@ def figures_of(evidence: Evidence) -> dict[str, Any]:
     locked, (way, free_way) = evidence.locked, evidence.transports
     standing = [moment for moment in steps(locked.readings) if moment >= locked.stood_from + 0.5]
     response = response_ms(standing, locked.frames)
+    unseen = watched_steps(standing, locked.frames) - len(response)
+    unanswered = max(0, evidence.switched_on - len(evidence.power_on_s))
     costs_ms: Floats = locked.ticks["sections_ms"].sum(axis=1).astype(np.float64)
     return {
         "transport_ms": percentiles(way.latency_ms, NAMED),
         "free_running_transport_ms": percentiles(free_way.latency_ms, {"p50": 50.0, "p99": 99.0}),
-        "response_ms": percentiles(response, {"p50": 50.0}),
+        "response_ms": percentiles(response, {"p50": 50.0}, unseen),
         "ticks": len(locked.ticks),
         "late_ticks": int(((locked.ticks["flags"] & LATE) > 0).sum()),
         "missing_frames": missing_frames(locked.frames),
@@ -142,15 +146,17 @@ def figures_of(evidence: Evidence) -> dict[str, Any]:
         },
         "rss_mb": round(locked.rss_mb, 1),
         "start_to_first_frame_s": round(locked.start_to_first_frame_s, 3),
-        "power_on_to_reading_s": percentiles(evidence.power_on_s, FEW),
+        "power_on_to_reading_s": percentiles(evidence.power_on_s, FEW, unanswered),
         "restart_to_reading_s": percentiles(evidence.restart_s, FEW),
         "kill_to_reading_s": percentiles(evidence.kill_s, FEW),
         "firmware": evidence.firmware,
         "power_ons": len(evidence.power_on_s),
+        "unanswered_power_ons": unanswered,
         "restarts": len(evidence.restarts),
         "readings": len(way.latency_ms),
         "overtaken_readings": way.overtaken,
         "steps": len(response),
+        "unseen_steps": unseen,
         **_sound(evidence.sound),
         **_light(evidence.light, evidence.light_dance),
     }
@@ -203,10 +209,12 @@ def table(figures: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
         "transport  " + "  ".join(f"{name} {_ms(value)}" for name, value in way.items()),
         f"  ({figures['readings']} readings, {figures['overtaken_readings']} of them overtaken by newer)",
         f"  running free  p50 {_ms(free['p50'])}  p99 {_ms(free['p99'])}",
-        f"response to a step, half of the way  p50 {_ms(response['p50'])}   ({figures['steps']} steps)",
+        f"response to a step, half of the way  p50 {_ms(response['p50'])}   ({figures['steps']} steps, "
+        f"{figures['unseen_steps']} more did not show)",
         *_sound_lines(figures),
         *_light_lines(figures),
-        f"{figures['power_ons']} power-ons of a sensor, {figures['restarts']} restarts of the box",
+        f"{figures['power_ons']} power-ons of a sensor, {figures['unanswered_power_ons']} more without a "
+        f"reading; {figures['restarts']} restarts of the box",
         "tick by section, p50  "
         + "  ".join(f"{name} {_ms(part['p50'])}" for name, part in figures["sections_ms"].items()),
         "",

@@ -83,7 +83,7 @@ def transport(readings: Sequence[SentReading], frames: Sequence[Frame]) -> Trans
 def power_on_s(readings: Sequence[SentReading], frames: Sequence[Frame]) -> Floats:
     """From each power-on of the sensor to the first frame that carries a reading of that power-on, seconds.
 
-    A power-on of which no frame tells is left out: the run ended before.
+    A power-on of which no frame tells is left out: the run ended before, or the box did not take the sensor.
     """
     in_order = sorted(frames, key=lambda frame: frame.arrived_at)
     arrived_at = [frame.arrived_at for frame in in_order]
@@ -126,6 +126,12 @@ class Shown(Protocol):
     def joint(self) -> Floats: ...
 
 
+def watched_steps(step_times: Sequence[float], shown: Sequence[Shown]) -> int:
+    """How many steps of the sensor fell into the time that was watched: those that should show."""
+    times = np.array([one.arrived_at for one in shown])
+    return sum(min(int(part.sum()) for part in _around(moment, times)) >= 2 for moment in step_times)
+
+
 def response_ms(step_times: Sequence[float], shown: Sequence[Shown]) -> Floats:
     """From each step of the sensor to half of the step in what is shown, ms; only steps that show.
 
@@ -138,8 +144,7 @@ def response_ms(step_times: Sequence[float], shown: Sequence[Shown]) -> Floats:
     joints = _continuous(np.array([one.joint for one in shown]))
     found = []
     for moment in step_times:
-        before = (times >= moment - BEFORE_STEP_S) & (times < moment)
-        after = (times >= moment + SETTLED_S[0]) & (times < moment + SETTLED_S[1])
+        before, after = _around(moment, times)
         if before.sum() < 2 or after.sum() < 2:
             continue
         start, end = joints[before].mean(0), joints[after].mean(0)
@@ -153,6 +158,12 @@ def response_ms(step_times: Sequence[float], shown: Sequence[Shown]) -> Floats:
         if len(beyond):
             found.append(1000.0 * (times[during][beyond[0]] - moment))
     return np.array(found)
+
+
+def _around(moment: float, times: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of the times are just before a step, and which after it, when it should have settled."""
+    before = (times >= moment - BEFORE_STEP_S) & (times < moment)
+    return before, (times >= moment + SETTLED_S[0]) & (times < moment + SETTLED_S[1])
 
 
 def sounded_ms(moments: Sequence[float], played: Played) -> Floats:
@@ -212,11 +223,18 @@ def _speeds(turned: Sequence[tuple[float, Sequence[float]]], grid: Floats) -> Fl
     return speeds
 
 
-def percentiles(values: Floats, which: Mapping[str, float]) -> dict[str, float | None]:
-    """Named percentiles, rounded to microseconds of the given milliseconds; None without values."""
-    if not len(values):
-        return dict.fromkeys(which)
-    return {name: round(float(np.percentile(values, share)), 3) for name, share in which.items()}
+def percentiles(values: Floats, which: Mapping[str, float], missing: int = 0) -> dict[str, float | None]:
+    """Named percentiles, rounded to microseconds of the given milliseconds; None without values.
+
+    missing: how many more should have come and never did. They count as later than all others: a percentile
+    that is one of them is None.
+    """
+    ranks = {name: share / 100.0 * (len(values) + missing - 1) for name, share in which.items()}
+    places, in_order = np.arange(len(values)), np.sort(values)
+    return {
+        name: round(float(np.interp(rank, places, in_order)), 3) if np.ceil(rank) < len(values) else None
+        for name, rank in ranks.items()
+    }
 
 
 def _continuous(quaternions: Floats) -> Floats:

@@ -105,7 +105,10 @@ def measure(
                 print(f"Watching the projector's pictures for {free_s:g} s ...", flush=True)
                 steps, dance = light_courses(free_s)
                 light_steps, light_dance = run(setting, steps), run(setting, dance)
-            evidence = Evidence(locked, free, power_ons, restarts, firmware, light_steps, light_dance, heard)
+            evidence = Evidence(
+                *(locked, free, power_ons, restarts, course.switched_on),
+                *(firmware, light_steps, light_dance, heard),
+            )
     except (ProbeError, OSError, ValueError) as error:
         message = sentence(error) if isinstance(error, OSError) else None
         print(f"bunraku measure: {message or error}", file=sys.stderr)

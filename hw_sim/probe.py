@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hw_sim.emulated_sensor import REBOOT_S
 from hw_sim.journal_reader import read_journal
 from hw_sim.latency import Frame, Restart, SentReading
 from hw_sim.osc_receiver import OscReceiver, decode
@@ -64,6 +65,11 @@ class Course:
     projects: bool = False
     sounds: bool = False
     dances: bool = False
+
+    @property
+    def switched_on(self) -> int:
+        """How often the sensor is switched on, and off again before the run ends."""
+        return round(self.seconds / (self.reboot_every_s + REBOOT_S)) if self.reboot_every_s else 0
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,9 @@ from hw_sim.latency import (
     response_ms,
     steps,
     transport,
+    watched_steps,
 )
+from hw_sim.measure import power_on_course
 from hw_sim.motions import about, dance, multiply
 from hw_sim.peers import ProbeError
 from hw_sim.probe import Run
@@ -97,6 +100,23 @@ def test_a_power_on_of_which_no_frame_tells_is_left_out() -> None:
     assert len(power_on_s([], received)) == 0
 
 
+def test_a_power_on_without_a_reading_is_later_than_all_others() -> None:
+    """Null: of the readings that came, each is in time."""
+    sent, received = power_ons(2)
+    some = replace(evidence(), power_ons=run(sent, received), switched_on=3)
+    assert figures_of(some)["power_on_to_reading_s"] == {"p50": pytest.approx(0.752), "max": None}
+    few = figures_of(replace(some, switched_on=5))
+    assert (few["power_ons"], few["unanswered_power_ons"]) == (2, 3)
+    failed = [limit.label for limit in verdict(few) if not limit.holds]
+    assert failed == ["sensor's power-on to its reading in a frame, median"]
+    assert "2 power-ons of a sensor, 3 more without a reading" in "\n".join(table(few, verdict(few)))
+
+
+def test_a_sensor_is_switched_on_and_off_as_often_as_its_course_says() -> None:
+    assert [power_on_course(seconds, 1.5).switched_on for seconds in (4.0, 18.0, 120.0)] == [2, 6, 9]
+    assert power_on_course(30.0, 5.0).switched_on == 9
+
+
 def test_transport_is_from_sending_to_the_first_frame_with_the_reading() -> None:
     sent = readings(100)
     received = frames(sent)
@@ -145,6 +165,27 @@ def test_a_joint_that_does_not_follow_has_no_response() -> None:
     still = [frame._replace(joint=np.array([1.0, 0, 0, 0])) for frame in frames(sent)]
     assert len(response_ms(steps(sent), still)) == 0
     assert percentiles(np.zeros(0), {"p50": 50.0}) == {"p50": None}
+
+
+def test_steps_that_show_late_or_never_count_as_later_than_all_others() -> None:
+    sent = readings(400)
+    moments = steps(sent)
+    early, late = frames(sent, response_s=0.02), frames(sent, response_s=0.35)
+    third = moments[2] - 0.02
+    received = [one if one.arrived_at < third else other for one, other in zip(early, late, strict=True)]
+    assert len(response_ms(moments, received)) < len(moments) / 2 < watched_steps(moments, received)
+    figures = figures_of(replace(evidence(), locked=run(sent, received)))
+    assert figures["response_ms"] == {"p50": None} and figures["unseen_steps"] > figures["steps"]
+    assert "nothing came" in "\n".join(table(figures, verdict(figures)))
+
+
+def test_percentiles_with_what_is_missing() -> None:
+    values = np.random.default_rng(1).normal(size=101)
+    for share in (0.0, 12.3, 50.0, 99.0, 99.9, 100.0):
+        found = percentiles(values, {"p": share})["p"]
+        assert found == pytest.approx(np.percentile(values, share), abs=6e-4)
+    assert percentiles(np.array([1.0, 3.0]), {"p50": 50.0, "max": 100.0}, 1) == {"p50": 3.0, "max": None}
+    assert percentiles(np.array([1.0]), {"p50": 50.0}, 1) == {"p50": None}
 
 
 def test_the_figures_have_exactly_the_documented_names() -> None:
