@@ -88,7 +88,8 @@ def emulate_command(setting: Setting, port: int, log: Path, *options: str) -> li
 def write_box_file(setting: Setting, folder: Path, ports: tuple[int, int, int], **own: object) -> Path:
     """The venue's limits and real-time settings with the run's own ports: sensors, control, frames.
 
-    Its state and runtime folders are separate too; it serves no page and makes no sound.
+    Its state and runtime folders are separate too; it serves no page and makes no sound. It hears no other
+    box, no timecode and no MIDI, and keeps no opening hours: closed, it would stand still.
     """
     sensors, control, frames = ports
     values = {
@@ -100,6 +101,7 @@ def write_box_file(setting: Setting, folder: Path, ports: tuple[int, int, int], 
         "state": str(folder / "state"),
         "console": None,
         "sound": None,
+        **dict.fromkeys(("pair", "locked", "timecode", "midi", "hours")),
         **own,
     }
     path = folder / "box.yaml"

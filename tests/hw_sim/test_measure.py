@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hw_sim.peers import scratch_folder
+from appliance.show.box import load_box
+from hw_sim.peers import Setting, scratch_folder, write_box_file
 from tests.bundles import write_show
 
 
@@ -39,6 +40,25 @@ def test_a_folder_is_removed_while_files_still_appear_in_it() -> None:
         writer.start()
     assert not folder.exists()
     writer.join()
+
+
+def test_what_is_measured_is_no_box_of_a_pair_and_keeps_no_opening_hours(tmp_path: Path) -> None:
+    """It would take over from the box that dances, or stand still outside of the hours."""
+    (tmp_path / "secret").write_text("0" * 64)
+    venue = {
+        "limits": {"wait_ms": 3},
+        "pair": {"role": "second", "peer": ["127.0.0.2"], "secret": str(tmp_path / "secret")},
+        "hours": {"open": [{"days": ["mon"], "from": "10:00", "to": "10:01"}]},
+        "timecode": {"source": "art-net"},
+        "midi": {},
+    }
+    (tmp_path / "venue.yaml").write_text(json.dumps(venue))
+    theirs = load_box(tmp_path / "venue.yaml")
+    setting = Setting(tmp_path, venue, tmp_path / "keys", "left-wrist", "lShldr", tmp_path)
+    ours = load_box(write_box_file(setting, tmp_path, (9750, 9002, 9004)))
+    for name in ("pair", "hours", "timecode", "midi"):
+        assert getattr(theirs, name) is not None and getattr(ours, name) is None, name
+    assert ours.locked is None and ours.limits == theirs.limits
 
 
 @pytest.mark.realtime
