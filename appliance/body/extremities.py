@@ -37,6 +37,8 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
     if float((_furthest(anatomy, thumb, wrist) - knuckles.mean(axis=0)) @ aside) < 0.0:
         aside = -aside
     palm = np.cross(knuckles.mean(axis=0) - wrist, aside)
+    if float(np.linalg.norm(palm)) < 1e-6 * height:  # all in the wrist, or along one line
+        return _plain_hand(anatomy, joint)
     palm = palm / np.linalg.norm(palm)
     if float((wrist - anatomy.positions[anatomy.trunk[0]]) @ anatomy.across) < 0.0:
         palm = -palm

@@ -330,6 +330,17 @@ def test_a_hand_has_five_fingers_also_where_the_skeleton_has_none(name: str, han
     assert pieces(mesh, near & (out > 0.0)) == 1
 
 
+def test_fingers_that_span_no_palm_are_a_plain_hand() -> None:
+    """Some skeletons have all bones of the palm begin in the wrist."""
+    dancer = skeletons.dancer()
+    offsets = dancer.offsets.copy()
+    for hand in (dancer.index("lHand"), dancer.index("rHand")):
+        knuckles = [joint for joint, parent in enumerate(dancer.parents) if parent == hand]
+        offsets[knuckles] = 0.0
+    body = body_mesh(Skeleton(dancer.names, dancer.parents, offsets, dancer.ends))
+    assert np.isfinite(body.vertices).all() and len(body.faces) > 20_000
+
+
 def test_a_head_has_a_crown_a_nose_and_a_chin() -> None:
     mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
     eyes = mesh.bind_positions[[skeleton.index(name) for name in ("leftEye", "rightEye")]].mean(axis=0)
