@@ -8,7 +8,7 @@ const CORNERS = [[0, 0], [1, 0], [1, 1], [0, 1]]; // in the projector's order, a
 const SWITCHES = ["grid", "test_card", "info"]; // what the projector calls them, and their addresses
 const STEP_S = 0.12, NUDGE = 0.002;
 const OWN_MS = 2500; // the projector tells once a second: until then this page's own change is the newest
-const before = []; // for undo: the corners, or the pull of a point of the mesh, before each change made here
+const before = []; // for undo: the corners and the mesh, or the pull of one of its points, before each change made here
 const MESH = 5; // points across and down
 const INNER = [...Array(MESH * MESH).keys()].filter((place) => ![0, MESH - 1, MESH * (MESH - 1), MESH * MESH - 1].includes(place));
 let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]), pulls = [];
@@ -95,18 +95,24 @@ async function switchOn(id, address, on) {
 }
 
 async function change(address, given, corners) {
-  remember();
+  note({ corners: shown.map((one) => [...one]), warp: pulls.map((one) => [...one]) });
   if (await command(address, ...given)) {
     ownUntil = performance.now() + OWN_MS;
+    pulls = []; // the mesh goes with the corners
     put(corners);
   } else before.pop();
   tellUndo();
 }
 
 async function undo() {
-  const { corners, place, pull } = before.at(-1) ?? {};
-  if (corners && await command("/projector/corners", ...corners.flat())) put(corners);
-  else if (pull && await command(POINT.address, place + 1, ...away(pull, pulls[place]))) {
+  const { corners, warp = [], place, pull } = before.at(-1) ?? {};
+  if (corners && await command("/projector/corners", ...corners.flat())) {
+    for (const at of INNER.filter((one) => warp[one])) {
+      const left = away(warp[at], pulls[at]);
+      if ((left[0] || left[1]) && await command(POINT.address, at + 1, ...left)) pulls[at] = warp[at];
+    }
+    put(corners);
+  } else if (pull && await command(POINT.address, place + 1, ...away(pull, pulls[place]))) {
     pulls[place] = pull;
     lay(pulls);
   } else return;
