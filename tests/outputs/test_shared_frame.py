@@ -15,7 +15,7 @@ import pytest
 from appliance.box.ring import Ring
 from appliance.box.ring_file import RingFileWriter
 from appliance.outputs import shared_frame
-from appliance.outputs.frame_layout import FRAME_SLOTS, FrameLayout
+from appliance.outputs.frame_layout import FORMAT, FRAME_SLOTS, FrameLayout
 from appliance.outputs.frame_reader import STALE_S, FrameReader
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
@@ -56,6 +56,14 @@ def test_the_facts_arrive(writer: FrameWriter, tmp_path: Path, skeleton: Skeleto
     np.testing.assert_array_equal(found.skeleton.offsets, skeleton.offsets)
     assert found.skeleton.parents == skeleton.parents
     assert dataclasses.replace(found, skeleton=skeleton) == dataclasses.replace(expected, skeleton=skeleton)
+
+
+def test_the_page_on_outputs_has_the_format_and_every_fact() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "outputs.md").read_text("utf-8")
+    assert f"Format {FORMAT}, little-endian." in page
+    facts = page.partition("**Facts**, JSON")[2].partition("\n\n")[0]
+    names = [field.name for field in dataclasses.fields(shared_frame.Facts)]
+    assert [name for name in names if f"`{name}`" not in facts] == []
 
 
 def test_the_last_frames_come_in_their_order(writer: FrameWriter, tmp_path: Path, skeleton: Skeleton) -> None:
