@@ -161,7 +161,9 @@ PROJECTOR = (
         *(_CORNER, *_WAY),
         arguments="1 to 4, dx, dy",
     ),
-    _once("projector", "corners/reset", "/projector/corners/reset", "the whole picture again, without a mesh"),
+    _once(
+        "projector", "corners/reset", "/projector/corners/reset", "the whole picture again, without a mesh"
+    ),
     _once(
         "projector",
         "warp",
