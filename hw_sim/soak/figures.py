@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from typing import Any, NamedTuple
 
-from hw_sim.soak.box import LATE_MS
+from hw_sim.soak.box import LATE_MS, LOAD
 from hw_sim.soak.growth import growth
 from hw_sim.soak.run import Soak
 from hw_sim.soak.unit import Unit
@@ -22,6 +22,8 @@ METHOD = (
 MOST_LATE_BEYOND = 0.001  # share of all slots, beyond cyclictest's figure for the machine
 MOST_LATE_OF_MACHINE = 0.005  # above it the comparison says little
 MOST_GROWTH_MB = 1.0
+# A sensor is away for 8 s at most, or starts anew; of a short run it may be half.
+MOST_WITHOUT_READING_S = 30.0
 
 
 class Limit(NamedTuple):
@@ -71,7 +73,12 @@ def figures_of(soak: Soak) -> dict[str, Any]:
         else {"late": said.late - before.late, "skipped": said.skipped - before.skipped},
         "processes": {unit.name: _process(unit, soak.seconds) for unit in soak.box.units},
         "temperature_c": {"first": temperatures[0], "max": max(temperatures)} if temperatures else None,
-        "sensors": {"outages": soak.outages, "power_ons": soak.box.sensors.starts},
+        "sensors": {
+            "outages": soak.outages,
+            "power_ons": soak.box.sensors.starts,
+            "readings_in_frames": frames.readings,
+            "longest_without_reading_s": round(frames.without_reading_s(soak.begun + soak.seconds), 1),
+        },
         "guests_came_or_went": soak.guest_changes,
         "commands": dict(soak.desk.counts),
         "universes_of_light": soak.universes,
@@ -106,7 +113,25 @@ def limits_of(soak: Soak) -> list[Limit]:
     untold = [u.name for u in soak.box.units if not u.is_away and u.name not in [one.name for one in grown]]
     if untold:
         found.append(Limit("memory", f"too short to tell: {', '.join(untold)}", "a longer run", False))
-    died = {unit.name: unit.deaths for unit in soak.box.units if unit.deaths}
+    without_s, most_s = (
+        figures["sensors"]["longest_without_reading_s"],
+        min(MOST_WITHOUT_READING_S, soak.seconds / 2.0),
+    )
+    found += [
+        Limit(
+            "readings",
+            f"new ones in {soak.frames.readings} frames; at the longest none came for {_time(without_s)}",
+            f"none for {_time(most_s)} at most",
+            without_s <= most_s,
+        ),
+        Limit("commands", f"{soak.desk.counts['done']} done", "more than none", soak.desk.counts["done"] > 0),
+        Limit("light", f"{soak.universes} universes came", "more than none", soak.universes > 0),
+    ]
+    if soak.load_is_missing:
+        missing = "stress-ng is not there. Install it: sudo apt-get install -y stress-ng"
+        found.append(Limit("load", missing, "its load; or a soak that says --no-load", False))
+    died = {unit.name: unit.deaths for unit in (*soak.box.units, soak.box.sensors) if unit.deaths}
+    died |= {LOAD: soak.load_deaths} if soak.load_deaths else {}
     found.append(
         Limit(
             "processes",

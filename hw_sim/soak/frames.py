@@ -24,7 +24,8 @@ class FrameWatch:
 
     The stamps are made when the stage hands the datagram over, so a receiver that gets no processor measures
     as well as one that does. `late`: frames that say so themselves, or left later than `late_ms`; `missing`:
-    ticks of which no frame came, but for those (`unheard`) that found no room here.
+    ticks of which no frame came, but for those (`unheard`) that found no room here. `readings`: frames that
+    carry a new one of the sensor that the tick follows.
     """
 
     def __init__(self, late_ms: float) -> None:
@@ -40,17 +41,20 @@ class FrameWatch:
         self.longest_gap_s = 0.0
         self.delays, self.seconds = Delays(), Seconds()
         self.newest: float | None = None  # arrival, monotonic seconds
+        self.readings = 0
+        self._longest_without_s = self._reading_at = 0.0
         self._begun = 0.0
-        self._tick = -1
+        self._tick = self._sequence = -1
         self._no_room = self._overflowed = 0
         self._wall_ahead_s = time.time() - time.monotonic()
 
     def start(self, now: float) -> None:
         """Reset all counts; seconds of the run count from here."""
         self.heard = self.late = self.missing = self.unheard = self.stage_starts = 0
-        self.longest_gap_s = 0.0
+        self.longest_gap_s = self._longest_without_s = 0.0
+        self.readings = 0
         self.delays, self.seconds = Delays(), Seconds()
-        self._begun = now
+        self._begun = self._reading_at = now
 
     def poll(self, timeout_s: float) -> None:
         """Wait up to `timeout_s`, then take all that is there."""
@@ -70,23 +74,35 @@ class FrameWatch:
             self._gap(self.newest, now)
             self._miss(now, int((now - self.newest) * 1000.0 / SLOT_MS))
 
+    def without_reading_s(self, now: float) -> float:
+        """The longest time until now in which no frame carried a new reading."""
+        return max(self._longest_without_s, now - self._reading_at)
+
     def close(self) -> None:
         """Listen no more."""
         self._socket.close()
 
     def _hear(self, datagram: bytes, arrival: float) -> None:
         try:
-            (_, (tick, second, _, late, rest)), *_ = decode(datagram)
+            (_, (tick, second, sequence, late, rest)), *_ = decode(datagram)
             deadline = float(second) + float(rest)  # type: ignore[arg-type]
         except (MalformedOscError, ValueError):
             return
         lateness_ms = 1000.0 * (arrival - deadline)
+        self._note_reading(int(sequence), arrival)  # type: ignore[arg-type]
         self._count(int(tick), arrival)  # type: ignore[arg-type]
         bad = bool(late) or lateness_ms > self._late_ms
         self.heard += 1
         self.late += bad
         self.delays.add(lateness_ms)
         self.seconds.note(int(arrival - self._begun), lateness_ms, int(bad))
+
+    def _note_reading(self, sequence: int, arrival: float) -> None:
+        if sequence >= 0 and sequence != self._sequence:
+            self._sequence = sequence
+            self.readings += 1
+            self._longest_without_s = self.without_reading_s(arrival)
+            self._reading_at = arrival
 
     def _count(self, tick: int, arrival: float) -> None:
         """The frames missing between the previous one and this one."""

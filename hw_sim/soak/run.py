@@ -50,6 +50,8 @@ class Soak:
     begun: float = 0.0
     seconds: float = 0.0
     load: str = "none"
+    load_is_missing: bool = False  # it was wanted, and there is no stress-ng
+    load_deaths: int = 0
     network: str = "venue"
     universes: int = 0
     guest_changes: int = 0
@@ -89,8 +91,10 @@ def soak(
         opened.callback(soak.close)
         _await_first_frame(soak, stopped)
         companions = [unit.name for unit in box.units[1:]]
-        acts = script(seconds, companions, GUESTS, seed, load and shutil.which("stress-ng") is not None)
+        soak.load_is_missing = load and shutil.which("stress-ng") is None
+        acts = script(seconds, companions, GUESTS, seed, load and not soak.load_is_missing)
         _dance(soak, acts, ports, stopped, each_second)
+        _change_load(soak, "none")
         soak.frames.end(time.monotonic())
     return soak
 
@@ -190,6 +194,7 @@ def _drain(guest: socket.socket) -> None:
 def _change_load(soak: Soak, name: str) -> None:
     soak.load = name
     if soak.box.load is not None:
+        soak.load_deaths += soak.box.load.deaths
         soak.box.load.end(_ENDS_WITHIN_S)
         soak.box.load = None
     options = dict(LOADS)[name]

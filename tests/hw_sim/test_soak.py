@@ -14,27 +14,34 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from appliance.outputs.frame_reader import FrameReader
 from hw_sim.peers import HOST
 from hw_sim.soak.delays import Delays
+from hw_sim.soak.desk import Desk
+from hw_sim.soak.figures import limits_of, table
 from hw_sim.soak.frames import FrameWatch
 from hw_sim.soak.growth import growth
+from hw_sim.soak.run import Soak
 from hw_sim.soak.script import KILLS_UNTIL, script
 from hw_sim.soak.unit import PAUSE_S, Unit
 from hw_sim.soak.vitals import Vitals
+from hw_sim.soak.wakeups import Wakeups
 from tests.bundles import write_show
 from tests.system.processes import PATIENCE_S, wait_until
 
 LATE_MS = 15.0
 
 
-def frame(tick: int, deadline: float, late: bool = False) -> bytes:
+def frame(tick: int, deadline: float, late: bool = False, sequence: int = -1) -> bytes:
     """`/bunraku/frame ,iiiif` by hand."""
     second = int(deadline)
-    return b"/bunraku/frame\0\0,iiiif\0\0" + struct.pack(">iiiif", tick, second, -1, late, deadline - second)
+    numbers = tick, second, sequence, late, deadline - second
+    return b"/bunraku/frame\0\0,iiiif\0\0" + struct.pack(">iiiif", *numbers)
 
 
 class Stage:
@@ -44,10 +51,10 @@ class Stage:
         self._port = watch.port
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
-    def send(self, tick: int, before_s: float = 0.0, late: bool = False) -> float:
+    def send(self, tick: int, before_s: float = 0.0, late: bool = False, sequence: int = -1) -> float:
         """A frame whose deadline was `before_s` ago; how many ms later it left, at most."""
         now = time.monotonic()
-        self._socket.sendto(frame(tick, now - before_s, late), (HOST, self._port))
+        self._socket.sendto(frame(tick, now - before_s, late, sequence), (HOST, self._port))
         return 1000.0 * (time.monotonic() - now)
 
     def close(self) -> None:
@@ -128,6 +135,47 @@ def test_a_stage_that_begins_anew_is_counted_with_its_pause(watch: FrameWatch, s
     watch.poll(1.0)
     assert watch.stage_starts == 1
     assert watch.missing >= 4
+
+
+def test_a_box_that_loses_its_sensors_is_noticed(watch: FrameWatch, stage: Stage) -> None:
+    """Null: the frames go on, none of them late."""
+    watch.start(began := time.monotonic())
+    for tick, sequence in enumerate((-1, 3, 3, 4, 4, 4)):
+        stage.send(tick, sequence=sequence)
+    watch.poll(1.0)
+    assert (watch.heard, watch.readings) == (6, 2)
+    assert watch.without_reading_s(time.monotonic()) <= time.monotonic() - began
+    assert watch.without_reading_s(time.monotonic() + 40.0) > 39.9
+
+
+@contextlib.contextmanager
+def soaked(tmp_path: Path) -> Iterator[Soak]:
+    """A soak of 40 s in which all went well, and no process of the box was looked at."""
+    box: Any = SimpleNamespace(units=[], sensors=Unit("sensors", ("true",), tmp_path / "output"))
+    lamps: Any = None
+    with contextlib.closing(FrameWatch(LATE_MS)) as frames, contextlib.closing(Desk(1)) as desk:
+        frames.start(1000.0)
+        frames.heard, frames.readings, frames._reading_at = 2000, 1900, 1039.9
+        desk.counts["done"] = 5
+        yield Soak(box, frames, Wakeups(), desk, lamps, 40.0, begun=1000.0, seconds=40.0, universes=9)
+
+
+def fails(soak: Soak) -> list[str]:
+    return [limit.name for limit in limits_of(soak) if not limit.holds]
+
+
+def test_a_soak_of_nothing_does_not_hold(tmp_path: Path) -> None:
+    """Sensors, commands, lamps and load that never came are no evidence that the box bears them."""
+    with soaked(tmp_path) as soak:
+        assert fails(soak) == []
+        soak.universes, soak.load_is_missing, soak.load_deaths = 0, True, 2
+        soak.desk.counts["done"] = 0
+        soak.box.sensors.deaths = 3
+        soak.frames._reading_at = 1010.0
+        assert fails(soak) == ["readings", "commands", "light", "load", "processes"]
+        (died,) = [limit.found for limit in limits_of(soak) if limit.name == "processes"]
+        assert died == "sensors ended 3 times, load ended 2 times"
+        assert any("stress-ng is not there" in line for line in table(soak))
 
 
 def test_nobody_is_killed_in_the_second_half_and_everything_happens() -> None:
