@@ -7,6 +7,7 @@ largest gaps 105 to 245 ms, 0.4 to 0.6 % of gaps over 30 ms, 0.7 to 1.8 % under 
 from __future__ import annotations
 
 import random
+from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -78,7 +79,8 @@ class VenueNetwork:
         self._random = random.Random(f"datagrams {seed}")
         self._random_back = random.Random(f"answers {seed}")
         self._stalls = random.Random(f"stalls {seed}")
-        self._stall: tuple[float, float] | None = None
+        self._stalled: deque[tuple[float, float]] = deque(maxlen=2)  # a slower datagram looks further ahead
+        self._begun = -1.0  # when the first datagram left
         self._stall_number = self._stalls.randrange(profile.long_stall_each)
         self._last: dict[tuple[int, bool], float] = {}
 
@@ -90,6 +92,7 @@ class VenueNetwork:
         """
         profile, source = self.profile, self._random if to_box else self._random_back
         draw = source.random
+        self._begun = now if self._begun < 0.0 else self._begun
         if draw() < profile.loss_share:
             return [Delivery(now, data, "lost")]
         at = now + self._delay_s(now, source)
@@ -122,11 +125,9 @@ class VenueNetwork:
 
     def _stall_near(self, moment: float) -> tuple[float, float]:
         """Start and end of the stall that is on at `moment`, or of the next one."""
-        if self._stall is None:
-            self._stall = self._next_stall(moment)
-        while self._stall[1] <= moment:
-            self._stall = self._next_stall(self._stall[1])
-        return self._stall
+        while not self._stalled or self._stalled[-1][1] <= moment:
+            self._stalled.append(self._next_stall(self._stalled[-1][1] if self._stalled else self._begun))
+        return next(stall for stall in self._stalled if stall[1] > moment)
 
     def _next_stall(self, after: float) -> tuple[float, float]:
         profile = self.profile

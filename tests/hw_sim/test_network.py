@@ -97,6 +97,17 @@ def test_a_stall_holds_up_all_sensors_at_once() -> None:
     assert (stalled[0] & stalled[1]).sum() > 0.9 * stalled[0].sum()
 
 
+@pytest.mark.parametrize("seed", [*range(10), 14, 23])
+def test_no_answer_of_the_box_changes_when_a_reading_arrives(seed: int) -> None:
+    """In seed 14 the first reading is lost; in 23 an answer looks beyond the stall of the next reading."""
+    network = VenueNetwork(BAD, seed)
+    deliveries = []
+    for n in range(3000):
+        deliveries += [(n, delivery) for delivery in network.carry(DATAGRAM, 100 + n * 0.02)]
+        network.carry(DATAGRAM, 100 + n * 0.02 + 0.018, to_box=False)
+    assert deliveries == carried(BAD, seed, 60)
+
+
 def test_what_the_box_answers_suffers_the_same_and_changes_nothing_for_the_readings() -> None:
     network = VenueNetwork(BAD, 3)
     deliveries, answers = [], []
