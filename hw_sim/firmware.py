@@ -19,6 +19,7 @@ BOX = (0x7F000001, 9750)  # where the box is, as the simulated radio sees it
 STEP_S = 0.002
 ANSWER_WITHIN_US = 1_000_000
 POLL_US = 5_000
+CLOCK_WRAPS_S = (1 << 32) * 1e-6
 LANES = {0: Lane.NETWORK, 1: Lane.CABLE}
 # The lamp by the seconds from flash to flash, see docs/dancer.md.
 LIGHTS = ((0.15, "strobe"), (0.5, "fast"), (1.6, "slow"), (4.0, "on"))
@@ -234,7 +235,10 @@ class FirmwareSensor:
         _, _, _, _, boot_nonce, _, sequence = wire.HEAD.unpack_from(data)
         device_s = int.from_bytes(data[wire.HEAD.size : wire.HEAD.size + 4], "little") * 1e-6
         booted_at = self.wearable.status.booted_at_us * 1e-6
-        measured_at = booted_at + device_s / (1 + self._drift_ppm * 1e-6)
+        clock_rate = 1 + self._drift_ppm * 1e-6
+        # The clock in a packet begins anew after 72 minutes.
+        device_s += CLOCK_WRAPS_S * round(((self._now - booted_at) * clock_rate - device_s) / CLOCK_WRAPS_S)
+        measured_at = booted_at + device_s / clock_rate
         orientation = self._wearer.orientation(measured_at)
         return Sample(self.name, boot_nonce, sequence, measured_at, orientation, self._power_on_at)
 

@@ -54,6 +54,19 @@ def hellos_of(wearable: CompiledWearable) -> list[wire.Hello]:
     return [packet for packet in packets if isinstance(packet, wire.Hello)]
 
 
+def test_a_reading_of_the_second_hour_is_logged_at_its_moment() -> None:
+    """Its clock began anew after 72 minutes: the log said that it was measured before that."""
+    sensor, measured_at = device(drift_ppm=50.0), 4999.99
+    sensor.start(0.0)
+    sensor._now = 5000.0
+    device_us = round(measured_at * (1 + 50e-6) * 1e6)
+    reading = wire.Reading(KEY.device_id, 1, 1, 7, device_us % (1 << 32), (1, 0, 0, 0), 0xFF, 87, 0, 0, 0, 0)
+    sample = sensor._sample(wire.pack(reading, wire.Tagger(KEY.key)))
+    sensor.close()
+    assert device_us > 1 << 32 and sample.sampled_at == pytest.approx(measured_at, abs=1e-4)
+    assert sample.orientation == pytest.approx(motions.dance(1)(measured_at), abs=1e-3)
+
+
 def test_without_the_library_it_says_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(FirmwareMissingError, match=r"make firmware.*apt-get install -y cmake g\+\+ make"):
         load_library(tmp_path / "libwearable.so")
