@@ -175,7 +175,7 @@ class EmulatedSensor:
                 pairing.take_heartbeat(packet, now)
             case wire.Call():
                 pairing.take_call(now, lane)
-            case wire.Restore() if packet.imu_id == self.imu_id and pairing.may_restore(now):
+            case wire.Restore() if pairing.take_restore(packet, now) and packet.imu_id == self.imu_id:
                 self.profile = self.profile or packet.offsets
 
     def close(self) -> None:

@@ -34,7 +34,7 @@ class Pairing:
         self._hello_after_call = -HELLO_AFTER_CALL_S
         self._heard = 0.0
         self._assigned = 0.0
-        self._heartbeats = -1
+        self._heartbeats = self._restores = -1  # the newest sequence of each
         self._sent_at: dict[int, float] = {}  # reading sequence -> seconds
 
     @property
@@ -80,17 +80,25 @@ class Pairing:
         self._sent_at.pop(sequence - REMEMBERED_READINGS, None)
 
     def take_assignment(self, packet: wire.Assignment, now: float, lane: Lane) -> bool:
-        """Accept it if it answers one of the newest hellos. Its lane becomes the link's."""
+        """Accept it if it answers one of the newest hellos. Its lane becomes the link's.
+
+        A link stays as it is within its session; one by cable is not left for the network.
+        """
         newest = self._hellos - 1
         is_answer = max(newest - ANSWERED_HELLOS, self._answered_hello) < packet.hello_sequence <= newest
         if not is_answer or not packet.session or lane not in self._lanes_up:
             return False
         self._answered_hello = packet.hello_sequence
+        is_better_linked = self.lane is not None and self.lane > lane
+        if is_better_linked or (self.lane == lane and packet.session == self.session):
+            return False
+        if self.lane is None or packet.session != self.session:
+            self._assigned = now
         if packet.session != self.session:
             self.session = packet.session
-            self._heartbeats = -1
+            self._heartbeats = self._restores = -1
         self.lane, self.led, self.rate_hz = lane, packet.led, packet.rate_hz
-        self._heard = self._assigned = now
+        self._heard = now
         self._hello_at = {other: at for other, at in self._hello_at.items() if other > lane}
         return True
 
@@ -112,9 +120,13 @@ class Pairing:
             self._hello_after_call = now
             self._hello_at[lane] = now
 
-    def may_restore(self, now: float) -> bool:
-        """Whether a calibration from the box still counts."""
-        return self.lane is not None and now - self._assigned < RESTORE_S
+    def take_restore(self, packet: wire.Restore, now: float) -> bool:
+        """Whether a calibration from the box counts: soon, in the link's session and in rising order only."""
+        is_late = self.lane is None or now - self._assigned >= RESTORE_S
+        if is_late or packet.session != self.session or packet.sequence <= self._restores:
+            return False
+        self._restores = packet.sequence
+        return True
 
     def _look_for_the_box(self, now: float) -> None:
         self.lane = None

@@ -34,6 +34,22 @@ class TestCalibration:
         assert pair.device.profile == self.OFFSETS
         assert readings(pair)[-1].flags & wire.HAS_PROFILE
 
+    def test_not_in_another_session_and_not_a_recorded_one(self) -> None:
+        """As the firmware: it counts both as replayed."""
+        pair = paired()
+        pair.run(1.0)
+        head = pair.box.head(0xBAD)
+        pair.line.inject(pair.box.sign(wire.Restore(*head, pair.device.imu_id, self.OFFSETS)))
+        pair.run(0.1)
+        assert pair.device.profile is None
+        recorded = self.restore(pair, pair.device.imu_id)
+        pair.line.inject(recorded)
+        pair.run(0.1)
+        pair.device.profile = None
+        pair.line.inject(recorded)
+        pair.run(0.1)
+        assert pair.device.profile is None
+
     @pytest.mark.parametrize("late_s, imu_id", [(10.5, None), (1.0, bytes(16))])
     def test_not_later_and_not_anothers(self, late_s: float, imu_id: bytes | None) -> None:
         pair = paired()

@@ -8,8 +8,9 @@ import pytest
 
 from appliance.sensor import wire
 from hw_sim import motions
+from hw_sim.device import Lane
 from hw_sim.emulated_sensor import EmulatedSensor
-from hw_sim.pairing import LOST_S
+from hw_sim.pairing import LOST_S, Pairing
 from hw_sim.wearer import Wearer
 from tests.hw_sim.tiny_box import KEY, Pair, TinyBox, hello_times, paired, readings
 
@@ -104,6 +105,18 @@ def test_the_next_power_on_draws_another_nonce_and_starts_from_zero() -> None:
     assert pair.sent[-1].sample.power_on_at == pytest.approx(50.0 + 3.0 + 1.5)
 
 
+def test_a_link_is_not_kept_by_assignments() -> None:
+    """Within its session only heartbeats keep it: as in the firmware."""
+    pairing = Pairing(1)
+    pairing.connect(Lane.NETWORK, True, 0.0)
+    for at, hello, led, is_taken in ((0.0, 0, wire.LED_ON, True), (2.0, 1, wire.LED_STROBE, False)):
+        pairing.take_call(at, Lane.NETWORK)
+        assert [sequence for _, _, sequence in pairing.due_hellos(at)] == [hello]
+        answer = wire.Assignment(KEY.device_id, 1, 0x5E55, hello, hello, 0, 50, led)
+        assert pairing.take_assignment(answer, at + 0.1, Lane.NETWORK) == is_taken
+    assert pairing.led == wire.LED_ON and pairing.next_at == pytest.approx(0.1 + LOST_S)
+
+
 class TestRoaming:
     """Between the network and a cable; the cable is preferred, the session stays."""
 
@@ -123,6 +136,16 @@ class TestRoaming:
         assert {reading.session for reading in readings(pair)} == {pair.box.session}
         sequences = [reading.sequence for reading in readings(pair)]
         assert sequences == sorted(set(sequences))
+
+    def test_a_link_by_cable_is_not_left_for_the_network(self) -> None:
+        pair = paired()
+        pair.cable.is_up = True
+        pair.run(2.0)
+        on_network: list[bytes] = []
+        pair.line.passing_on = on_network.append
+        pair.line.inject(pair.box.call())
+        pair.run(1.0)
+        assert len(on_network) == 1, "a hello, whose answer came by the network too"
 
     def test_a_cable_to_a_dumb_charger_does_not_stop_the_stream(self) -> None:
         pair = paired()
