@@ -74,7 +74,7 @@ class Strings:
             gains.append(_formed(partial * self.hertz, preset.formants) * config.brightness**number)
         turning = np.concatenate(frequencies)
         audible = turning < 2 * np.pi * _HIGHEST * rate
-        decay = decays(turning, turning.min(), config.decay_s * preset.decay)
+        decay = decays(turning, turning.min(initial=np.inf), config.decay_s * preset.decay)
         poles = (-decay + 1j * turning) / rate
         self.frequencies = turning / (2 * np.pi)
         self._from_strings = np.concatenate(shares, axis=1) * np.concatenate(gains) * audible
@@ -120,8 +120,9 @@ class Strings:
 
     def _sounding(self, states: Samples) -> Samples:
         """Samples (channels, steps, STEP) of states (channels, steps, modes) at each step's start."""
-        sound: Samples = (states.reshape(-1, states.shape[2]) @ self._ringing).real
-        return sound.reshape(*states.shape[:2], STEP)
+        channels, steps, modes = states.shape
+        sound: Samples = (states.reshape(channels * steps, modes) @ self._ringing).real
+        return sound.reshape(channels, steps, STEP)
 
 
 def _formed(hertz: Samples, formants: Sequence[tuple[float, float]]) -> Samples:

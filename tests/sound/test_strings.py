@@ -37,6 +37,15 @@ def peaks(sound: np.ndarray, count: int) -> list[float]:
     return sorted(float(place) * RATE / len(sound) for place in best)
 
 
+def test_a_figure_of_one_joint_has_no_string_and_is_silent() -> None:
+    skeleton = Skeleton(("hip",), (-1,), np.zeros((1, 3)))
+    instrument = Instrument(skeleton, StringsConfig(), SoundConfig())
+    instrument.level = 1.0
+    for number in range(4):
+        instrument.dance(np.array([[0.0, 1.0 + number, 0.0]]), 0.02 * number)
+        assert not instrument.render(4 * STEP).any()
+
+
 def test_partials_are_where_they_should_be() -> None:
     sound = plucked(StringsConfig(base_hz=110.0, partials=4, decay_s=5.0), 2.0)
     assert peaks(sound, 4) == pytest.approx([110.0, 220.0, 330.0, 440.0], abs=0.6)
