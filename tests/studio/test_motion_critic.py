@@ -13,8 +13,10 @@ from appliance.dancer.extrapolation import Extrapolation
 from appliance.pose import quaternion
 from appliance.studio.autoencoder import motion_critic, rotation
 from appliance.studio.autoencoder.motion_critic import HOP, WINDOWS, MotionCritic, Sequences, extrapolated
+from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.evaluation.in_play import blended
+from tests.studio.tiny import write_recordings
 
 CPU = torch.device("cpu")
 
@@ -123,3 +125,16 @@ def test_wandering_sequences_go_on_and_begin_anew(dancer: Dataset) -> None:
         ages.append(float(sequences.state()["age"].max()))
     assert max(ages) >= 60, "some are coded a hundred times"
     assert float(sequences.state()["age"].min()) <= 10, "others have just begun"
+
+
+@pytest.mark.parametrize(("window", "is_seen"), [(5, True), (20, True), (21, False), (64, False)])
+def test_windows_of_any_length_are_trained_with_a_critic_where_it_sees_three_poses(
+    window: int, is_seen: bool, tmp_path: Path
+) -> None:
+    dancer = load_dataset(write_recordings(tmp_path / "dancer", seconds=6.0))
+    training = Training(dancer, Settings(window=window, width=16, latent=8, steps=2, batch=16))
+    assert (training.sequences is not None) == is_seen
+    if training.sequences is not None:
+        motion = motion_critic.blended(training.sequences.draw(2).windows)
+        assert motion.shape[1] == motion_critic.blended_poses(window) >= 3
+    assert all(torch.isfinite(value) for value in training.train_step().values())

@@ -194,14 +194,19 @@ class MotionCritic(nn.Module):
 
 
 def blended_poses(window: int) -> int:
-    """Poses of the motion that `blended` makes of a sequence."""
-    return WINDOWS - window // HOP + 1
+    """Poses of the motion that `blended` makes of a sequence; below 3 there is nothing to look at."""
+    return WINDOWS - _older(window)
+
+
+def _older(window: int) -> int:
+    """How many windows are blended with the newest one."""
+    return -(-window // HOP) - 1
 
 
 def blended(windows: Tensor) -> Tensor:
     """(B, W, T, M, 4) -> (B, P, M, 4): overlapping windows, one every HOP ticks, blended as in the box."""
     shares = torch.from_numpy(weights(windows.shape[2], 1, "prompt"))[::HOP].to(windows.device)
-    older = len(shares) - 1
+    older = _older(windows.shape[2])
     newest = windows[:, older:, 0]
     motion = shares[0] * newest
     for back in range(1, older + 1):
@@ -224,8 +229,7 @@ def level(motion: Tensor, target: Tensor | None = None) -> tuple[Tensor, Tensor]
 
 def middle_target(targets: Tensor) -> Tensor:
     """(B, M, 4) of targets (B, W, T, M, 4): where the hand is in the middle of the blended motion."""
-    older = targets.shape[2] // HOP - 1
-    return targets[:, older + blended_poses(targets.shape[2]) // 2, 0]
+    return targets[:, _older(targets.shape[2]) + blended_poses(targets.shape[2]) // 2, 0]
 
 
 def draw_passes(most: int) -> int:

@@ -161,7 +161,8 @@ class Training(TrainingLoop[Report]):
             self.batches = Copies(self.train_windows, settings.input_noise_degrees, processes)
         self._chances = chances
         self.sequences: Sequences | None = None
-        if isinstance(network, Coupled) and settings.sequences:
+        is_seen = settings.sequences and motion_critic.blended_poses(settings.window) >= 3
+        if isinstance(network, Coupled) and is_seen:
             sequences = Sequences(dataset, settings.window, self.device)
             if len(sequences):
                 self._let_motion_be_seen(sequences)
@@ -284,7 +285,7 @@ class Training(TrainingLoop[Report]):
     def _let_motion_be_seen(self, sequences: Sequences) -> None:
         """Add the motion critic, which no other kind of training has, nor its checkpoint."""
         settings = self.settings
-        poses = max(motion_critic.blended_poses(settings.window), 3)
+        poses = motion_critic.blended_poses(settings.window)
         self.sequences = sequences
         self.motion_critic = MotionCritic(self.autoencoder.shape.joints, poses).to(self.device)
         self.motion_optimizer = torch.optim.Adam(
