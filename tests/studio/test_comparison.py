@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -111,6 +112,11 @@ def test_a_network_that_repeats_a_recording_has_it_by_heart(rows: dict[str, Row]
 def test_what_the_hands_take_did_is_nearer_to_a_coupled_dance(rows: dict[str, Row]) -> None:
     assert rows["sane"]["masked"] < 0.95 * rows["pastes"]["masked"]
     assert rows["sane"]["masked_nearest"] == rows["pastes"]["masked_nearest"]
+
+
+def test_takes_too_short_for_a_clip_have_no_distance_and_do_not_end_a_training(training: list[Take]) -> None:
+    recorded = Recorded([training[0], take("clapper", 901, 1.5)], NAMES)
+    assert all(math.isnan(value) for value in recorded.floor(10))
 
 
 def test_four_baselines_are_in_the_json_and_in_the_table(

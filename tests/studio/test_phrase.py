@@ -24,6 +24,7 @@ from appliance.studio import dance_files
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.export.chosen_phrase import choose_phrase
+from appliance.studio.improviser import naturalness
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.improvisation import ImproviseOptions, run
 from appliance.studio.improviser.naturalness import Yardstick, distances, measure
@@ -31,6 +32,7 @@ from appliance.studio.improviser.pace import pace
 from appliance.studio.improviser.phrase import STAGE_M, PhraseOptions, closed_loop, on_stage
 from appliance.studio.improviser.stretches import best_stretches
 from appliance.studio.standing import measure_standing
+from appliance.studio.studio_error import StudioError
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, skeleton, swaying, write_recordings
 
@@ -330,6 +332,21 @@ def test_the_stretch_that_loops_is_the_phrase(tmp_path: Path) -> None:
 
 def test_short_recordings_have_no_phrase_that_loops(tmp_path: Path) -> None:
     assert choose_phrase(load_dataset(write_recordings(tmp_path / "dancer", count=2, seconds=5.0))) is None
+
+
+def test_a_short_first_take_and_a_long_second_one_have_a_phrase_and_are_compared_in_bounded_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(naturalness, "MOST_COMPARED", 60)
+    folder = write_recordings(tmp_path / "dancer", count=1, seconds=1.5)
+    for number in (1, 2):
+        write_bvh(folder / f"sway_{number}.bvh", swaying(40.0, seed=number))
+    dataset = load_dataset(folder)
+    assert dataset.training[0].recording.seconds < 2.0
+    assert choose_phrase(dataset) is not None
+    assert len(Yardstick.of(dataset.takes, dataset.moving).shapes) <= 62
+    with pytest.raises(StudioError, match="No recording has 2 s without a capture error"):
+        Yardstick.of(dataset.training[:1], dataset.moving)
 
 
 def test_what_lies_between_two_capture_errors_may_be_a_few_frames(tmp_path: Path) -> None:

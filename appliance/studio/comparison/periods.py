@@ -41,6 +41,7 @@ from appliance.studio.evaluation.pictures import (
 )
 from appliance.studio.exchange.retargeting import retarget
 from appliance.studio.improviser.naturalness import SECOND_S, distances, figure_shapes, seconds_of
+from appliance.studio.improviser.naturalness import nearest as nearest_of
 from appliance.studio.progress import doing, shown
 from appliance.studio.studio_error import StudioError
 
@@ -118,7 +119,7 @@ class Period:
         found = np.empty(len(self.rows))
         for owner in np.unique(self.owners):
             own = self.owners == owner
-            found[own] = distances(self.rows[own], self.rows[~own]).min(axis=1)
+            found[own], _ = nearest_of(self.rows[own], self.rows[~own])
         return found
 
     def between_halves(self) -> Array:
@@ -126,7 +127,7 @@ class Period:
         half = np.unique(self.owners, return_inverse=True)[1] % 2
         found = np.empty(len(self.rows))
         for side in (0, 1):
-            found[half == side] = distances(self.rows[half == side], self.rows[half != side]).min(axis=1)
+            found[half == side], _ = nearest_of(self.rows[half == side], self.rows[half != side])
         return found
 
 
@@ -146,7 +147,7 @@ def run(options: PeriodsOptions) -> None:
     with doing("measuring each second of dance", console):
         one, other = (Period.of(name, takes, roles) for name, takes in both)
         usual = usual_cm(one, other)
-        away = [distances(a.rows, b.rows).min(axis=1) for a, b in ((one, other), (other, one))]
+        away = [nearest_of(a.rows, b.rows)[0] for a, b in ((one, other), (other, one))]
         nulls = [period.between_halves() for period in (one, other)]
     found = {
         period.name: movements(period, against, usual, options.count)
@@ -194,8 +195,7 @@ def usual_cm(one: Period, other: Period) -> float:
 
 def movements(period: Period, other: Period, usual: float, count: int) -> list[Movement]:
     """Movements that the other period has nothing like, the most frequent first, each with all alike."""
-    apart = distances(period.rows, other.rows)
-    away, nearest = apart.min(axis=1), apart.argmin(axis=1)
+    away, nearest = nearest_of(period.rows, other.rows)
     new = np.flatnonzero(away > usual)
     new = new[:: max(1, len(new) // MOST_NEW)]
     alike = distances(period.rows[new], period.rows[new]) <= usual

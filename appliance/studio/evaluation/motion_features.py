@@ -55,7 +55,7 @@ def kinetic_features(skeleton: Skeleton, clips: Sequence[Array], fps: float) -> 
         across = (velocities[..., [0, 2]] ** 2).sum(axis=-1).mean(axis=0) / 2
         upwards = (velocities[..., 1] ** 2).mean(axis=0) / 2
         found.append([across, upwards, np.linalg.norm(accelerations, axis=-1).mean(axis=0)])
-    return np.array(found, dtype=np.float64).reshape(len(clips), -1)
+    return np.array(found, dtype=np.float64).reshape(len(clips), 3 * len(places))
 
 
 def geometric_features(skeleton: Skeleton, clips: Sequence[Array], fps: float) -> Clips | None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from appliance.pose.recording import Recording
-from appliance.studio.data.dataset import FPS, Dataset, Take
+from appliance.studio.data.dataset import FPS, Dataset
 from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
 from appliance.studio.improviser.phrase import SEAM_S, STAGE_M, closed_loop, faultiness, on_stage
 from appliance.studio.improviser.stretches import best_stretches
@@ -15,7 +14,6 @@ from appliance.studio.improviser.stretches import best_stretches
 LONGEST_S, SHORTEST_S = 60.0, 10.0
 CHOICE = 0.6  # fraction of the longest stretch: the rest is room to choose in
 FINALISTS = 4
-COMPARED_S = 1200.0  # longest recordings; comparing all poses with each other grows with the square
 _SPARE_S = 0.5
 
 
@@ -55,7 +53,7 @@ def choose_phrase(dataset: Dataset) -> ChosenPhrase | None:
     if room_s < SHORTEST_S:
         return None
     seconds = min(LONGEST_S, max(SHORTEST_S, CHOICE * room_s))
-    yardstick = Yardstick.of(_compared(dataset.takes), dataset.moving)
+    yardstick = Yardstick.of(dataset.takes, dataset.moving)
     dances = [part for _, _, part in parts]
     stretches = best_stretches(dances, yardstick, seconds, STAGE_M, SEAM_S, FINALISTS)
     found = []
@@ -67,12 +65,3 @@ def choose_phrase(dataset: Dataset) -> ChosenPhrase | None:
         chosen = ChosenPhrase(phrase, take.file, begins_s, ends_s, len(stretches), natural)
         found.append((faultiness(natural) + stretch.cost, chosen))
     return min(found, key=lambda one: one[0])[1] if found else None
-
-
-def _compared(takes: Sequence[Take]) -> list[Take]:
-    """The first takes, as many as can be compared pose by pose."""
-    kept: list[Take] = []
-    for take in takes:
-        if not kept or sum(one.recording.seconds for one in kept) + take.recording.seconds <= COMPARED_S:
-            kept.append(take)
-    return kept

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from appliance.dancer.grounding import survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
@@ -15,9 +16,14 @@ from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.improviser.pace import Pace, mean_pace, mean_speed, pace
 from appliance.studio.standing import Standing, measure_standing
+from appliance.studio.studio_error import StudioError
 
 EVERY_S = 0.2  # between two poses that are compared
 SECOND_S = 1.0  # length of the stretches that are searched for in the recordings
+MOST_COMPARED = 6000  # poses of 20 minutes; with all poses of 80 minutes their distances would take 15 GB
+SECONDS_A_POSE = 5  # stretches of a second that begin between two poses that are compared
+SHORTEST_S = 2.0
+_DISTANCES_AT_ONCE = 1 << 23  # 64 MB
 
 
 @dataclass(frozen=True)
@@ -86,8 +92,13 @@ class Yardstick:
 
     @staticmethod
     def of(takes: Sequence[Take], moving: Sequence[int]) -> Yardstick:
-        """Measure the takes."""
+        """Measure the takes. Raises StudioError where no stretch is long enough."""
         parts = [part for take in takes for part in sound_parts(take)]
+        if not parts:
+            raise StudioError(
+                f"No recording has {SHORTEST_S:g} s without a capture error to compare a dance with. Give "
+                "longer or cleaner ones, or --all-frames."
+            )
         names = [take.take for take in takes for _ in sound_parts(take)]
         usual_speed = mean_speed(parts, moving)
         paces = [pace(part, moving, usual_speed) for part in parts]
@@ -95,8 +106,9 @@ class Yardstick:
         shapes = [figure_shapes(part, moving) for part in parts]
         speeds = [np.linalg.norm(np.diff(shape, axis=0), axis=1).mean() * FPS for shape in shapes]
         lengths = [len(part) for part in parts]
-        few = [shape[:: round(EVERY_S * FPS)] for shape in shapes]
-        seconds = [seconds_of(shape, 2) for shape in shapes]
+        every = max(round(EVERY_S * FPS), -(-sum(lengths) // MOST_COMPARED))
+        few = [shape[::every] for shape in shapes]
+        seconds = [seconds_of(shape, every // SECONDS_A_POSE) for shape in shapes]
         some = max(1, sum(len(part) for part in seconds) // 200)
         among = _to_others(few, names)
         return Yardstick(
@@ -151,7 +163,7 @@ def standing_of(recording: Recording) -> Standing:
     return measure_standing(recording.skeleton, poses, roots, floor, floor.lifts, recording.fps)
 
 
-def sound_parts(take: Take, shortest_s: float = 2.0) -> list[Recording]:
+def sound_parts(take: Take, shortest_s: float = SHORTEST_S) -> list[Recording]:
     """The stretches of a take without a glitch."""
     recording, fps = take.recording, take.recording.fps
     return [recording.excerpt(a / fps, b / fps) for a, b in take.sound_runs if b - a >= shortest_s * fps]
@@ -208,6 +220,17 @@ def distances(a: Array, b: Array) -> Array:
     squared = (a * a).sum(1)[:, None] + (b * b).sum(1)[None] - 2 * a @ b.T
     root: Array = np.sqrt(np.maximum(squared, 0) / (a.shape[1] / 3))
     return root
+
+
+def nearest(a: Array, b: Array) -> tuple[Array, NDArray[np.intp]]:
+    """(A,) each: the distance of figures (A, J * 3) from the nearest of (B, J * 3), and which one that is."""
+    found, places = np.empty(len(a)), np.empty(len(a), np.intp)
+    at_once = max(1, _DISTANCES_AT_ONCE // max(1, len(b)))
+    for first in range(0, len(a), at_once):
+        rows = slice(first, first + at_once)
+        apart = distances(a[rows], b)
+        found[rows], places[rows] = apart.min(axis=1), apart.argmin(axis=1)
+    return found, places
 
 
 def seconds_of(shapes: Array, stride: int) -> Array:
