@@ -16,9 +16,11 @@ from appliance.pose.recording import Recording
 from appliance.show.bundle import default_show_path
 from appliance.studio.comparison import versions
 from appliance.studio.comparison.periods import Period, _takes
+from appliance.studio.comparison.pictures import draw_joints_over_time
 from appliance.studio.comparison.versions import compare, null_rows, sentences
 from appliance.studio.data.mirror import mirrored
 from appliance.studio.exchange.retargeting import retarget
+from appliance.studio.improviser import naturalness
 from appliance.studio.studio_error import StudioError
 from tests.studio.bodies import body
 from tests.studio.conftest import bunraku
@@ -190,3 +192,35 @@ def test_a_recording_that_is_too_short_is_no_practice(folders: tuple[Path, Path]
     write_bvh(tmp_path / "short.bvh", swaying(4.0, 1))
     result = bunraku("periods", folders[0], tmp_path / "short.bvh", "--out", tmp_path / "out")
     assert result.exit_code == 2 and "less than 9 s of sound dance" in " ".join(result.stderr.split())
+
+
+def test_joints_with_names_of_other_joints_roles_are_told_apart(tmp_path: Path) -> None:
+    """VRM has `chest` below `upperChest`, which is taken for the chest."""
+    names = {"hip": "hips", "abdomen": "spine", "neck": "upperChest"}
+
+    def renamed(dance: Recording) -> Recording:
+        changed = tuple(names.get(name, name) for name in dance.skeleton.names)
+        return replace(dance, skeleton=replace(dance.skeleton, names=changed))
+
+    found = compare(renamed(danced()), renamed(danced(seed=2)))
+    assert {"chest", "joint chest"} <= found.by_joint.keys()
+    assert len(found.by_joint) == len(found.joints)
+    draw_joints_over_time(tmp_path / "joints.png", found, found.moments(), "one", "other")
+
+
+def test_hours_of_a_practice_are_compared_part_by_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(size=(50, 30)), rng.normal(size=(33, 30))
+    whole, most = naturalness.distances(one, other), []
+
+    def counted(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        most.append(len(a) * len(b))
+        return distances(a, b)
+
+    distances = naturalness.distances
+    monkeypatch.setattr(naturalness, "_DISTANCES_AT_ONCE", 100)
+    monkeypatch.setattr(naturalness, "distances", counted)
+    apart, places = naturalness.nearest(one, other)
+    assert max(most) <= 100 and len(most) > 1
+    np.testing.assert_allclose(apart, whole.min(axis=1))
+    np.testing.assert_array_equal(places, whole.argmin(axis=1))

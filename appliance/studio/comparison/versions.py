@@ -93,9 +93,11 @@ class Comparison:
         return {self.name(place): float(means[place]) for place in np.argsort(-means)}
 
     def name(self, place: int) -> str:
-        """The role of a compared joint, else its name."""
-        joint, skeleton = self.joints[place], self.teacher.skeleton
-        return next((role for role, one in skeleton.roles.items() if one == joint), skeleton.names[joint])
+        """The role of a compared joint, else its name, which another joint may have as its role."""
+        joint, roles = self.joints[place], self.teacher.skeleton.roles
+        own = self.teacher.skeleton.names[joint]
+        known = next((role for role, one in roles.items() if one == joint), None)
+        return known or (f"joint {own}" if own in roles else own)
 
     def moments(self) -> list[Moment]:
         """Where they differ most, the worst one first."""
