@@ -111,6 +111,13 @@ def test_nothing_to_train_on_is_refused(tmp_path: Path) -> None:
         load_dataset(folder, Catalogue(held_out=("*",)))
 
 
+def test_a_joint_name_that_a_network_s_file_cannot_hold_is_refused_before_training(tmp_path: Path) -> None:
+    file = write_recordings(tmp_path / "dancer", count=1) / "sway_0.bvh"
+    file.write_text(file.read_text().replace("JOINT lShldr", "JOINT l,Shldr"))
+    with pytest.raises(DatasetError, match=r"'l,Shldr' in sway_0\.bvh has a comma in its name"):
+        load_dataset(file.parent)
+
+
 def test_a_take_shorter_than_a_window_gives_none(tmp_path: Path) -> None:
     write_bvh(tmp_path / "short.bvh", swaying(0.1))
     take = load_take(tmp_path / "short.bvh", Catalogue())

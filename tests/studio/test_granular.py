@@ -146,6 +146,13 @@ def test_what_cannot_be_is_said(
     assert not (tmp_path / "p.bvh").exists()
 
 
+def test_a_network_of_single_poses_is_not_fed_with_its_own_motion(
+    pose_checkpoint: Path, tmp_path: Path
+) -> None:
+    done = bunraku("granular", pose_checkpoint, "--out", tmp_path / "phrase.bvh", "--feedback", "0.2")
+    assert done.exit_code == 2 and "knows single poses" in done.output
+
+
 def test_long_windows_are_trained_danced_and_no_show(recordings: Path, tmp_path: Path) -> None:
     folder = tmp_path / "long"
     sizes = ("--network", "mlp", "--window", 32, "--width", 32, "--latent", 8, "--steps", 20)

@@ -119,6 +119,12 @@ def load_dataset(
             f"Nothing moves in the recordings of {folder}: no joint turns by more than {MOVING_DEGREES:g} "
             "degree. Export them again with their rotations."
         )
+    commas = [name for name in (skeleton.names[joint] for joint in moving) if "," in name]
+    if commas:
+        raise DatasetError(
+            f"'{commas[0]}' in {files[0].name} has a comma in its name, which parts the joints' names in a "
+            "network's file. Rename the joint in all recordings."
+        )
     errors = find_capture_errors([recorded for _, recorded in read], moving)
     takes = [masked_take(take, found, catalogue) for take, found in zip(takes, errors, strict=True)]
     training, held_out = _kept_apart(takes, catalogue)

@@ -109,6 +109,11 @@ def _poses(options: GranularOptions, network: Network, dataset: Dataset) -> Pose
     count, latent = max(2, round(options.seconds * FPS / hop)), latent_of(network)
     if options.feedback is not None:
         assert not isinstance(network, MotionNetwork), "the command refuses it"
+        if window_of(network) < 2:
+            raise StudioError(
+                f"{options.checkpoint} knows single poses. --feedback goes on from a window's last two: give "
+                "a puppet's checkpoint, or one of train --model sequence."
+            )
         return fed_back(network, _windows(options, network, dataset, options.one, 1), options.feedback)
     if options.one is not None:
         windows = [
