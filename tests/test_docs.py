@@ -18,10 +18,12 @@ from PIL import Image, ImageChops, ImageSequence
 from pydantic import BaseModel, ValidationError
 
 from appliance.cli.app import PLUG_INS, parser, plug_ins
+from appliance.levers.addresses import FORMS
 from appliance.show import describe
 from appliance.show.box import BoxConfig
 from appliance.show.section import Section
 from appliance.show.show import ShowConfig
+from appliance.show_control.command import command
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.data.catalogue import CatalogueFile
 from tests.test_readme import PAGES as RUN_BY_TEST_README
@@ -288,6 +290,22 @@ def test_files_of_source_that_pages_name_exist(page: Path) -> None:
     assert {one for one in named if not any(path.endswith(f"/{one}") for path in known)} == set()
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_by_osc_are_taken_by_the_box(page: Path) -> None:
+    """oscsend hears nothing of a command that is none."""
+    families, refused = {address.split("/")[1] for address in FORMS}, {}
+    for one, sent, other, said in SENT.findall(page.read_text("utf-8")):
+        address, words = one or other, (sent or said).split()
+        if address.split("/")[1] not in families or re.search(r"\b[A-Z]{2,}\b|\.\.", " ".join(words)):
+            continue  # a path, or words that stand for others
+        numbers = [float(word) if re.fullmatch(r"-?[\d.]+", word) else word for word in words]
+        try:
+            command(address, numbers)
+        except ValueError as error:
+            refused[f"{address} {words}"] = str(error)
+    assert refused == {}
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if page.name != "notebook.md"], ids=lambda p: p.name)
 def test_buttons_and_parts_of_the_page_are_called_as_they_are_there(page: Path) -> None:
     words = json.loads((ROOT / "appliance/console/page/words/en.json").read_text("utf-8")).values()
@@ -302,6 +320,7 @@ IS_COMMAND = re.compile(
     r"\s*(?:\$ )?(?:sudo )?(bunraku(?:-[a-z-]+)?|make|apt|dd|oscsend|torchrun|arduino-cli|blender|nmcli"
     r"|systemctl|python|ffmpeg|journalctl|cp|mount)(?: +([a-z-]+))?"
 )
+SENT = re.compile(r"oscsend \S+ \d+ (/\S+)(?: [sifTF]+)?((?: [^\s;&|`]+)*)|`(/[\w/]+)((?: [\w.-]+)+)`")
 SOURCE = re.compile(r"`([\w./-]+\.(?:py|js|cpp|h|sh|ino))`")
 EMPHASISED = re.compile(r"(?<![*\w])\*([A-Z][^*]+)\*(?!\*)")
 # Words of other programs and titles of papers; all others in italics are the page's.
