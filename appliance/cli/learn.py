@@ -219,12 +219,14 @@ class Learner:
 
         Raises _StoppedError where it is no longer wanted.
         """
+        was_ended = False
         with tempfile.TemporaryFile() as out:
             child = start_child((*BUNRAKU, *command), stdout=out, stderr=subprocess.STDOUT)
             try:
                 while child.poll() is None:
                     if self._is_over() or (pauses and self._show_goes()):
                         end_child(child, _ENDS_WITHIN_S)
+                        was_ended = child.returncode != 0
                         break
                     self._report(state=state, **self._share())
                     with contextlib.suppress(subprocess.TimeoutExpired):
@@ -235,7 +237,9 @@ class Learner:
             if self._is_over():
                 raise _StoppedError
             out.seek(0)
-            return int(child.returncode), out.read().decode(errors="replace")
+            # While it reads or exports, the signal ends it at once: it continues as after a step.
+            status = _INTERRUPTED if was_ended else int(child.returncode)
+            return status, out.read().decode(errors="replace")
 
     def _await_rest(self) -> None:
         while self._show_goes():

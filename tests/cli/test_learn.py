@@ -186,6 +186,28 @@ def test_it_pauses_while_a_show_dances_and_goes_on_from_the_checkpoint(
     assert "--resume" in second and "--recordings" not in second and check[0] == "check"
 
 
+def test_a_show_that_starts_while_it_exports_is_a_pause_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own_handler = PROGRAM[PROGRAM.index("signal.signal(") : PROGRAM.index("share =")]
+    exports = PROGRAM.replace(own_handler, '(out / "checkpoint.pt").touch()\n')  # SIGTERM ends it at once
+    monkeypatch.setattr(sys.modules[__name__], "PROGRAM", exports)
+    box = Box(tmp_path, monkeypatch, report_of("default", tmp_path))
+    box.learning.begin(Wanted("takes"))
+
+    def script() -> None:
+        box.await_(lambda: box.learning.reported().get("share") == 0.1)
+        box.dances = True
+        box.await_(lambda: box.learning.reported()["state"] != "training")
+        box.dances = False
+        box.let_end()
+
+    box.beside(script)
+    assert box.run() == 0 and box.learning.reported()["state"] == "learned"
+    assert [words[0] for words in box.begun()] == ["train", "train", "check"]
+    assert "--resume" in box.begun()[1]
+
+
 def test_a_stopped_learner_continues_with_the_same_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
