@@ -98,9 +98,26 @@ def test_a_page_is_read_without_its_code(tmp_path: Path) -> None:
 def test_comments_of_the_firmware_and_of_scripts_are_read(tmp_path: Path) -> None:
     header, script = tmp_path / "a.h", tmp_path / "a.sh"
     header.write_text("// What it holds.\nint a;  // of a box\n")
-    script.write_text("# for want of a disk\n")
+    script.write_text("#!/bin/sh\n# for want of a disk\nls # of a box\n")
     assert [one.tic for one in english.findings_in(header, tmp_path)] == ["what", "of"]
-    assert [one.tic for one in english.findings_in(script, tmp_path)] == ["want"]
+    assert [one.tic for one in english.findings_in(script, tmp_path)] == ["want", "of"]
+    page = tmp_path / "a.js"
+    page.write_text("const A = 1; // of a frame\nconst b = c * of + d; // a frame's\n")
+    assert [one.line for one in english.findings_in(page, tmp_path)] == [1]
+
+
+def test_the_page_s_words_are_read(tmp_path: Path) -> None:
+    words = tmp_path / "en.json"
+    words.write_text(
+        '{\n "runs": "So. The log tells the rest.",\n "b": { "one": "a \\"bar\\" of its own" }\n}\n'
+    )
+    assert [(one.line, one.tic) for one in english.findings_in(words, tmp_path)] == [(2, "tells"), (3, "own")]
+
+
+def test_scripts_without_an_ending_and_the_page_s_words_are_among_the_files() -> None:
+    names = {str(path.relative_to(english.ROOT)) for path in english.files()}
+    assert {english.WORDS, "deploy/bunraku-release", "deploy/system/usr/sbin/bunraku-access-point"} <= names
+    assert "appliance/console/page/words/de.json" not in names
 
 
 def test_the_table_only_shrinks(tmp_path: Path) -> None:

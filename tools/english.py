@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import json
 import re
 import subprocess
 from collections import Counter
@@ -20,6 +21,7 @@ TABLE = ROOT / "tests" / "english_findings.txt"
 FOLDERS = ("appliance", "hw_sim", "firmware", "tools", "deploy")
 PAGES = ("*.md", "docs/*.md", "firmware/*.md")
 C_LIKE = {".h", ".hpp", ".c", ".cpp", ".ino", ".js"}
+WORDS = "appliance/console/page/words/en.json"
 SCRIPTS = {".sh", ".service", ".conf", ".target", ".path", ".mount", ".rules", ".cmake", ".yaml"}
 
 Kind = Literal["page", "message", "docstring", "comment"]
@@ -154,7 +156,7 @@ def texts_of_module(source: str) -> Iterator[Text]:
             if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
                 docstrings.add(id(first.value))
     yield from _strings(tree, docstrings)
-    yield from _comments(source, "#")
+    yield from _comments(source, "#", "  ")
 
 
 def _strings(tree: ast.AST, docstrings: set[int]) -> Iterator[Text]:
@@ -176,10 +178,19 @@ def _strings(tree: ast.AST, docstrings: set[int]) -> Iterator[Text]:
             yield Text(node.lineno, "message", text)
 
 
-def _comments(source: str, mark: str) -> Iterator[Text]:
-    """Comments behind `mark`; those on lines that follow one another are one text."""
-    whole = re.compile(rf"^\s*(?:{mark}) ?(.*)$")
-    behind = re.compile(rf"\S  (?:{mark}) (.*)$")
+def texts_of_words(source: str) -> Iterator[Text]:
+    """The values of a JSON object: the page's words."""
+    for number, line in enumerate(source.splitlines(), 1):
+        for value in re.findall(r': ("(?:[^"\\]|\\.)*")', line):
+            yield Text(number, "message", json.loads(value))
+
+
+def _comments(source: str, mark: str, gap: str = "  ?") -> Iterator[Text]:
+    """Comments behind `mark`; those on lines that follow one another are one text. gap: between code and
+    comment.
+    """
+    whole = re.compile(rf"^\s*(?:{mark})(?!!) ?(.*)$")
+    behind = re.compile(rf"\S{gap}{'#' if mark == '#' else '///?'} (.*)$")
     start, gathered = 0, list[str]()
     for number, line in enumerate([*source.splitlines(), ""], 1):
         if found := whole.match(line):
@@ -199,6 +210,8 @@ def texts_of(path: Path) -> Iterator[Text]:
         yield from texts_of_page(source)
     elif path.suffix == ".py":
         yield from texts_of_module(source)
+    elif path.suffix == ".json":
+        yield from texts_of_words(source)
     elif path.suffix in C_LIKE:
         yield from _comments(source, r"///?|\*|/\*\*?")
     else:
@@ -206,13 +219,20 @@ def texts_of(path: Path) -> Iterator[Text]:
 
 
 def files(root: Path = ROOT) -> list[Path]:
-    """Files that git knows and people read."""
+    """Files that git knows and people read; scripts have an ending, or their program in the first line."""
     asked = [*FOLDERS, *PAGES]
     listed = subprocess.run(["git", "ls-files", "-z", "--", *asked], cwd=root, capture_output=True, text=True)
     listed.check_returncode()
     suffixes = {".py", ".md"} | C_LIKE | SCRIPTS
     paths = [root / name for name in listed.stdout.split("\0") if name]
-    return [path for path in paths if path.suffix in suffixes and path.is_file()]
+    return [path for path in paths if path.is_file() and (path.suffix in suffixes or _is_read(path, root))]
+
+
+def _is_read(path: Path, root: Path) -> bool:
+    if path.suffix:
+        return path == root / WORDS
+    with path.open("rb") as stream:
+        return stream.read(2) == b"#!"
 
 
 def findings_in(path: Path, root: Path = ROOT) -> list[Finding]:

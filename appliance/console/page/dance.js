@@ -4,7 +4,7 @@ import { multiplied } from "./rotation.js";
 const HEAD_BYTES = 16; // tick (float64), flags, joints (uint32): stage_view.py
 const GRID_M = 3;
 const NEAR_M = 4.5, BACK = 1.8; // the eye from one dancer; and for each metre that several are from their middle
-const GHOST = 2, GHOST_M = 1.0; // a flag of a frame: stage_view.py; how far the phrase stands beside the puppet
+const GHOST = 2, GHOST_M = 1.0; // a flag of a frame: stage_view.py; how far beside the puppet the phrase is drawn
 const HELD = 0.01; // less is not seen
 const INK = { body: [238, 226, 206], hand: [255, 138, 92], ghost: [98, 118, 142], floor: "#2a2f36", shadow: "#000000" };
 

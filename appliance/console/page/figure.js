@@ -5,7 +5,7 @@ import { say, withPin } from "./device.js";
 import { aimed, inverse, multiplied } from "./rotation.js";
 
 const TOUCH_PX = 40; // from the middle of a ring
-const EVERY_MS = 50; // of the stream; the box gives a joint back after half a second of silence
+const EVERY_MS = 50; // between two messages; the box gives a joint back after half a second of silence
 const RETRY_MS = 1000;
 const FREE = "#6cb4ee", HELD = "#ff8a5c", STRING = "#f3ece0";
 

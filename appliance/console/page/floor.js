@@ -2,7 +2,7 @@
 import { command } from "./device.js";
 import { byId } from "./elements.js";
 
-const REACH_M = 3, STEP_M = 0.1, HEAD_BYTES = 16; // of a frame: tick, flags, joints
+const REACH_M = 3, STEP_M = 0.1, HEAD_BYTES = 16; // a frame's: tick, flags, joints
 const INK = { grid: "#2d323a", puppet: "#b3b7bd", led: "#ffffff", goal: "#ff8a5c" };
 let places = [], goal = [], joints = 0, puppets = 1;
 

@@ -4,7 +4,7 @@ import { withPin } from "./device.js";
 import { byId } from "./elements.js";
 import { clock, locale, number, translated, words } from "./words.js";
 
-const HEAD_BYTES = 16, JOINT_BYTES = 32; // of a frame: dance.js
+const HEAD_BYTES = 16, JOINT_BYTES = 32; // a frame's: dance.js
 const SLOWEST_MS = 20, MANY = 5; // what fills the timeline's height
 const INK = { late: "#ff7a66", skipped: "#f0b840", failed: "#d36bff", slowest: "#59636f", mark: "#f3ece0", order: "#58c27d" };
 const exact = (seconds) => new Date(1000 * seconds).toLocaleTimeString(locale, { hourCycle: "h23" });

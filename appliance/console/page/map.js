@@ -5,7 +5,7 @@ import { byId } from "./elements.js";
 import { words } from "./words.js";
 
 const PATIENCE_MS = 60_000;
-const MOST_POINTS = 16, STEP = 0.02, TAP = 0.03; // of the map's width
+const MOST_POINTS = 16, STEP = 0.02, TAP = 0.03; // shares of the map's width
 const INK = { path: "#6b7480", figure: "#b3b7bd", line: "#ff8a5c" };
 let ground = null, groundOf = -1, drawn = null, points = [], cursor = [0.5, 0.5];
 

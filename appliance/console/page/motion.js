@@ -14,7 +14,7 @@ const DIALS = {
   path: [["wobble", 0, 2, 0.05, 2], ["frequency", 0.05, 4, 0.05, 2]],
   improvise: [["temperature", 0, 2, 0.05, 2], ["seconds", 5, 60, 1, 0]],
 };
-const BETWEEN = ["mix", "offset"]; // of two phrases alone
+const BETWEEN = ["mix", "offset"]; // for two phrases only
 
 export function initMotion() {
   for (const [source, dials] of Object.entries(DIALS)) {
