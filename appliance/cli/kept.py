@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from appliance.cli.options import ShowFolder, ThisBoxFile
+from appliance.cli.options import ThisBoxFile, ThisShowFolder
 from appliance.dancer.material.material_file import SUFFIX, parsed_recipe, read_material
 from appliance.dancer.phrase import FPS, X, Z
 from appliance.generator.saved_motions import FOLDER
@@ -23,7 +23,7 @@ def kept(
     out: Annotated[
         Path | None, typer.Option(help="Write it there: .bvh, .glb, .npz or .csv. Default: NAME.bvh.")
     ] = None,
-    show: ShowFolder = None,
+    show: ThisShowFolder = None,
     box: ThisBoxFile = None,
 ) -> None:
     """List the motions that `/motion/keep` kept on this box, or write one as a recording.

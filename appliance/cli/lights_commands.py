@@ -14,6 +14,7 @@ from appliance.cli.options import (
     ChosenFile,
     ShowFolder,
     ThisBoxFile,
+    ThisShowFolder,
     command_group,
     is_for_subcommand,
 )
@@ -46,7 +47,7 @@ def light(
 
 @lights.command("test")
 def walk_through(
-    show: ShowFolder = None,
+    show: ThisShowFolder = None,
     box: ThisBoxFile = None,
     fixture: Annotated[list[str] | None, typer.Option(help="This fixture alone; repeatable.")] = None,
     attribute: Annotated[str | None, typer.Option(help="This attribute alone; `aim` for heads.")] = None,

@@ -10,8 +10,13 @@ import typer
 from appliance.show.bundle import bundled_shows, named_show
 
 _NAMES = ", ".join(bundled_shows())
-SHOW_OR_NAME = f"Show bundle, or the name of one that comes with the box: {_NAMES}. Default: default."
+_SHOW = f"Show bundle, or the name of one that comes with the box: {_NAMES}."
+SHOW_OR_NAME = f"{_SHOW} Default: default."
 ShowFolder = Annotated[Path | None, typer.Option("--show", callback=named_show, help=SHOW_OR_NAME)]
+ThisShowFolder = Annotated[
+    Path | None,
+    typer.Option("--show", callback=named_show, help=f"{_SHOW} Default: this box's, elsewhere default."),
+]
 BoxFile = Annotated[
     Path | None, typer.Option("--box", help="box.yaml of the venue. Default: everything on this machine.")
 ]
