@@ -6,7 +6,7 @@ import numpy as np
 
 from appliance.body.rest_pose import anatomy_of
 from appliance.body.sculpture import Sculpture, sculpture
-from appliance.body.skinning import BodyMesh, weights_of
+from appliance.body.skinning import BodyMesh, joint_numbers, weights_of
 from appliance.body.surface import Finer, Grid, finer_grid, surface_of
 from appliance.body.volumes import grid_around, sampled, settled
 from appliance.pose.quaternion import Array
@@ -32,7 +32,7 @@ def body_mesh(skeleton: Skeleton) -> BodyMesh:
         vertices,
         normals,
         faces,
-        joints,
+        joint_numbers(joints, len(skeleton)),
         weights,
         anatomy.height,
         anatomy.positions.astype("float32"),

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from appliance.body.bake import bake
 from appliance.body.body_mesh import SPACING, body_mesh
-from appliance.body.skinning import MOVERS, Baked, BodyMesh
+from appliance.body.skinning import MOVERS, Baked, BodyMesh, joint_numbers
 from appliance.pose.foreign_file import content, require_inside
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.whole_file import written_whole
@@ -226,7 +226,7 @@ def _is_whole(mesh: BodyMesh, joint_count: int) -> bool:
         (mesh.vertices.shape, mesh.normals.shape) == ((count, 3), (count, 3))
         and (mesh.joints.shape, mesh.weights.shape) == ((count, MOVERS), (count, MOVERS))
         and (mesh.bind_positions.shape, mesh.bind_world.shape) == ((joint_count, 3), (joint_count, 4))
-        and mesh.joints.dtype == np.uint8
+        and mesh.joints.dtype == joint_numbers(mesh.joints, joint_count).dtype
         and all(part.dtype == np.float32 and bool(np.isfinite(part).all()) for part in numbers)
         and 0.0 < mesh.height < np.inf
         and count > 0

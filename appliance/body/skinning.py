@@ -19,6 +19,8 @@ from appliance.body.volumes import Ball, Slab
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 
+JointNumbers = NDArray[np.uint8] | NDArray[np.uint16]
+
 
 @dataclass(frozen=True, eq=False)
 class Baked:
@@ -40,7 +42,8 @@ class BodyMesh:
     """A closed surface around a skeleton, in the pose in which it was modelled.
 
     vertices, normals: (V, 3) float32, metres; faces: (F, 3) int32, counter-clockwise seen from outside;
-    joints: (V, 4) uint8 and weights: (V, 4) float32, which joints move a vertex, sum 1, strongest first;
+    joints: (V, 4) as joint_numbers and weights: (V, 4) float32, which joints move a vertex, sum 1, strongest
+    first;
     height: metres; bind_positions: (J, 3) and bind_world: (J, 4), where the joints were when it was modelled;
     baked: in a surface that was read from a show.
     """
@@ -48,12 +51,17 @@ class BodyMesh:
     vertices: NDArray[np.float32]
     normals: NDArray[np.float32]
     faces: NDArray[np.int32]
-    joints: NDArray[np.uint8]
+    joints: JointNumbers
     weights: NDArray[np.float32]
     height: float
     bind_positions: NDArray[np.float32]
     bind_world: NDArray[np.float32]
     baked: Baked | None = None
+
+
+def joint_numbers(joints: NDArray[np.integer], count: int) -> JointNumbers:
+    """Numbers of a skeleton's joints as a surface has them: in a byte, of more than 256 joints in two."""
+    return joints.astype(np.uint8) if count <= 256 else joints.astype(np.uint16)
 
 
 def dual_quaternions(bind_positions: Array, bind_world: Array, positions: Array, world: Array) -> Array:
@@ -74,7 +82,7 @@ def weights_of(
     faces: NDArray[np.int32],
     volumes: Sequence[Slab | Ball],
     part_of: Callable[[int], int],
-) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Which joints move each vertex, (V, 4), and how much, (V, 4), strongest first.
 
     The owner of the nearest volume, softened only along the surface: a hanging hand does not move the thigh
@@ -100,7 +108,7 @@ def weights_of(
     strongest = np.take_along_axis(few, order, axis=1)
     kept = np.take_along_axis(weights, strongest, axis=1)
     joints = np.array([*owners, *owners[:1] * MOVERS])[strongest]
-    return joints.astype(np.uint8), (kept / kept.sum(axis=1, keepdims=True)).astype(np.float32)
+    return joints, (kept / kept.sum(axis=1, keepdims=True)).astype(np.float32)
 
 
 def neighbours(faces: NDArray[np.int32], count: int) -> NDArray[np.int64]:

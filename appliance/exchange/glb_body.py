@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from appliance.body.mesh_file import write_mesh
 from appliance.body.rest_pose import anatomy_of
-from appliance.body.skinning import MOVERS, BodyMesh
+from appliance.body.skinning import MOVERS, BodyMesh, JointNumbers, joint_numbers
 from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.glb_file import GlbFile
 from appliance.pose import quaternion
@@ -260,13 +260,15 @@ def _laid_on(
     return total
 
 
-def _strongest(weights: Array) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+def _strongest(weights: Array) -> tuple[JointNumbers, NDArray[np.float32]]:
+    count = weights.shape[1]
     weights = np.pad(weights, ((0, 0), (0, max(0, MOVERS - weights.shape[1]))))
     joints = np.argsort(-weights, axis=1, kind="stable")[:, :MOVERS]
     kept = np.take_along_axis(weights, joints, axis=1)
     total = kept.sum(axis=1, keepdims=True)
     kept = np.where(total > 1e-6, kept / np.maximum(total, 1e-6), np.eye(1, MOVERS))
-    return np.where(kept > 0.0, joints, joints[:, :1]).astype(np.uint8), kept.astype(np.float32)
+    joints = np.where(kept > 0.0, joints, joints[:, :1])
+    return joint_numbers(joints, count), kept.astype(np.float32)
 
 
 def _normals(vertices: Array, faces: NDArray[np.int64]) -> NDArray[np.float32]:

@@ -86,7 +86,7 @@ def _xyzw(q: Array) -> NDArray[np.float32]:
 def _body(recording: Recording, buffer: GlbBuffer) -> tuple[dict[str, Any], int]:
     """The sculpted body as a primitive, and the accessor of the inverse bind matrices."""
     mesh = body_mesh(recording.skeleton)
-    joints = np.where(mesh.weights > 0, mesh.joints, 0).astype(np.uint8)
+    joints = np.where(mesh.weights > 0, mesh.joints, 0).astype(mesh.joints.dtype)
     normals = mesh.normals.astype(np.float64)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(length > 0.5, normals / np.maximum(length, 1e-9), [0.0, 1.0, 0.0])

@@ -98,6 +98,15 @@ def test_the_surface_of_another_skeleton_or_of_another_model_is_made_again(
     assert write_mesh(tmp_path, toy) and read_mesh(tmp_path, toy) is not None
 
 
+def test_a_surface_of_more_joints_than_a_byte_counts_follows_each_of_them(tmp_path: Path) -> None:
+    rope = skeletons.rope(300)
+    write_mesh(tmp_path, rope)
+    found = read_mesh(tmp_path, rope)
+    assert found is not None and int(found.joints.max()) == 299
+    away = found.vertices - found.bind_positions[found.joints[:, 0]]
+    assert np.abs(away).max() < 0.5 and found.height == pytest.approx(3.0)
+
+
 def test_a_damaged_file_never_stops_the_projector(toy: Skeleton, tmp_path: Path, rng: random.Random) -> None:
     file = tmp_path / MESH_FILE
     whole = file.read_bytes()

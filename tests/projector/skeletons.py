@@ -39,6 +39,15 @@ def point() -> Skeleton:
     return built([("thing", None, (0, 0, 0))])
 
 
+def rope(joints: int) -> Skeleton:
+    """Three metres of rope in so many joints."""
+    long = 3.0 / joints
+    bones: list[Bone] = [
+        (f"j{n}", f"j{n - 1}" if n else None, (0, long if n else 0, 0)) for n in range(joints)
+    ]
+    return built(bones, {f"j{joints - 1}": (0, long, 0)})
+
+
 def mixamo() -> Skeleton:
     """Named as by Mixamo, centimetre by centimetre symmetrical, without fingers."""
     bones: list[Bone] = [

@@ -17,7 +17,7 @@ from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import STYLES, LookConfig, looks_by_name
 from tests.projector.golden_looks import AT_S, FOLDER, MEAN_LIMIT, P99_LIMIT, SIZE, difference, renderer
 from tests.projector.gpu_cost import GpuCost
-from tests.projector.skeletons import mixamo, point, toy
+from tests.projector.skeletons import mixamo, point, rope, toy
 
 MOST_GPU_BYTES = 25e6
 MOST_DRAW_CALLS = 20
@@ -41,6 +41,17 @@ def still(skeleton: Skeleton, size: float = 1.0) -> Recording:
     )
     lowest = grown.forward_kinematics(poses[0], np.zeros(3))[0][:, 1].min()
     return Recording(grown, poses, np.tile([0.0, -lowest, 0.0], (60, 1)), 50.0)
+
+
+def test_hundreds_of_joints_look_like_tens(gl: moderngl.Context) -> None:
+    """A rope whose last tenth is bent; a byte counts 256 joints."""
+    pictures = []
+    for joints in (30, 300):
+        dance = still(rope(joints))
+        dance.poses[:, joints * 9 // 10] = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
+        with renderer(gl, dance.skeleton) as made:
+            pictures.append(draw_still(gl, made, moment_of(dance, 1.0), "lines", SIZE))
+    assert difference(*pictures)[0] < MEAN_LIMIT
 
 
 @pytest.mark.parametrize("style", STYLES)

@@ -34,6 +34,7 @@ class BodyBuffers:
         lit = np.concatenate([self.normals, baked.open[:, None]], axis=1)
         values = self.positions, lit, baked.sunk, baked.calm, self.joints, self.weights
         parts = dict(zip(PARTS, values, strict=True))
+        self._layout = layout(parts)
         drawn = mesh.faces[baked.order]
         self._fine = _uploaded(ctx, parts, np.arange(len(self.positions)), drawn)
         self._coarse = _uploaded(ctx, parts, *merged(self.positions, drawn, COARSE))
@@ -41,7 +42,7 @@ class BodyBuffers:
     def content(self, coarse: bool) -> tuple[list[tuple[Any, ...]], moderngl.Buffer]:
         """The vertices with their layout, and the indices."""
         vertices, indices = self._coarse if coarse else self._fine
-        return [(vertices, *layout(PARTS))], indices
+        return [(vertices, *self._layout)], indices
 
     def release(self) -> None:
         for buffer in (*self._fine, *self._coarse):

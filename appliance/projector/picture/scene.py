@@ -241,7 +241,7 @@ class Easel:
     def vertices(self, parts: Mapping[str, Any], instanced: bool = False) -> list[tuple[Any, ...]]:
         """Bring vertices onto the GPU; returns what a vertex array is made of. instanced: one an instance."""
         self._buffers.append(self.ctx.buffer(packed(parts)))
-        formats, *names = layout(tuple(parts))
+        formats, *names = layout(parts)
         return [(self._buffers[-1], formats + ("/i" if instanced else ""), *names)]
 
     def indices(self, values: NDArray[np.int32]) -> moderngl.Buffer:

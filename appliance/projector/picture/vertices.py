@@ -20,9 +20,10 @@ FORMATS = {  # moderngl's word for it, and numpy's
 }
 
 
-def layout(parts: tuple[str, ...]) -> tuple[str, ...]:
+def layout(parts: Mapping[str, Any]) -> tuple[str, ...]:
     """The layout of a vertex array with vertices of these parts: the format, then names in shaders."""
-    return " ".join(FORMATS[part][0] for part in parts), *(f"in_{part}" for part in parts)
+    formats = (_formats(part, values)[0] for part, values in parts.items())
+    return " ".join(formats), *(f"in_{part}" for part in parts)
 
 
 def packed(parts: Mapping[str, Any]) -> bytes:
@@ -31,7 +32,8 @@ def packed(parts: Mapping[str, Any]) -> bytes:
     Bytes hold 0 to 1, or -1 to 1 for directions; a shader doubles those and takes 1 away.
     """
     count = len(next(iter(parts.values())))
-    kinds: list[Any] = [(part, FORMATS[part][1], int(FORMATS[part][0][0])) for part in parts]
+    formats = {part: _formats(part, values) for part, values in parts.items()}
+    kinds: list[Any] = [(part, kind, int(word[0])) for part, (word, kind) in formats.items()]
     records = np.zeros(count, kinds)
     for part, values in parts.items():
         if part in ("normal", "tangent", "calm"):
@@ -40,3 +42,8 @@ def packed(parts: Mapping[str, Any]) -> bytes:
             values = np.round(255.0 * values)
         records[part][:, : values.shape[1]] = values
     return records.tobytes()
+
+
+def _formats(part: str, values: Any) -> tuple[str, str]:
+    """FORMATS, and two bytes for the numbers of more joints than one holds."""
+    return ("4u2", "u2") if part == "joints" and values.dtype.itemsize > 1 else FORMATS[part]

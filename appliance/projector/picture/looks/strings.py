@@ -10,6 +10,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from appliance.body.skinning import joint_numbers
 from appliance.pose.anatomy import Anatomy
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.glow import Glow
@@ -38,7 +39,7 @@ class Strings:
         parts = {
             "position": easel.bind_positions[many].astype(np.float32),
             "chance": random.random_sample((len(many), 4)).astype(np.float32),
-            "joints": np.repeat(many[:, None], 4, axis=1).astype(np.uint8),
+            "joints": joint_numbers(np.repeat(many[:, None], 4, axis=1), len(easel.skeleton)),
         }
         self._tied_to = easel.vertices(parts, instanced=True)
         self._strings = easel.drawing("string", "string", self._tied_to)
