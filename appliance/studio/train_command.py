@@ -81,7 +81,7 @@ def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
         training = Training(dataset, settings, device, processes, begin)
     else:
         training = training_for(settings, dataset, _puppet(options, state), device, processes)
-    training.origin |= source.as_state()
+    training.origin |= source.learned_by(dataset).as_state()
     begun_with = (
         options.start.resolve().name if options.start else (state or {}).get("origin", {}).get("from")
     )
@@ -233,7 +233,7 @@ def _require_as_begun(options: TrainOptions, settings: AnySettings, source: Sour
         asked = sources.given(
             source.recordings, options.catalogue, options.held_out, options.reading, options.keep
         )
-        if asked.catalogue != source.catalogue:
+        if asked.catalogue != replace(source.catalogue, learned=()):
             other.append("--catalogue, --held-out or --keep (its recordings stay as they were)")
     if other:
         raise StudioError(

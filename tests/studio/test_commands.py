@@ -24,7 +24,9 @@ from appliance.show.show import load_show
 from appliance.studio.data.catalogue import Catalogue, recordings_in
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.data.remembered import Remembered, reading_facts
-from appliance.studio.evaluation.findings import few_data
+from appliance.studio.data.sources import remembered
+from appliance.studio.evaluation.coders import load_state
+from appliance.studio.evaluation.findings import few_data, findings
 from appliance.studio.export import gate, release
 from appliance.studio.export.packing import write_show_yaml
 from tests.studio.conftest import Said, bunraku
@@ -160,6 +162,28 @@ def test_export_keeps_what_the_artist_wrote(trained: Trained, tmp_path: Path) ->
     assert read_bvh(out / "phrase.bvh").seconds == pytest.approx(2.0)
     assert "contains a recording" not in said(result)
     assert verify_bundle(out) == []
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_takes_that_came_or_went_since_never_make_a_learned_one_the_measure(
+    trained: Trained, recordings: Path, tmp_path: Path
+) -> None:
+    """sway_2 was kept apart. Without it sway_1 would be the last one, and with another one sway_2 is not."""
+    checkpoint = trained[0] / "checkpoint.pt"
+    for name in ("fewer", "more"):
+        shutil.copytree(recordings, tmp_path / name)
+    (tmp_path / "fewer" / "sway_2.bvh").unlink()
+    write_bvh(tmp_path / "more" / "z_new.bvh", swaying(4.0, seed=9))
+    for name, held_out in (("fewer", []), ("more", ["sway_2", "z_new"])):
+        asked = ["export", checkpoint, "--out", tmp_path / f"{name}_show", "--recordings", tmp_path / name]
+        result = bunraku(*asked)
+        assert result.exit_code == 0, said(result)
+        report = json.loads((tmp_path / f"{name}_show" / "report.json").read_text())
+        assert report["training"]["takes"] == ["sway_0", "sway_1"]
+        assert report["training"]["held_out"] == held_out
+    state = load_state(checkpoint)
+    resumed = remembered(state, tmp_path / "fewer", checkpoint).load(lambda files: files)
+    assert "learned from all of these takes" in " ".join(findings(resumed))
 
 
 @pytest.mark.usefixtures("unmeasured")

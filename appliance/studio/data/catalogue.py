@@ -31,7 +31,7 @@ Spans = tuple[tuple[float, float], ...]  # seconds from and to
 @dataclass(frozen=True)
 class Catalogue:
     """Facts about recordings that their files lack: true frame rates, takes, held-out ones, and
-    corrections to the detected capture errors.
+    corrections to the detected capture errors. learned: takes that a checkpoint's network learned from.
     """
 
     true_fps: dict[str, float] = field(default_factory=dict)
@@ -44,6 +44,7 @@ class Catalogue:
     up: dict[str, str] = field(default_factory=dict)
     facing: dict[str, str] = field(default_factory=dict)
     root: dict[str, str] = field(default_factory=dict)
+    learned: tuple[str, ...] = ()
 
     @property
     def reading(self) -> ReadingOptions:

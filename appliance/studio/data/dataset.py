@@ -142,12 +142,17 @@ def load_folder(folder: Path, reading: ReadingOptions) -> Dataset:
 
 
 def _kept_apart(takes: Sequence[Take], catalogue: Catalogue) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
-    """Training and held-out takes: whole takes, or the end of a single take."""
+    """Training and held-out takes: whole takes, or the end of a single take.
+
+    Where none is named, those that the network did not learn from, of a new one the last: takes may have come
+    or gone since, and no measured one may be a learned one.
+    """
     held = {take.take for take in takes if catalogue.is_held_out(take.name)}
     names = sorted({take.take for take in takes})
     if not held and len(names) == 1:
         return _ends_kept_apart(takes)
-    held = held or {names[-1]}
+    learned = set(names) & set(catalogue.learned)
+    held = held or (set(names) - learned if learned else {names[-1]})
     if held.issuperset(names):
         raise DatasetError("Every take is held out: nothing is left to train on.")
     training = tuple(take for take in takes if take.take not in held)

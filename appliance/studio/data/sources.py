@@ -25,6 +25,11 @@ class Sources:
         """Plain values for a checkpoint."""
         return {"recordings": str(self.recordings.resolve()), "catalogue": asdict(self.catalogue)}
 
+    def learned_by(self, dataset: Dataset) -> Sources:
+        """The same, and which takes a network learns from: they are not held out later."""
+        known = {*self.catalogue.learned, *(take.take for take in dataset.training)}
+        return replace(self, catalogue=replace(self.catalogue, learned=tuple(sorted(known))))
+
     def load(self, progress: Callable[[Sequence[Path]], Sequence[Path]]) -> Dataset:
         """Read every recording. Raises DatasetError or BvhError."""
         return load_dataset(self.recordings, self.catalogue, progress)

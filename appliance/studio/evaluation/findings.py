@@ -63,6 +63,8 @@ def require_windows(dataset: Dataset, least: int, window: int = WINDOW) -> None:
 
 
 def _kept_apart(dataset: Dataset) -> str:
+    if not dataset.held_out and len({take.take for take in dataset.takes}) > 1:
+        return "Nothing is kept apart: the network learned from all of these takes."
     if not dataset.held_out:
         return "Nothing is kept apart: there is only one short take, so the learning cannot be measured."
     held = ", ".join(sorted(take.name for take in dataset.held_out))
