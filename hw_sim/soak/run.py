@@ -94,8 +94,8 @@ def soak(
         soak.load_is_missing = load and shutil.which("stress-ng") is None
         acts = script(seconds, companions, GUESTS, seed, load and not soak.load_is_missing)
         _dance(soak, acts, ports, stopped, each_second)
-        _change_load(soak, "none")
         soak.frames.end(time.monotonic())
+        _change_load(soak, "none")
     return soak
 
 
