@@ -73,6 +73,13 @@ def test_same_moment_same_picture_whatever_came_before(
         assert np.array_equal(draw_still(*drawing, moment, style, SIZE), picture)
 
 
+def test_a_band_of_leds_is_not_too_wide_for_the_textures_behind_it(
+    dance: Recording, drawing: tuple[moderngl.Context, Renderer]
+) -> None:
+    for style in STYLES:
+        assert draw_still(*drawing, moment_of(dance, AT_S), style, (3840, 64)).max() > 100
+
+
 @pytest.mark.parametrize("size", [(320, 180), (240, 180), (180, 320), (400, 100)])
 def test_edge_is_true_black_and_the_figure_inside(
     size: tuple[int, int], dance: Recording, drawing: tuple[moderngl.Context, Renderer]

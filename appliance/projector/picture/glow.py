@@ -8,7 +8,7 @@ import numpy as np
 from appliance.projector.picture.looks.palette import Palette
 from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.shadow import OVERHEAD, Shadow
-from appliance.projector.picture.targets import Target
+from appliance.projector.picture.targets import Target, of_lines
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
@@ -30,7 +30,7 @@ class Glow:
         """A small, soft copy of a picture, `gain` times as bright."""
         easel = self._easel
         easel.ctx.enable_only(moderngl.NOTHING)
-        size = (max(2, round(picture.size[0] * lines / picture.size[1])), lines)
+        size = of_lines(lines, picture.size[0] / picture.size[1])
         first, second = easel.canvas(name, size), easel.canvas(name + " half", size)
         first.start()
         inputs = {"source": picture.texture, "texel": (0.25 / size[0], 0.25 / size[1]), "gain": gain}

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import moderngl
 
 from appliance.projector.picture.scene import Easel
-from appliance.projector.picture.targets import Target
+from appliance.projector.picture.targets import Target, of_lines
 
 LINES = 400  # the height of the sheet
 STEP_S = 0.4  # strokes are laid onto it so often
@@ -31,7 +31,7 @@ class KeptStrokes:
     def at(self, time_s: float, aspect: float, lay: Callable[[Target, float], None] | None) -> Target:
         """The sheet at this time. lay: draws the strokes of now, as strong as the number says, into a target;
         None: nothing is kept, the sheet is blank."""
-        sheet = self._easel.canvas("kept", (round(LINES * aspect), LINES))
+        sheet = self._easel.canvas("kept", of_lines(LINES, aspect))
         step = int(time_s // STEP_S)
         if sheet is not self._sheet or lay is None or step < self._step:
             sheet.start()

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import moderngl
 
+from appliance.projector.picture.image_file import MOST_WIDE
 from appliance.projector.sdl import sdl2
 
 _FRAMEBUFFER, _DEPTH = 0x8D40, 0x8D00  # GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT
@@ -57,6 +58,12 @@ class Target:
         for owned in (self._depth, self._fine, self._melted):
             if owned is not None:
                 owned.release()
+
+
+def of_lines(lines: int, aspect: float) -> tuple[int, int]:
+    """The size of a soft picture of that many lines, of fewer where it would be too wide for a texture."""
+    lines = max(1, min(lines, int(MOST_WIDE / aspect)))
+    return max(2, round(lines * aspect)), lines
 
 
 def _invalidation() -> Callable[..., None]:

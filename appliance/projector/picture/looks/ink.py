@@ -18,7 +18,7 @@ from appliance.projector.picture.kept_strokes import KeptStrokes
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.particles import traced
 from appliance.projector.picture.scene import Easel, Scene
-from appliance.projector.picture.targets import Target
+from appliance.projector.picture.targets import Target, of_lines
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
@@ -112,7 +112,7 @@ class Ink:
     def _paper(self, look: LookConfig, aspect: float) -> Target:
         """The sheet; drawn again when its shape or the look has changed."""
         wanted = {"aspect": aspect, "density": look.density, "vignette": look.vignette}
-        sheet = self._easel.canvas("paper", (round(PAPER_LINES * aspect), PAPER_LINES))
+        sheet = self._easel.canvas("paper", of_lines(PAPER_LINES, aspect))
         if wanted != self._made:
             sheet.start()
             self._easel.ctx.enable_only(moderngl.NOTHING)

@@ -8,6 +8,7 @@ import numpy as np
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.scene import Easel, Scene, direction
 from appliance.projector.picture.shadow import Shadow
+from appliance.projector.picture.targets import of_lines
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
@@ -65,7 +66,7 @@ class Plaster:
             "beam_to": view.on_picture(pool),
             "beam_width": scene.spread * BEAM_WIDTH * scene.share_of_picture,
         }
-        air = easel.canvas("stage", (round(AIR_LINES * scene.aspect), AIR_LINES))
+        air = easel.canvas("stage", of_lines(AIR_LINES, scene.aspect))
         air.start()
         easel.ctx.enable_only(moderngl.NOTHING)
         self._air.draw(inputs)
