@@ -145,7 +145,7 @@ def emulate(
     if serial is None:
         refuse_idle(context, ("baud",), "without --serial")
     else:
-        refuse_idle(context, ("host", "port"), "with --serial")
+        refuse_idle(context, ("host", "port", "network"), "with --serial")
     if not firmware:
         refuse_idle(context, ("imu",), "without --firmware")
     try:

@@ -11,7 +11,7 @@ from itertools import count
 from typing import NamedTuple, Protocol
 
 from hw_sim.device import Device, Lane, Outgoing, Sample
-from hw_sim.network import PERFECT, VenueNetwork
+from hw_sim.network import PERFECT, Delivery, VenueNetwork
 
 LONGEST_SLEEP_S = 0.05  # a signal to stop is seen within this
 IDLE_S = 0.006  # time that must be left for what is not urgent, such as a status line
@@ -128,7 +128,7 @@ class Emulator:
         """Carry what the box sent to one device; note a cable that came or went."""
         for lane, sender in self._senders[number].items():
             while (data := sender.receive_packet()) is not None:
-                for delivery in self._network.carry(data, now, number, to_box=False):
+                for delivery in self._carried(data, now, number, lane, to_box=False):
                     if delivery.note != "lost":
                         arrival = delivery.at, next(self._order), number, lane, delivery.data
                         heapq.heappush(self._to_the_devices, arrival)
@@ -137,12 +137,18 @@ class Emulator:
                 self.devices[number].connect(lane, sender.is_up, now)
 
     def _carry(self, number: int, outgoing: Outgoing) -> None:
-        for delivery in self._network.carry(outgoing.data, outgoing.at, number):
+        for delivery in self._carried(outgoing.data, outgoing.at, number, outgoing.lane, to_box=True):
             if delivery.note == "lost":
                 self.counts["lost"] += 1
                 continue
             carried = outgoing._replace(data=delivery.data)
             heapq.heappush(self._to_the_box, (delivery.at, next(self._order), number, carried, delivery.note))
+
+    def _carried(self, data: bytes, at: float, number: int, lane: Lane, to_box: bool) -> list[Delivery]:
+        """By the network; a cable loses nothing and holds nothing up."""
+        if lane == Lane.CABLE:
+            return [Delivery(at, data, "")]
+        return self._network.carry(data, at, number, to_box)
 
     def _send(self, number: int, outgoing: Outgoing, note: str) -> None:
         sender = self._senders[number].get(outgoing.lane)

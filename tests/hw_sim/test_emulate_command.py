@@ -121,9 +121,7 @@ def test_over_a_cable_that_is_pulled_out_and_plugged_in_again(
 ) -> None:
     with NullModem(tmp_path) as cable:
         link = open_link(load_keys(keys_path), serial=[(str(cable.far), 115200)])
-        process = emulate(
-            "--keys", keys_path, "--serial", cable.near, "--sensor", "head", "--network", "perfect"
-        )
+        process = emulate("--keys", keys_path, "--serial", cable.near, "--sensor", "head")
         before = hear_until(link, bool)
         cable.pull_out()
         cable.plug_in()

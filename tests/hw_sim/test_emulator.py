@@ -190,6 +190,18 @@ def test_the_step_for_measuring_is_believed_at_once(degrees: float) -> None:
     assert {reason for reason, number in show.link.counts.items() if number} <= {"hello", "accepted", "lost"}
 
 
+def test_a_cable_is_no_network() -> None:
+    """Null: the same packets by the network, of which a tenth are late, lost or damaged."""
+    trouble = {"lost", "reordered", "duplicated", "corrupted"}
+    for by_cable in (True, False):
+        pair = Pair(sensor(), network=VenueNetwork(BAD, 3))
+        pair.line.is_up, pair.cable.is_up = not by_cable, by_cable
+        pair.run(10.0)
+        assert len(pair.sent) > 400
+        assert bool(trouble & set(pair.emulator.counts)) != by_cable
+        assert all(sent.sent_at - sent.sample.sampled_at < 0.005 for sent in pair.sent) == by_cable
+
+
 def test_a_reboot_is_silent_and_starts_from_zero() -> None:
     nonces = count(1)
     device = sensor(reboot_every_s=5.0, boot_nonce=lambda: next(nonces))

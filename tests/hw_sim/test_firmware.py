@@ -315,7 +315,7 @@ def test_as_a_process_over_a_real_tty(emulate: Emulate, tmp_path: Path) -> None:
     create_keys(path, ["head"])
     with NullModem(tmp_path) as cable:
         link = open_link(load_keys(path), serial=[(str(cable.far), 115200)])
-        process = emulate("--firmware", "--keys", path, "--serial", cable.near, "--network", "perfect")
+        process = emulate("--firmware", "--keys", path, "--serial", cable.near)
         hear_until(link, lambda heard: len(heard) > 25)
         process.terminate()
         assert process.wait(timeout=60) == 0
