@@ -8,6 +8,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from matplotlib import get_data_path
 from PIL import Image
 
 from appliance.levers.show_state import ShowState
@@ -127,6 +128,15 @@ def test_letters_of_several_scripts_are_drawn_as_themselves() -> None:
     two = lettered("a\nb", 40, RED)
     assert two.shape[0] > 1.5 * lettered("a", 40, RED).shape[0]
     assert (two[..., :3] == RED).all() and two[..., 3].max() == 255
+
+
+def test_a_font_that_was_saved_anew_is_taken_with_the_next_cards(show: Show, tmp_path: Path) -> None:
+    card = CardConfig(name="x", text="Hamlet", font="own.ttf", size=0.4)
+    state, seen = ShowState().to(CARD, "x"), []
+    for content in (b"broken", Path(get_data_path(), "fonts/ttf/DejaVuSansMono-Bold.ttf").read_bytes()):
+        (tmp_path / "own.ttf").write_bytes(content)
+        seen.append(show([card], state))
+    assert np.abs(seen[1] - seen[0]).max() > 100
 
 
 def test_a_card_follows_the_corners(gl: moderngl.Context, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from appliance.levers.show_state import ShowState
 from appliance.levers.table import CARD
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import LINES, MOST_WIDE, Image, read_image, texture_of
-from appliance.projector.picture.lettering import lettered, letters_without_font
+from appliance.projector.picture.lettering import forget_fonts, lettered, letters_without_font
 from appliance.projector.picture.wall import Wall
 from appliance.show.card import CardConfig
 
@@ -53,6 +53,7 @@ class Cards:
         say: Callable[[str], None],
     ) -> None:
         self._gl = gl
+        forget_fonts()
         self._nothing = gl.texture((1, 1), 4, bytes(4))
         self._drawings = {
             gamma: Drawing(gl, "laid", "card", parts=["GAMMA"] * gamma) for gamma in (False, True)

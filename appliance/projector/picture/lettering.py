@@ -53,6 +53,12 @@ def letters_without_font(text: str, font: Path | None = None) -> str:
     return "".join(dict.fromkeys(one for one in text if not any(_has(path, one) for path in fonts)))
 
 
+def forget_fonts() -> None:
+    """Look at font files anew: a show's may have been saved again since, and others installed."""
+    for known in (fonts_of_machine, _opened, _has):
+        known.cache_clear()
+
+
 class _Line:
     """A line of words, each run of letters in the first font that has them."""
 
