@@ -74,6 +74,9 @@ def measure(
                 "The picture of --report needs matplotlib, which is missing here: nothing was measured. "
                 "Leave --report out (--json FILE writes the figures), or: pip install 'bunraku[pictures]'"
             )
+        for folder in (report, None if json_file is None else json_file.parent):
+            if folder is not None:  # before minutes are measured for nothing
+                folder.mkdir(parents=True, exist_ok=True)
         with scratch_folder("bunraku-measure-") as scratch:
             setting, page = _setting(show, box, scratch, firmware), Progress(progress)
             parts = 5 if setting.sounds else 4
@@ -110,25 +113,30 @@ def measure(
                 *(firmware, light_steps, light_dance, heard),
             )
     except (ProbeError, OSError, ValueError) as error:
-        message = sentence(error) if isinstance(error, OSError) else None
-        print(f"bunraku measure: {message or error}", file=sys.stderr)
-        raise typer.Exit(REFUSED) from None
+        raise _refused(error) from None
     figures = figures_of(evidence)
     limits = verdict(figures)
     page.report(figures=figures, limits=[limit._asdict() | {"holds": limit.holds} for limit in limits])
     for line in table(figures, limits):
         print(line)
     written = [json_file] if json_file is not None else []
-    if report is not None:
-        from hw_sim.report import draw_report
+    try:
+        if report is not None:
+            from hw_sim.report import draw_report
 
-        report.mkdir(parents=True, exist_ok=True)
-        written.append(report / "measure.json")
-        print(f"Picture: {draw_report(report / 'measure.png', evidence)}")
-    for path in written:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(figures, indent=2) + "\n")
+            written.append(report / "measure.json")
+            print(f"Picture: {draw_report(report / 'measure.png', evidence)}")
+        for path in written:
+            path.write_text(json.dumps(figures, indent=2) + "\n")
+    except OSError as error:
+        raise _refused(error) from None
     raise typer.Exit(0 if all(limit.holds for limit in limits) else FAILED)
+
+
+def _refused(error: Exception) -> typer.Exit:
+    message = sentence(error) if isinstance(error, OSError) else None
+    print(f"bunraku measure: {message or error}", file=sys.stderr)
+    return typer.Exit(REFUSED)
 
 
 def locked_course(seconds: float) -> Course:

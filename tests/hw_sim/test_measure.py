@@ -116,6 +116,17 @@ def test_a_show_that_does_not_dance_is_refused_with_the_box_s_own_words(tmp_path
     assert "This show cannot be danced" in done.stderr and "puppet.onnx" in done.stderr
 
 
+@pytest.mark.parametrize("option", ["--json", "--report"])
+def test_a_place_that_takes_no_file_is_refused_before_anything_is_measured(
+    option: str, tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    show = write_show(tmp_path / "show")
+    done = measure("--show", str(show), "--seconds", "4", option, str(tmp_path / "file" / "new" / "figures"))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "bunraku measure: " in done.stderr and "Traceback" not in done.stderr
+
+
 def test_a_box_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     done = measure("--show", str(write_show(tmp_path / "show")), "--box", str(tmp_path / "absent.yaml"))
     assert done.returncode == 2
