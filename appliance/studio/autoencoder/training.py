@@ -402,8 +402,10 @@ class Training(TrainingLoop[Report]):
         """(N, T, M, 4): heading-free windows to learn from, of each take its mirror image too if wanted."""
         settings, dataset = self.settings, self.dataset
         poses = windows(dataset.training, dataset.moving, mirror, settings.window, settings.hop)
-        parts, network = torch.split(torch.tensor(poses).to(self.device), 4096), self.autoencoder
-        return torch.cat([network.without_heading(part, network.facing(part)) for part in parts])
+        found, network = torch.from_numpy(poses).to(self.device), self.autoencoder
+        for part in torch.split(found, 4096):  # in place: an hour of dance has a gigabyte of windows
+            part.copy_(network.without_heading(part, network.facing(part)))
+        return found
 
     def _own_windows(self, mirror: bool) -> tuple[Tensor, Tensor]:
         """Those of the training windows that are no mirror images, and the numbers of their takes (N,).

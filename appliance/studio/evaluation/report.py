@@ -11,7 +11,7 @@ from torch import Tensor
 
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.data.dataset import Dataset, windows
+from appliance.studio.data.dataset import Dataset, window_starts, windows
 from appliance.studio.evaluation.coders import TorchCoder
 from appliance.studio.evaluation.evaluation import Evaluation
 from appliance.studio.export.gate import LIMITS_DEGREES, Verdict
@@ -32,9 +32,9 @@ def write_up(
 ) -> dict[str, Any]:
     """The report as JSON. difference: largest between ONNX and PyTorch in any quaternion component."""
     figures = evaluation.as_json()
-    ranges = joint_ranges(
-        coder.autoencoder, windows(dataset.training, _places(coder, dataset), mirror=dataset.mirrors)
-    )
+    takes = [[take] for take in dataset.training if len(window_starts(take))]  # one by one: for the memory
+    of_takes = (windows(one, _places(coder, dataset), mirror=dataset.mirrors) for one in takes)
+    ranges = torch.stack([joint_ranges(coder.autoencoder, found) for found in of_takes]).amax(dim=0)
     return {
         "network": {
             "architecture": state["settings"]["network"],
