@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from dataclasses import dataclass
+from itertools import zip_longest
 from uuid import UUID
 
 from hw_sim.dmx import sacn
@@ -68,4 +69,4 @@ class SacnNode:
             return None
         highest = max(packet.priority for packet in alive)
         ranked = [packet.levels for packet in alive if packet.priority == highest]
-        return bytes(map(max, zip(*ranked, strict=True))) if len(ranked) > 1 else ranked[0]
+        return bytes(map(max, zip_longest(*ranked, fillvalue=0)))

@@ -18,6 +18,7 @@ from hw_sim.dmx.widget_message import Deframer, framed
 
 GET_PARAMETERS, SEND_DMX, GET_SERIAL = 3, 6, 10  # labels of the DMX USB Pro API 1.44
 PARAMETERS = bytes((44, 1, 9, 1, 40))  # firmware 1.44, break 96 us, mark 10.67 us, 40 Hz
+LEAST, MOST = 25, 513  # octets of a universe with its start code; it sends no others
 LOOKS_EACH_S = 0.02
 REMEMBERED = 4096  # some 100 s
 
@@ -101,7 +102,7 @@ class UsbProWidget:
 
     def _obey(self, master: int, label: int, payload: bytes, arrival: float) -> None:
         self.labels.append(label)
-        if label == SEND_DMX:
+        if label == SEND_DMX and LEAST <= len(payload) <= MOST:
             self.universes.append((arrival, payload))
         elif label == GET_PARAMETERS:
             self._answer(master, label, PARAMETERS)

@@ -50,6 +50,10 @@ def test_it_answers_parameters_and_serial_number(tmp_path: Path) -> None:
         port.write(framed(SEND_DMX, bytes(25)) + framed(GET_SERIAL, b""))
         port.read(9)
         assert widget.levels == bytes(24)
+        for count in (24, 514):  # as the manufacturer's document says: 25 to 513
+            port.write(framed(SEND_DMX, b"\1" * count) + framed(GET_SERIAL, b""))
+            port.read(9)
+            assert widget.levels == bytes(24)
 
 
 def test_it_is_there_only_while_it_is_plugged_in(tmp_path: Path) -> None:

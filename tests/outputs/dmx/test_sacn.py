@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from uuid import UUID, uuid4
@@ -237,6 +238,13 @@ def test_a_node_follows_the_more_important_box_and_falls_back() -> None:
     node.receive(second.leaves(), 3.1)
     assert node.levels(1, 3.1) == first.levels
     assert node.levels(1, 5.0) is None
+
+
+def test_a_node_shows_the_higher_level_of_two_boxes_that_send_unequally_many() -> None:
+    node, whole, short = SacnNode(), Box(100, 10), Box(100, 20)
+    node.receive(whole.says(), 0.0)
+    node.receive(replace(short.says(), levels=bytes([20]) * 30), 0.0)
+    assert node.levels(1, 0.1) == bytes([20]) * 30 + bytes([10]) * (len(whole.levels) - 30)
 
 
 def test_a_node_ignores_what_was_overtaken() -> None:
