@@ -137,7 +137,7 @@ def figures_of(evidence: Evidence) -> dict[str, Any]:
         "free_running_transport_ms": percentiles(free_way.latency_ms, {"p50": 50.0, "p99": 99.0}),
         "response_ms": percentiles(response, {"p50": 50.0}, unseen),
         "ticks": len(locked.ticks),
-        "late_ticks": int(((locked.ticks["flags"] & LATE) > 0).sum()),
+        "late_ticks": int(((locked.ticks["flags"] & LATE) > 0).sum()) + locked.gaps,
         "missing_frames": missing_frames(locked.frames),
         "tick_ms": percentiles(costs_ms, {"p50": 50.0, "p99": 99.0, "max": 100.0}),
         "sections_ms": {

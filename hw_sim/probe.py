@@ -85,6 +85,7 @@ class Run:
     stood_from: float
     pictures: Sequence[Picture] = ()
     played: Played | None = None
+    gaps: int = 0  # entries that the journal lost: ticks of which nothing is known
 
 
 def run(setting: Setting, course: Course, progress: Progress | None = None) -> Run:
@@ -124,7 +125,7 @@ def run(setting: Setting, course: Course, progress: Progress | None = None) -> R
                 with _seen(screen, box, folder) as pictures, _heard(course, box, folder), closing(live):
                     datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control, live)
             stop(stage, output)
-    header, ticks = read_journal(folder / "run.journal")
+    header, ticks, gaps = read_journal(folder / "run.journal")
     return Run(
         frames=_frames(datagrams, header["joints"].index(setting.joint)),
         readings=_read_log(log, setting.sensor),
@@ -135,6 +136,7 @@ def run(setting: Setting, course: Course, progress: Progress | None = None) -> R
         stood_from=stood_from,
         pictures=pictures,
         played=read_played(folder / _PLAYED) if course.sounds else None,
+        gaps=gaps,
     )
 
 

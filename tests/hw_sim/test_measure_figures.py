@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import json
+import struct
 import subprocess
 import sys
 import time
+import zlib
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from hw_sim.figures import Evidence, figures_of, table, verdict
+from hw_sim.journal_reader import read_journal
 from hw_sim.latency import (
     Frame,
     Restart,
@@ -139,6 +144,33 @@ def test_frames_before_the_first_reading_carry_nothing() -> None:
     silent = [Frame(9.0 + 0.02 * n, n, -1, False, np.array([1.0, 0, 0, 0])) for n in range(10)]
     assert len(transport(readings(5), silent).latency_ms) == 0
     assert transport([], []).overtaken == 0
+
+
+def chunk(kind: int, content: bytes) -> bytes:
+    stored = zlib.compress(content)
+    head = struct.pack("<4sHHII", b"bkj2", kind, 0, len(stored), len(content))
+    return head + struct.pack("<I", zlib.crc32(head + stored)) + stored
+
+
+def test_a_tick_that_the_journal_lost_counts_as_late(tmp_path: Path) -> None:
+    """The disk that lost it held the box up, perhaps."""
+    layout = [("tick", "<i8", ()), ("flags", "<u4", ())]
+    (tmp_path / "1.segment").write_bytes(chunk(1, json.dumps({"record": layout}).encode()))
+    entries = [struct.pack("<QIIqI", number, 1, 12, 100 + number, 0) for number in (1, 2, 5)]
+    log = chunk(3, b"".join(entries))
+    (tmp_path / "2.segment").write_bytes(log)
+    journal = read_journal(tmp_path)
+    assert journal.ticks["tick"].tolist() == [101, 102, 105] and journal.gaps == 2
+    some = evidence()
+    figures = figures_of(replace(some, locked=replace(some.locked, gaps=2)))
+    assert figures["late_ticks"] == 2 and "FAIL  late ticks" in "\n".join(table(figures, verdict(figures)))
+    (tmp_path / "2.segment").write_bytes(log[:30] + bytes([log[30] ^ 1]) + log[31:])
+    with pytest.raises(ValueError, match="damaged"):
+        read_journal(tmp_path)
+    (tmp_path / "1.segment").unlink()
+    (tmp_path / "2.segment").unlink()
+    with pytest.raises(ValueError, match="no journal"):
+        read_journal(tmp_path)
 
 
 def test_missing_frames_are_holes_in_the_numbering() -> None:
