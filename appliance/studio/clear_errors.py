@@ -38,13 +38,15 @@ def clear_errors(command: str) -> Iterator[None]:
 
 
 def _is_for_people(error: Exception) -> bool:
+    from appliance.dancer.grounding import GroundingError
     from appliance.pictures.filmstrip import MissingPicturesError
     from appliance.pose.bvh import BvhError
     from appliance.show.config_error import ConfigError
     from appliance.studio.data.dataset import DatasetError
     from appliance.studio.studio_error import StudioError
 
-    return isinstance(error, BvhError | ConfigError | DatasetError | MissingPicturesError | StudioError)
+    known = BvhError | ConfigError | DatasetError | GroundingError | MissingPicturesError | StudioError
+    return isinstance(error, known)
 
 
 def _refuse(message: str) -> None:

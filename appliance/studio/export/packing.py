@@ -16,7 +16,6 @@ from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import write_checksums
-from appliance.studio.autoencoder.training_run import stop_signals
 
 SKELETON, PHRASE, SHOW = "skeleton.bvh", "phrase.bvh", "show.yaml"
 PHRASE_DIGITS = 4  # in degrees and centimetres: finer than any eye or projector resolves
@@ -41,6 +40,7 @@ def write_show_yaml(
     hands: list[dict[str, Any]],
     acknowledgement: str = "",
     phrase: str = "the show's phrase",
+    has_feet: bool = True,
 ) -> Path:
     """show.yaml with what the artist will want to change; refuses to overwrite the artist's own.
 
@@ -52,6 +52,7 @@ def write_show_yaml(
         if acknowledgement:
             text += yaml.safe_dump({"acknowledgement": acknowledgement}, allow_unicode=True, width=100)
         text += _TEMPLATE.replace("PHRASE", " ".join(phrase.split()))
+        text = text.replace("GROUNDED\n", "" if has_feet else _GROUNDED)
         text = text.replace("HANDS", "\n".join(_hand(hand) for hand in hands))
         path.write_text(text.replace("HELD", _flow([hand["joint"] for hand in hands])), encoding="utf-8")
     return path
@@ -71,6 +72,7 @@ def _flow(value: Any) -> str:
     return dumped.removesuffix("\n").removesuffix("\n...")
 
 
+_GROUNDED = "  grounded: false              # no joint is named foot or ankle: nothing stands on the floor\n"
 _TEMPLATE = """
 dancer:
   network: puppet.onnx
@@ -80,6 +82,7 @@ dancer:
 
 motion:
   phrase: phrase.bvh           # PHRASE
+GROUNDED
 
 hands:
 HANDS
@@ -122,14 +125,3 @@ def seal(folder: Path) -> None:
     """Write the body's surface, then the checksums over all that is in the bundle."""
     write_surface(folder)
     write_checksums(folder)
-
-
-def put_in_place(made: Path, folder: Path) -> None:
-    """Replace files of a bundle by those in another folder, and write its checksums.
-
-    A first Ctrl-C is not obeyed meanwhile: a box refuses a network beside the checksums of another one.
-    """
-    with stop_signals():
-        for file in made.iterdir():
-            file.replace(folder / file.name)
-        write_checksums(folder)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -21,6 +20,9 @@ from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
 from appliance.pose.roles import UPPER_ARMS
 from appliance.pose.skeleton import Skeleton
+from appliance.show.bundle import write_checksums
+from appliance.studio.autoencoder.training_run import stop_signals
+from appliance.studio.dance_files import write_report
 from appliance.studio.data.dataset import Dataset, Take
 from appliance.studio.data.remembered import KEY, Remembered, reading_facts
 from appliance.studio.data.sources import Sources
@@ -74,7 +76,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
         report = _make(request, dataset, made, console)
         if not (made / ANSWER).exists():
             (request.out / ANSWER).unlink(missing_ok=True)
-        packing.put_in_place(made, request.out)
+        _put_in_place(made, request.out)
     print_answer(console, report["puppetry"])
     return report
 
@@ -131,10 +133,11 @@ def _make(request: Request, dataset: Dataset, folder: Path, console: Console) ->
         hanging = hanging_orientation(dataset.skeleton, hand["joint"])
         if hanging is not None:
             hand["at_neutral"] = hanging
-        packing.write_show_yaml(folder, name, [hand], request.source.catalogue.acknowledgement, about)
+        thanks, has_feet = request.source.catalogue.acknowledgement, bool(dataset.skeleton.feet)
+        packing.write_show_yaml(folder, name, [hand], thanks, about, has_feet)
     elif request.name or request.hand:
         say(f"{request.out / packing.SHOW} stays as it is: --name and --hand are for a new one.")
-    (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    write_report(folder / "report.json", report)
     shown = _longest_sound_take(judged_on)
     draw_report(folder / "report.png", name, report, evaluation, coder, shown)
     for name in (BODY_FILE, MESH_FILE):
@@ -142,6 +145,17 @@ def _make(request: Request, dataset: Dataset, folder: Path, console: Console) ->
             shutil.copyfile(request.out / name, folder / name)
     packing.write_surface(folder)
     return report
+
+
+def _put_in_place(made: Path, folder: Path) -> None:
+    """Replace files of a bundle by those in another folder, and write its checksums.
+
+    A first Ctrl-C is not obeyed meanwhile: a box refuses a network beside the checksums of another one.
+    """
+    with stop_signals():
+        for file in made.iterdir():
+            file.replace(folder / file.name)
+        write_checksums(folder)
 
 
 def first_hand(skeleton: Skeleton, joints: Sequence[str], wanted: str | None = None) -> tuple[str, str]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.dancer.grounding import survey
+from appliance.dancer.grounding import GroundingError, survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
@@ -157,8 +157,11 @@ def measure(phrase: Recording, yardstick: Yardstick, endless: bool = True) -> Na
 
 
 def standing_of(recording: Recording) -> Standing:
-    """Feet against the recording's own floor; a jump is no float."""
-    floor = survey(recording)
+    """Feet against the recording's own floor; a jump is no float. Not a number without named feet."""
+    try:
+        floor = survey(recording)
+    except GroundingError:
+        return Standing(*[float("nan")] * len(fields(Standing)))
     poses, roots = recording.poses, recording.roots
     return measure_standing(recording.skeleton, poses, roots, floor, floor.lifts, recording.fps)
 
