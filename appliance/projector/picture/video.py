@@ -11,7 +11,7 @@ from typing import IO
 
 import moderngl
 
-from appliance.projector.picture.image_file import LINES
+from appliance.projector.picture.image_file import LINES, MOST_WIDE
 
 FFMPEG = "ffmpeg"
 UNSEEN_S = 2.0  # after which it stops; it begins anew when its look comes back
@@ -51,9 +51,10 @@ class Video:
         self._texture.release()
 
     def _begin(self) -> None:
-        """Pictures as PPM, which says their size, at the video's own pace."""
+        """Pictures as PPM, which says their size, in bytes and at the video's own pace."""
         command = [FFMPEG, "-v", "error", "-nostdin", "-stream_loop", "-1", "-re", "-i", self._path, "-an"]
-        command += ["-vf", f"scale=-2:min(ih\\,{LINES}),vflip", "-f", "image2pipe", "-c:v", "ppm", "-"]
+        fits = f"scale=min(iw\\,{MOST_WIDE}):min(ih\\,{LINES}):force_original_aspect_ratio=decrease"
+        command += ["-vf", f"{fits},vflip", "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]
         try:
             self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
         except OSError as error:
