@@ -156,8 +156,8 @@ class Hands:
         np.copyto(self._before, self._present)
         for rows, puppeteer in self._turned:
             self._is_new[rows] = not puppeteer.is_holding
-            if isinstance(puppeteer, Kept):
-                puppeteer.follow_phrase(window[0, self._places[rows.start]])
+            if not isinstance(puppeteer, Springs):
+                puppeteer.start_from(window[0, self._places[rows.start]])
             target = puppeteer.pull(now)
             self._present[rows] = (
                 puppeteer.orientations if isinstance(puppeteer, Springs) else target.orientation

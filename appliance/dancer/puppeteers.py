@@ -39,10 +39,19 @@ class Puppeteer:
     """Holds one joint. Its weight eases in over TAKE_S when it takes the joint and eases out over GIVE_BACK_S
     when it releases it; a new `weight` is approached at the pace of taking. A disabled puppeteer releases the
     joint, whatever its source, and takes it again when enabled.
+
+    Where it knows the phrase's orientation (start_from), its target is led from there when it takes the joint
+    and back there when it releases it, and the weight fades in the part of that in which the two are near.
+    Without that, the joint would turn over in one tick where hand and phrase pass opposite orientations,
+    because the network mixes the two by the short way.
     """
 
-    SNAPSHOT: tuple[str, ...] = ("weight", "enabled", "_target", "_presence", "_level", "_pulled_at")
+    SNAPSHOT: tuple[str, ...] = (
+        *("weight", "enabled", "_target", "_presence", "_level", "_pulled_at"),
+        *("_holding", "_lead_over_s", "_leading_s", "_led_s", "_apart"),
+    )
     TIMES: tuple[str, ...] = ("_pulled_at",)
+    GRIP = 3.0  # the weight is whole after this part of a fade in which the target is led
 
     def __init__(self, joint: str, weight: float = 1.0) -> None:
         self.joint = joint
@@ -52,6 +61,11 @@ class Puppeteer:
         self._presence = 0.0
         self._level = weight
         self._pulled_at: float | None = None
+        self._phrases_own: FloatArray | None = None
+        self._holding = False
+        self._lead_over_s = 0.0  # how long the next pull begins to lead the target
+        self._leading_s = self._led_s = 0.0  # rest and total of the time in which it is led
+        self._apart = 0.0, 0.0, 0.0, 0.0  # half the angle to the target from where it is led to, and its axis
 
     @property
     def is_holding(self) -> bool:
@@ -68,6 +82,10 @@ class Puppeteer:
         """Where the last pull pointed the joint, (4,) local; overwritten by the next."""
         return self._target.orientation
 
+    def start_from(self, orientation: FloatArray) -> None:
+        """Before each pull: the phrase's orientation of the joint, (4,) local; read in the pull."""
+        self._phrases_own = orientation
+
     def pull(self, now: float) -> Target:
         """The target at the time `now`; it stands still while the time does.
 
@@ -75,15 +93,52 @@ class Puppeteer:
         """
         elapsed = 0.0 if self._pulled_at is None else min(max(0.0, now - self._pulled_at), LONGEST_STEP_S)
         self._pulled_at = now
-        self._point(self._target.orientation, now, elapsed)
-        if self.enabled and self._holds(now):
+        orientation, holds = self._target.orientation, self.enabled and self._holds(now)
+        before = orientation.tolist()
+        self._point(orientation, now, elapsed)
+        grip = 1.0
+        if (phrases_own := self._phrases_own) is not None:
+            grip = self.GRIP
+            if holds != self._holding:
+                rest_s = TAKE_S * (1.0 - self._presence) if holds else GIVE_BACK_S * self._presence
+                self._lead_over_s = max(self._lead_over_s, rest_s)
+            if not holds:
+                orientation[:] = phrases_own
+        self._holding = holds
+        self._lead(orientation, before, elapsed)
+        if holds:
             self._presence = min(1.0, self._presence + elapsed / TAKE_S)
         else:
             self._presence = max(0.0, self._presence - elapsed / GIVE_BACK_S)
         most = elapsed / TAKE_S
         self._level += min(max(self.weight - self._level, -most), most)
-        self._target.weight = self._level * ease(self._presence)
+        self._target.weight = self._level * ease(min(1.0, grip * self._presence))
         return self._target
+
+    def _lead(self, orientation: FloatArray, before: Sequence[float], elapsed: float) -> None:
+        """Lead the target to its new orientation from that of the tick before, by half a turn in TAKE_S at
+        most, where something has asked for it.
+
+        The difference is fixed then and removed by and by. Recomputed each tick it made steps of 25 degrees
+        for a hand that moved by 7, and reversed where the hand passed the opposite orientation.
+        """
+        if not (self._lead_over_s or self._leading_s):
+            return
+        present = _four(orientation.tolist())
+        if self._lead_over_s:
+            w, *axis = multiplied(_four(before), inverse(present))
+            sine = math.hypot(*axis)
+            half_angle, scale = math.atan2(sine, abs(w)), math.copysign(1.0 / max(sine, _LEAST_TURN), w)
+            x, y, z = (scale * part for part in axis)
+            self._apart = half_angle, x, y, z
+            self._leading_s = self._led_s = max(self._lead_over_s, TAKE_S * 2.0 * half_angle / math.pi)
+            self._lead_over_s = 0.0
+        self._leading_s = max(0.0, self._leading_s - elapsed)
+        half_angle, *axis = self._apart
+        x, y, z = axis
+        orientation[:] = multiplied(
+            about((x, y, z), 2.0 * half_angle * ease(self._leading_s / self._led_s)), present
+        )
 
     def _holds(self, now: float) -> bool:
         """Whether the joint should be held at the time `now`."""
@@ -110,9 +165,6 @@ class WornSensor(Puppeteer):
         "_reading",
         "_local",
         "_heard_at",
-        "_leading_s",
-        "_led_s",
-        "_apart",
         "_measured_at",
         "_turn",
     )
@@ -127,8 +179,6 @@ class WornSensor(Puppeteer):
         )
         self._reading, self._local = quaternion.IDENTITY.copy(), quaternion.IDENTITY.copy()
         self._heard_at: float | None = None
-        self._leading_s = self._led_s = 0.0  # rest and total of the time in which the target is led
-        self._apart = 0.0, 0.0, 0.0, 0.0  # half the angle from reading to target, and its axis
         self._measured_at: float | None = None
         self._turn = _STILL
 
@@ -137,7 +187,7 @@ class WornSensor(Puppeteer):
         self._joint_from_reading, self._measured_at = joint_from_reading, None
         if self._heard_at is not None:
             np.matmul(joint_from_reading, self._reading, out=self._local)
-            self._lead(TAKE_S)
+            self._lead_over_s = TAKE_S
 
     def adjust(self, joint_from_reading: NDArray[np.float32]) -> None:
         """Use a matrix that differs by less than can be seen: the target is not led."""
@@ -163,7 +213,7 @@ class WornSensor(Puppeteer):
         self._turn = self._turned_since(before, measured_at)
         self._measured_at = measured_at
         if self._heard_at is not None and arrival - self._heard_at > HOLD_S:
-            self._lead(max(self._leading_s, min(arrival - self._heard_at, TAKE_S)))
+            self._lead_over_s = max(self._leading_s, min(arrival - self._heard_at, TAKE_S))
         self._heard_at = arrival
 
     def silent_s(self, now: float) -> float:
@@ -196,30 +246,7 @@ class WornSensor(Puppeteer):
         return multiplied(about(axis, rate * min(max(now - self._measured_at, 0.0), AHEAD_S)), _four(local))
 
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
-        local = self._turned_on(now)
-        if self._leading_s <= elapsed:
-            self._leading_s = 0.0
-            orientation[:] = local
-        elif elapsed:
-            self._leading_s -= elapsed
-            half_angle, x, y, z = self._apart
-            half_angle *= self._leading_s / self._led_s
-            sine = math.sin(half_angle)
-            left = np.array((math.cos(half_angle), sine * x, sine * y, sine * z), np.float32)
-            orientation[:] = quaternion.multiply(left, np.array(local, np.float32))
-
-    def _lead(self, seconds: float) -> None:
-        """Lead the target from its present orientation to the readings, by half a turn in TAKE_S at most.
-
-        The difference is fixed here and removed evenly. Recomputed each tick it made steps of 25 degrees
-        for a hand that moved by 7, and reversed where the hand passed the opposite orientation.
-        """
-        axis, angle = quaternion.to_axis_angle(
-            quaternion.multiply(self._target.orientation, quaternion.inverse(self._local))
-        )
-        x, y, z = axis.tolist()
-        self._apart = float(angle) / 2, x, y, z
-        self._leading_s = self._led_s = max(seconds, TAKE_S * float(angle) / math.pi)
+        orientation[:] = self._turned_on(now)
 
 
 class TurningAxis(Puppeteer):
@@ -260,7 +287,10 @@ class FixedOrientation(Puppeteer):
 
     def __init__(self, joint: str, orientation: Sequence[float], weight: float = 1.0) -> None:
         super().__init__(joint, weight)
-        self._target.orientation[:] = _unit(orientation)
+        self._orientation = _unit(orientation)
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        orientation[:] = self._orientation
 
 
 class Kept(Puppeteer):
@@ -269,9 +299,11 @@ class Kept(Puppeteer):
     Its target is that of the window's first pose; Hands gives the other poses theirs.
     """
 
-    def follow_phrase(self, orientation: FloatArray) -> None:
-        """Take the phrase's orientation (4,) of this tick."""
-        self._target.orientation[:] = orientation
+    GRIP = 1.0
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        if self._phrases_own is not None:
+            orientation[:] = self._phrases_own
 
 
 class Remote(Puppeteer):

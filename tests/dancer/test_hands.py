@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from appliance.dancer.hands import HandError, Hands
 from appliance.dancer.puppeteers import (
     LONGEST_STEP_S,
+    TAKE_S,
     FixedOrientation,
     Kept,
     Puppeteer,
@@ -22,6 +23,7 @@ from appliance.dancer.puppeteers import (
     WornSensor,
 )
 from appliance.pose import quaternion
+from appliance.pose.ease import ease
 from tests.dancer.conftest import random_quaternions
 from tests.dancer.pulled import LEFT, RIGHT, TICK_S, weights, worn
 
@@ -128,13 +130,34 @@ def test_what_moved_a_joint_while_nothing_held_it_is_not_carried_on() -> None:
     hands = Hands([sensor], JOINTS)
     sensor.enabled = False
     carried = []
-    for tick in range(60):
+    for tick in range(75):
         sensor.take_reading(quaternion.from_axis_angle([0, 1, 0], 0.12 * tick).tolist(), tick * TICK_S)
         sensor.enabled = tick >= 40
         hands.pull(tick * TICK_S, WINDOW)
         carried.append(float(quaternion.angle_between(hands.targets[-1, 1], hands.targets[0, 1])))
     assert max(carried[:42]) < 1e-3
     assert carried[-1] == pytest.approx(0.12 * 3.06, rel=0.05)
+
+
+@pytest.mark.parametrize("seconds_per_turn", [2.0, -2.0, 5.0, -12.0])
+@pytest.mark.parametrize("apart", [150.0, 175.0, -175.0])
+def test_a_hand_that_comes_or_goes_near_the_phrases_opposite_does_not_turn_its_joint_over(
+    seconds_per_turn: float, apart: float
+) -> None:
+    """Mixed with the phrase as the network does, by the short way, while the two pass opposites."""
+    axis = np.array([0.0, 1.0, 0.0])
+    hand = TurningAxis("lShldr", axis.tolist(), seconds_per_turn, turned=math.radians(apart))
+    hands, danced = Hands([hand], JOINTS), []
+    turns = quaternion.from_axis_angle(axis, -0.004 * np.arange(400))
+    for tick in range(300):
+        hand.enabled = 10 <= tick < 100 or 180 <= tick < 240
+        window = np.repeat(turns[tick : tick + 8, None], len(JOINTS), axis=1).astype(np.float32)
+        hands.pull(tick * TICK_S, window)
+        danced.append(quaternion.slerp(window[0, 1], hands.targets[0, 1], float(hands.weights[1])))
+    assert hands.weights[1] == 0.0 and hands.weights.shape == (4,)
+    steps = quaternion.angle_between(np.array(danced[1:]), np.array(danced[:-1]))
+    own = math.tau * TICK_S / abs(seconds_per_turn) + 0.004
+    assert steps.max() < own + 1.6 * math.pi * TICK_S / TAKE_S  # half a turn at most, eased
 
 
 def held_course(hands: Hands, ticks: int, act: Callable[[int], None]) -> tuple[np.ndarray, np.ndarray]:
@@ -187,7 +210,7 @@ def test_a_smooth_hand_gives_smooth_targets(
 
     targets, held = held_course(Hands([hand], JOINTS), 300, act)
     step = math.tau * TICK_S / seconds_per_turn
-    led = math.pi * TICK_S / 0.5 if kind == "sensor" else 0.0  # half a turn in half a second
+    led = 1.5 * math.pi * TICK_S / TAKE_S  # from the phrase and back: half a turn at most, eased
     both = held[1:] & held[:-1]
     moved = quaternion.angle_between(targets[1:], targets[:-1])[both]
     if len(moved):
@@ -364,7 +387,7 @@ def test_a_stage_that_stood_still_goes_on_from_where_it_was(stop_s: float) -> No
     assert weights.min() > 0.9
     assert weights[-1] == 1.0
     apart = 1.2 if stop_s > 0.5 else 1.2 * 0.5 / stop_s
-    assert quaternion.angle_between(turns[1:], turns[:-1]).max() < 1.1 * apart * TICK_S / 0.5
+    assert quaternion.angle_between(turns[1:], turns[:-1]).max() < 1.6 * apart * TICK_S / 0.5  # eased
     assert quaternion.angle_between(turns[-1], np.array(RIGHT)) < 1e-3
 
 
@@ -372,7 +395,7 @@ def test_readings_that_are_heard_right_after_a_stop_are_led_to_as_well() -> None
     sensor = worn(1.0)
     sensor.take_reading(RIGHT, 1.7)
     turned = quaternion.angle_between(sensor.pull(1.7).orientation, np.array(LEFT))
-    assert turned == pytest.approx(1.2 * LONGEST_STEP_S / 0.5, rel=0.01)
+    assert turned == pytest.approx(1.2 * ease(LONGEST_STEP_S / 0.5), rel=0.01)
 
 
 def test_while_it_is_heard_the_target_is_the_newest_reading_at_once() -> None:
@@ -413,15 +436,15 @@ def test_worn_anew_while_it_dances_the_joint_is_led_over(silence_s: float) -> No
     apart = float(quaternion.angle_between(before, after))
     assert apart > 1.0
     sensor.wear(matrix)
-    assert (sensor.pull(1.0).orientation == before).all()
+    assert quaternion.angle_between(sensor.pull(1.0).orientation, before) < 1e-3
     shown = [before]
     for tick in range(51, 90):
         if tick > 50 + silence_s / TICK_S:
             sensor.take_reading(LEFT, tick * TICK_S)
         shown.append(sensor.pull(tick * TICK_S).orientation.copy())
     steps = quaternion.angle_between(np.array(shown[1:]), np.array(shown[:-1]))
-    assert steps.max() < 1.3 * apart / 25  # evenly over half a second
-    assert shown[-1] == pytest.approx(after, abs=1e-5)
+    assert steps.max() < 1.7 * apart / 25  # eased over half a second
+    assert quaternion.angle_between(shown[-1], after) < 1e-3
 
 
 def test_time_that_does_not_go_on_changes_nothing() -> None:

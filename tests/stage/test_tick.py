@@ -121,7 +121,7 @@ def test_a_frame_says_how_firmly_each_joint_is_held(stage: Callable[..., Tick]) 
     assert not of_hand[:20].any(), "before the first message nothing is held"
     assert np.all(np.diff(of_hand[20:80]) >= 0) and of_hand[79] == 1.0
     assert np.all(np.diff(of_hand[86:]) <= 0) and of_hand[-1] == 0.0, "released, it is free"
-    assert ((of_hand > 0.1) & (of_hand < 0.9)).sum() > 20, "it grows and fades"
+    assert ((of_hand > 0.1) & (of_hand < 0.9)).sum() > 10, "it grows and fades"
 
 
 def test_the_neutral_orientation_of_a_sensor_means_the_rest_pose(stage: Callable[..., Tick]) -> None:
