@@ -16,6 +16,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.stage_frame import in_stage_frame
 from appliance.show.check import verify_bundle
+from appliance.show.show import load_show
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.catalogue import Catalogue
 from appliance.studio.data.dataset import Dataset, DatasetError, load_dataset
@@ -229,6 +230,26 @@ def test_one_short_take_of_many_joints_trains_to_a_show_that_is_measured(tmp_pat
     assert report["evaluated_on"] == ["take_0 from 9.0 s on"]
     assert "not_measured" not in report["puppetry"]
     assert read_bvh(out / "phrase.bvh").seconds == pytest.approx(8.0, abs=0.1)
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_body_without_named_feet_trains_to_a_show_that_dances_and_says_what_it_cannot(
+    tmp_path: Path,
+) -> None:
+    def footless(dance: Recording) -> Recording:
+        names = tuple(name.replace("Foot", "Tip") for name in dance.skeleton.names)
+        return replace(dance, skeleton=replace(dance.skeleton, names=names))
+
+    takes = write(tmp_path / "dancer", *(footless(swaying(14.0, seed)) for seed in (1, 2)))
+    out = tmp_path / "show"
+    options = ["--steps", 2, "--width", 32, "--latent", 8, "--threads", 1, "--device", "cpu"]
+    result = bunraku("train", "--recordings", takes, "--out", out, *options)
+    assert result.exit_code == 0, said(result)
+    show, report = load_show(out), (out / "report.json").read_text()
+    assert not show.skeleton.feet and not show.config.motion.grounded and verify_bundle(out) == []
+    assert json.loads(report)["phrase"]["naturalness"]["slide_cm_s"] is None and "NaN" not in report
+    refused = bunraku("granular", out / "checkpoint.pt", "--out", tmp_path / "x.bvh", "--seconds", 2)
+    assert refused.exit_code == 2 and "named foot or ankle" in said(refused)
 
 
 def test_errors_of_a_part_are_at_their_place_in_it(tmp_path: Path) -> None:
