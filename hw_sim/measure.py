@@ -171,12 +171,24 @@ def light_courses(seconds: float) -> tuple[Course, Course]:
 def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool) -> Setting:
     """Reads of show and box file only what the measurement needs; the box itself checks the rest."""
     show = show_folder(show)
-    config = _plain_yaml(show / "show.yaml")
+    config, venue = _plain_yaml(show / "show.yaml"), _plain_yaml(box) if box is not None else {}
+    try:
+        return _followed(show, config, venue, box is not None, scratch, firmware)
+    except (AttributeError, KeyError, TypeError):
+        raise ProbeError(
+            f"{show / 'show.yaml'}: something in it cannot be. `bunraku check` says where."
+        ) from None
+
+
+def _followed(
+    show: Path, config: dict[str, Any], venue: dict[str, Any], is_venue: bool, scratch: Path, firmware: bool
+) -> Setting:
+    """The setting for the sensor that the tick follows. Raises ProbeError where there is none."""
     hands = [hand for hand in config.get("hands") or [] if isinstance(hand, dict) and hand.get("sensor")]
     if not hands:
         raise ProbeError(f"{show}: no sensor holds a joint in this show, so there is no way to follow.")
     followed = next((hand for hand in hands if hand.get("primary")), hands[0])
-    strings, venue = config.get("strings"), _plain_yaml(box) if box is not None else {}
+    strings = config.get("strings")
     keys = scratch / "sensors.keys"
     create_keys(keys, list(dict.fromkeys(hand["sensor"] for hand in hands)))
     return Setting(
@@ -187,7 +199,7 @@ def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool)
         joint=followed["joint"],
         scratch=scratch,
         firmware=firmware,
-        sounds=strings is not None and (box is None or venue.get("sound") is not None),
+        sounds=strings is not None and (not is_venue or venue.get("sound") is not None),
         cue=str(next(iter((strings or {}).get("cues") or ()), "")),
     )
 

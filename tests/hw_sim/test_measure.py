@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from appliance.show.box import load_box
-from hw_sim.peers import Setting, scratch_folder, write_box_file
+from hw_sim.measure import _setting
+from hw_sim.peers import ProbeError, Setting, scratch_folder, write_box_file
 from tests.bundles import write_show
 
 
@@ -106,6 +107,16 @@ def test_a_show_without_sensors_cannot_be_measured(tmp_path: Path) -> None:
     done = measure("--show", str(write_show(tmp_path / "show", hands=[])), "--seconds", "4")
     assert done.returncode == 2
     assert "no sensor holds a joint" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "fault", ["strings: yes", "hands: 5", "hands: [{sensor: a}]", "hands: [{sensor: {a: 1}, joint: lShldr}]"]
+)
+def test_a_show_that_cannot_be_read_is_refused(fault: str, tmp_path: Path) -> None:
+    hands = "" if "hands" in fault else "hands: [{sensor: left-wrist, joint: lShldr}]\n"
+    (tmp_path / "show.yaml").write_text(f"name: x\n{hands}{fault}\n")
+    with pytest.raises(ProbeError, match="`bunraku check` says where"):
+        _setting(tmp_path, None, tmp_path, False)
 
 
 def test_a_show_that_does_not_dance_is_refused_with_the_box_s_own_words(tmp_path: Path) -> None:
