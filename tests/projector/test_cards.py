@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 import pytest
 from matplotlib import get_data_path
-from PIL import Image
+from PIL import Image, ImageOps
 
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import CARD, MASTER
@@ -113,6 +113,18 @@ def test_an_image_too_wide_is_shrunk(tmp_path: Path) -> None:
     assert read_image(tmp_path / "wide.png").shape == (228, 4096, 4)
     whole = content_of(CardConfig(name="w", image="wide.png", image_size=1.0), tmp_path, pytest.fail)
     assert whole is not None and whole.shape[:2] == (228, 4096)
+
+
+@pytest.mark.parametrize("orientation", range(10))
+def test_a_photograph_stands_as_its_camera_was_held(orientation: int, tmp_path: Path) -> None:
+    """A telephone stores the rows of its sensor, and how it was held."""
+    stored, noted = Image.new("RGB", (48, 32), RED), Image.Exif()
+    stored.paste((0, 0, 255), (0, 16, 16, 32))
+    noted[0x0112] = orientation
+    stored.save(tmp_path / "photo.jpg", exif=noted)
+    with Image.open(tmp_path / "photo.jpg") as file:
+        upright = np.asarray(ImageOps.exif_transpose(file))
+    np.testing.assert_array_equal(read_image(tmp_path / "photo.jpg")[..., :3], upright)
 
 
 @pytest.mark.skipif(not fonts_of_machine(), reason="no font is installed here")
