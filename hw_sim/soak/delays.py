@@ -31,7 +31,7 @@ class Delays:
 
     def later_than(self, limit_ms: float) -> int:
         """How many came later than this."""
-        return int(self._counts[int(limit_ms / STEP_MS) + 1 :].sum())
+        return int(self._counts[max(int(limit_ms / STEP_MS) + 1, 0) :].sum())
 
     def whole_slots(self) -> int:
         """How many whole slots of 20 ms passed while late ones were awaited."""

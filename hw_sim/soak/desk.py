@@ -55,11 +55,6 @@ class Desk:
         self._send(_message(address, arguments), port)
         return address
 
-    def calm(self, port: int) -> None:
-        """Undo whatever darkens the show."""
-        for address, arguments in (("/go", ()), ("/blackout", (0,)), ("/master", (1.0,))):
-            self._send(_message(address, arguments), port)
-
     def poll(self) -> None:
         """Take the replies."""
         while True:

@@ -21,6 +21,7 @@ METHOD = (
 )
 MOST_LATE_BEYOND = 0.001  # share of all slots, beyond cyclictest's figure for the machine
 MOST_LATE_OF_MACHINE = 0.005  # above it the comparison says little
+MOST_USUAL_MS = LATE_MS / 2.0  # a slower box would excuse its late ticks by any wake-up of the machine
 MOST_GROWTH_MB = 1.0
 # A sensor is away for 8 s at most, or starts anew; of a short run it may be half.
 MOST_WITHOUT_READING_S = 30.0
@@ -91,13 +92,20 @@ def limits_of(soak: Soak) -> list[Limit]:
     machine, box = figures["cyclictest"], figures["spoilt_share"]
     beyond = box - machine["late_share"]
     by_machine = machine["complaint"] or f"{100 * machine['late_share']:.3f} % of cyclictest's wake-ups"
+    usual_ms = soak.frames.delays.percentile(50)
     found = [
+        Limit(
+            "usual lateness of a frame",
+            "none was seen" if usual_ms is None else f"{usual_ms:.1f} ms",
+            f"at most {MOST_USUAL_MS:g} ms",
+            usual_ms is not None and usual_ms <= MOST_USUAL_MS,
+        ),
         Limit(
             "late or missing ticks",
             f"{100 * box:.3f} % (the machine: {by_machine})",
             f"at most {100 * MOST_LATE_BEYOND:g} % beyond the machine's share",
             figures["slots"] > 0 and beyond <= MOST_LATE_BEYOND,
-        )
+        ),
     ]
     grown = [one for unit in soak.box.units if (one := growth(unit, soak.seconds)) is not None]
     for one in grown:

@@ -88,7 +88,7 @@ def test_delays_are_counted_in_steps_and_long_ones_cost_whole_slots() -> None:
     for delay_ms in (0.04, 1.0, 1.04, 14.9, 15.1, 47.0, -3.0, 1e9):
         delays.add(delay_ms)
     assert delays.count == 8
-    assert delays.later_than(15.0) == 3
+    assert (delays.later_than(15.0), delays.later_than(-0.5), delays.later_than(-20.0)) == (3, 8, 8)
     assert delays.whole_slots() == 2 + 100  # of 47 ms two, of the endless one as many as are counted at all
     assert delays.percentile(50) == pytest.approx(1.0)
     assert delays.worst_ms == 1e9
@@ -156,6 +156,7 @@ def soaked(tmp_path: Path) -> Iterator[Soak]:
     with contextlib.closing(FrameWatch(LATE_MS)) as frames, contextlib.closing(Desk(1)) as desk:
         frames.start(1000.0)
         frames.heard, frames.readings, frames._reading_at = 2000, 1900, 1039.9
+        frames.delays.add(4.0)
         desk.counts["done"] = 5
         yield Soak(box, frames, Wakeups(), desk, lamps, 40.0, begun=1000.0, seconds=40.0, universes=9)
 
@@ -176,6 +177,17 @@ def test_a_soak_of_nothing_does_not_hold(tmp_path: Path) -> None:
         (died,) = [limit.found for limit in limits_of(soak) if limit.name == "processes"]
         assert died == "sensors ended 3 times, load ended 2 times"
         assert any("stress-ng is not there" in line for line in table(soak))
+
+
+def test_a_slow_box_is_not_excused_by_the_machine(tmp_path: Path) -> None:
+    """Its frames need 14 ms, so that any wake-up after 1 ms would have made one late."""
+    with soaked(tmp_path) as soak:
+        soak.frames.late = 100
+        assert fails(soak) == ["late or missing ticks"]
+        for _ in range(100):
+            soak.wakeups.delays.add(1.5)
+            soak.frames.delays.add(14.0)
+        assert fails(soak) == ["usual lateness of a frame"]
 
 
 def test_nobody_is_killed_in_the_second_half_and_everything_happens() -> None:
