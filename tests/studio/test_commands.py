@@ -217,7 +217,7 @@ def test_a_ctrl_c_while_the_files_are_replaced_waits_for_the_checksums(
     replace_file, moved = Path.replace, list[str]()
 
     def replace(file: Path, target: Path) -> Path:
-        if file.parent.name == "show" and file.parent != show:
+        if target.parent == show and file.parent != show:
             moved.append(target.name)
             if len(moved) == 2:
                 signal.raise_signal(signal.SIGINT)
