@@ -26,19 +26,20 @@ FILE = "opening-hours"
 _LARGEST = 1024
 _LOOK_S = 1.0
 _FADE_S = 5.0  # for the strings
+_TRIES = 30  # once a second: show control has started again by then; one that refuses is not asked for ever
 
 
 class Memory(NamedTuple):
     """Outlives the process, not the power: what it did last stays done, and what people did since too.
 
-    is_open: whether it opened or closed, None: neither yet; goes: the show is to go on, and has not yet;
-    stands: the show has stopped since; ends: the cue of the end was called.
-    loud: the strings before the quiet hours, None outside of them. fades: from which strings to which, until
-    they have changed. before: the cue before nobody was there.
+    is_open: whether it opened or closed, None: neither yet; goes: how often /go may still be given until the
+    show goes; stands: the show has stopped since; ends: the cue of the end was called.
+    loud: the strings before the quiet hours, None outside of them. fades: from which strings to which, how
+    often that may still be given until they have changed. before: the cue before nobody was there.
     """
 
     is_open: bool | None = None
-    goes: bool = False
+    goes: int = 0
     stands: bool = False
     ends: bool = False
     loud: float | None = None
@@ -101,13 +102,15 @@ class Caretaker:
         is_open, before = self._hours.is_open(wall), self._memory.is_open
         if is_open != before:
             goes = is_open and before is not None and not state.panic  # at power-on the show runs already
-            self._memory = self._memory._replace(is_open=is_open, goes=goes, stands=False, ends=False)
+            self._memory = self._memory._replace(
+                is_open=is_open, goes=_TRIES * goes, stands=False, ends=False
+            )
             if is_open:
                 self._watch_anew(state)
             if goes:
                 self._open()
         elif self._memory.goes and (state.going or state.panic):
-            self._memory = self._memory._replace(goes=False)
+            self._memory = self._memory._replace(goes=0)
         elif self._memory.goes:  # again, until show control is there to hear it
             self._open()
         elif not is_open and not self._memory.stands:  # again too
@@ -120,6 +123,7 @@ class Caretaker:
                 self._give(("/cue", self._config.close_cue))
 
     def _open(self) -> None:
+        self._memory = self._memory._replace(goes=self._memory.goes - 1)
         self._give(("/go",))
         if self._config.open_cue:
             self._give(("/cue", self._config.open_cue))
@@ -134,13 +138,15 @@ class Caretaker:
     def _quieten(self, state: ShowState, wall: float) -> None:
         most, loud, strings = self._hours.strings(wall), self._memory.loud, state[STRINGS].value
         if most < 1.0 and loud is None:
-            self._memory = self._memory._replace(loud=strings, fades=[strings, min(most, strings)])
+            self._memory = self._memory._replace(loud=strings, fades=[strings, min(most, strings), _TRIES])
         elif most == 1.0 and loud is not None:
-            self._memory = self._memory._replace(loud=None, fades=[strings, loud])
-        elif self._memory.fades and self._memory.fades[0] != strings:
+            self._memory = self._memory._replace(loud=None, fades=[strings, loud, _TRIES])
+        before, after, left = self._memory.fades or (strings, strings, 0)
+        if left and before == strings != after:  # again, until it is heard
+            self._memory = self._memory._replace(fades=[before, after, left - 1])
+            self._give(("/strings", after, _FADE_S))
+        elif self._memory.fades:
             self._memory = self._memory._replace(fades=[])
-        if self._memory.fades and self._memory.fades[0] != self._memory.fades[1]:
-            self._give(("/strings", self._memory.fades[1], _FADE_S))  # again, until it is heard
 
     def _attract(self, state: ShowState, somebody: bool, now: float) -> None:
         attract = self._config.attract
