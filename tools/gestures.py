@@ -1,7 +1,7 @@
 """Measures the gesture recogniser: `python -m tools.gestures RECORDINGS`.
 
 RECORDINGS: as for tools.heading_drift. Gestures: eight made ones (circles, waves, a salute), and excerpts of
-a dancer's wrist. Each is learned from three repetitions; background: the first third of the takes. Then it is
+a dancer's wrist. Each is learned from three repetitions; background: every third of the takes. Then it is
 made again, in held-out dance: at 0.8 to 1.25 of the speed and 0.8 to 1.2 of the size, with noise of 3
 degrees, held otherwise by up to 12 degrees, or as another dancer's hand moves meanwhile. False alarms are
 counted in the other takes of both wrists. Null products: the same number of alarms at random
