@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from appliance.studio.data.regions import regions_of
 from appliance.studio.experiments.claims import claims
 from appliance.studio.experiments.claims_picture import COLOURS, draw_claims
 from appliance.studio.experiments.excerpts import FRAMES, Excerpt, choose, measured, named
+from appliance.studio.experiments.experiment import ExperimentOptions, _coders
 from appliance.studio.experiments.families import CONDITIONS, Condition, Trial
 from appliance.studio.experiments.null_networks import Paste
 from appliance.studio.experiments.page import write_page
@@ -213,3 +215,12 @@ def test_the_report_is_one_picture_with_a_field_for_each_verdict(
 def test_an_excerpt_reports_its_measures(takes: list[Take]) -> None:
     one: Excerpt = choose(takes, JOINTS)[0]
     assert one.as_json()["seconds"] == [round(one.first / FPS, 2), round((one.first + FRAMES) / FPS, 2)]
+
+
+def test_networks_whose_files_have_one_name_are_all_compared(tmp_path: Path, tiny_show: Path) -> None:
+    files = [tmp_path / folder / "puppet.onnx" for folder in ("one", "two", "three")]
+    for file in files:
+        file.parent.mkdir()
+        shutil.copy(tiny_show / "puppet.onnx", file)
+    found = list(_coders(ExperimentOptions(tiny_show, tmp_path / "out", networks=tuple(files))))
+    assert found[:2] == ["mlp, fp32", "mlp, fp32, puppet.onnx"] and len(found) == 4

@@ -158,7 +158,9 @@ def _coders(options: ExperimentOptions) -> dict[str, Coder]:
     for path in (options.show, *options.networks):
         coder = open_coder(path)
         name = f"{coder.facts['architecture']}, {coder.facts['precision']}"
-        found[name if name not in found else f"{name}, {path.name}"] = coder
+        name = f"{name}, {path.name}" if name in found else name
+        alike = sum(other.partition(" (")[0] == name for other in found)
+        found[f"{name} ({alike + 1})" if alike else name] = coder
     joints = next(iter(found.values())).joints
     for name, coder in found.items():
         if coder.joints != joints:
