@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import moderngl
@@ -12,6 +13,7 @@ from PIL import Image
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.projector.picture import scene
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import STYLES, LookConfig, looks_by_name
@@ -105,6 +107,21 @@ def test_cross_fade_mixes_the_two_pictures(
         pixels = np.frombuffer(target.read(components=4), np.uint8).reshape(SIZE[1], SIZE[0], 4)
         expected = (1 - mix) * whole[before] + mix * whole[now]
         assert np.abs(pixels[::-1, :, :3] - expected).max() <= 2
+
+
+def test_a_cross_fade_makes_no_canvas_anew(
+    dance: Recording, drawing: tuple[moderngl.Context, Renderer], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two looks that wanted one canvas in two sizes would both make it again in each picture."""
+    gl, looks = drawing
+    canvas = gl.framebuffer([gl.texture(SIZE, 4)])
+    moment = moment_of(dance, AT_S)
+    for one, other in itertools.combinations(STYLES, 2):
+        looks.draw(moment, one, other, 0.5, canvas)
+        with monkeypatch.context() as patched:
+            patched.setattr(scene, "Target", lambda *_, pair=(one, other): pytest.fail(f"{pair}"))
+            looks.draw(moment, one, other, 0.6, canvas)
+    canvas.release()
 
 
 def test_outline_of_ink_is_smooth(dance: Recording, gl: moderngl.Context) -> None:

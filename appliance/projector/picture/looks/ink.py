@@ -90,7 +90,7 @@ class Ink:
                 lay = partial(self._leave_strokes, scene, look.trail_s, inputs)
         picture.keep("rgba")
         picture.finish()
-        wet = self._glow.spread(picture, "near glow", WET)
+        wet = self._glow.spread(picture, "wet", WET)
         inputs |= {
             "picture": picture.texture,
             "wet_picture": wet.texture,
