@@ -185,13 +185,15 @@ def emulate(
             _stopped_by_signals() as should_stop,
             SendLog(log) if log is not None else nullcontext() as on_sent,
             closing(Emulator(sensors, senders, network=on_air, on_sent=on_sent)) as emulator,
-            StatusLine(where) as status,
         ):
-            emulator.run(seconds, should_stop, lambda: status.show(emulator, time.monotonic()))
-            is_taken = status.end(emulator)
+            if seconds == 0:  # the keys are written
+                return
+            with StatusLine(where) as status:
+                emulator.run(seconds, should_stop, lambda: status.show(emulator, time.monotonic()))
+                is_taken = status.end(emulator)
     except OSError as error:
         _refuse(error)
-    if not is_taken and seconds != 0:
+    if not is_taken:
         raise typer.Exit(UNANSWERED)
 
 

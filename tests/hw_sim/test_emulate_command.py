@@ -142,6 +142,7 @@ def test_the_first_run_writes_a_key_file_for_its_owner_alone(emulate: Emulate, t
     assert list(load_keys(path)) == ["left-wrist", "sensor-2", "sensor-3"]
     assert path.stat().st_mode & 0o777 == 0o600
     assert "The box must read the same file" in said
+    assert len(said.strip().splitlines()) == 1, "nothing is said about sensors that were not to send"
     assert all(sensor.key.hex() not in said for sensor in load_keys(path).values())
 
 
