@@ -37,7 +37,7 @@ class Live(Takeover):
 
     SNAPSHOT = (
         *("_before", "_newest", "_present", "_root", "_offset", "_has_root", "_is_new", "_comes", "_came"),
-        *("_is_whole", "_arrival", "_interval_s", "_extrapolation"),
+        *("_is_whole", "_arrival", "_interval_s", "_extrapolation", "_signs"),
     )
     TIMES = ("_arrival",)
 
@@ -45,7 +45,10 @@ class Live(Takeover):
 
     def __init__(self, joints: int, window: int, tick_s: float = 0.02) -> None:
         super().__init__(tick_s)
-        self._slerp, self._over = Slerp(joints), Slerp(window * joints)
+        # Between two dances that pass opposite orientations, the short way would change sides.
+        self._slerp, self._over = Slerp(joints), Slerp(window * joints, short=False)
+        self._signs = np.zeros((joints, 1), np.float32)  # which the phrase takes in a fade; 0: none yet
+        self._phrase = np.empty((window, joints, 4), np.float32)
         self._extrapolation = Extrapolation(joints, window)
         self._is_new = np.ones((joints, 1), dtype=np.bool_)
         self._before, self._newest, self._present, self._looked = np.tile(quaternion.IDENTITY, (4, joints, 1))
@@ -125,6 +128,7 @@ class Live(Takeover):
         self._fade(comes)
         if not self._share:
             self._offset[:] = np.nan
+            self._signs[:] = 0.0
             self._came[:] = self._comes
             self._is_whole = bool(self._comes.all())
             return window, roots
@@ -136,7 +140,8 @@ class Live(Takeover):
         self._extrapolation(self._present, self._is_new, out=self._window)
         self._is_new[:] = False
         rows = self._window.reshape(-1, 4)
-        self._over(rows, window.reshape(-1, 4), shares, out=rows)
+        self._take_sides(window, shares)
+        self._over(rows, self._phrase.reshape(-1, 4), shares, out=rows)
         self._roots[:] = roots
         if self._has_root:
             root = self._root[0] + share * (self._root[1] - self._root[0])
@@ -156,6 +161,16 @@ class Live(Takeover):
         self._follows[:] = ease(came)
         self._phrases_share[:] = 1.0 - self.share * self._follows
         return self._phrases_share.reshape(-1)
+
+    def _take_sides(self, window: FloatArray, shares: FloatArray | float) -> None:
+        """The phrase's window (T, J, 4) in the stream's hemisphere, as of when a joint was last of one of the
+        two only.
+        """
+        alike = np.copysign(1.0, np.einsum("jk,jk->j", self._present, window[0]))[:, None]
+        of_joint = np.broadcast_to(shares, window.size // 4)[: len(alike)]
+        settled = ((of_joint == 0.0) | (of_joint == 1.0))[:, None] | (self._signs == 0.0)
+        np.copyto(self._signs, alike, where=settled)
+        np.multiply(window, self._signs, out=self._phrase)
 
     def look(self, now: float) -> tuple[FloatArray, FloatArray] | None:
         """The stream's own pose (J, 4) and root (3,) at this time, whatever the puppet dances; None while it

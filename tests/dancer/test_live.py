@@ -60,6 +60,21 @@ def test_it_fades_in_and_out_over_its_time() -> None:
     assert np.abs(np.diff(course)).max() < 1.5 / 25  # no jump: the fade out takes 25 ticks
 
 
+@pytest.mark.parametrize("apart", [2.0, 2.8, -2.8])
+def test_a_dancer_who_passes_the_phrases_opposite_in_a_fade_turns_nothing_over(apart: float) -> None:
+    """Both turn, at different rates: the short way from one to the other would change sides."""
+    live, shown = Live(JOINTS, WINDOW), []
+    for tick in range(400):
+        now = tick * TICK_S
+        phrase = np.tile(pose(-0.6 * now), (WINDOW, 1, 1))
+        live.hear(pose(apart + 0.6 * now), NOWHERE, now, phrase[0])
+        if tick in (20, 220):
+            live.choose(tick == 20, 2.0)
+        shown.append(live.lay_over(now, phrase, ROOTS)[0][0].copy())
+    steps = quaternion.angle_between(np.array(shown[1:]), np.array(shown[:-1]))
+    assert steps.max() < 0.6 * TICK_S + 1.6 * (math.pi + 2.4) * TICK_S / 2.0  # apart at most, eased
+
+
 @pytest.mark.parametrize("rate", [24.0, 30.0, 60.0, 90.0, 120.0])
 def test_a_steady_turn_stays_steady_at_any_rate_of_the_stream(rate: float) -> None:
     """Poses that come at 24 a second would otherwise show as stairs at 50."""
