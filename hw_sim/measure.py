@@ -21,6 +21,7 @@ from hw_sim.figures import FREE_SETTLING_S, SETTLING_S, Evidence, figures_of, ta
 from hw_sim.peers import ProbeError, Setting, scratch_folder
 from hw_sim.probe import Course, Run, run, run_restarts
 from hw_sim.progress import Progress
+from hw_sim.screen import Screen
 
 REFUSED, FAILED = 2, 1
 BEAT_S = 0.02
@@ -74,6 +75,8 @@ def measure(
                 "The picture of --report needs matplotlib, which is missing here: nothing was measured. "
                 "Leave --report out (--json FILE writes the figures), or: pip install 'bunraku[pictures]'"
             )
+        if light:
+            Screen().close()
         for folder in (report, None if json_file is None else json_file.parent):
             if folder is not None:  # before minutes are measured for nothing
                 folder.mkdir(parents=True, exist_ok=True)

@@ -138,6 +138,15 @@ def test_a_place_that_takes_no_file_is_refused_before_anything_is_measured(
     assert "bunraku measure: " in done.stderr and "Traceback" not in done.stderr
 
 
+def test_a_light_without_a_screen_is_refused_before_anything_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    done = measure("--show", str(write_show(tmp_path / "show")), "--seconds", "4", "--light")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "No X11 screen" in done.stderr
+
+
 def test_a_box_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     done = measure("--show", str(write_show(tmp_path / "show")), "--box", str(tmp_path / "absent.yaml"))
     assert done.returncode == 2
