@@ -145,8 +145,8 @@ def test_letters_of_several_scripts_are_drawn_as_themselves() -> None:
 def test_a_font_that_was_saved_anew_is_taken_with_the_next_cards(show: Show, tmp_path: Path) -> None:
     card = CardConfig(name="x", text="Hamlet", font="own.ttf", size=0.4)
     state, seen = ShowState().to(CARD, "x"), []
-    for content in (b"broken", Path(get_data_path(), "fonts/ttf/DejaVuSansMono-Bold.ttf").read_bytes()):
-        (tmp_path / "own.ttf").write_bytes(content)
+    for name in ("DejaVuSerif", "DejaVuSansMono-Bold"):
+        (tmp_path / "own.ttf").write_bytes(Path(get_data_path(), f"fonts/ttf/{name}.ttf").read_bytes())
         seen.append(show([card], state))
     assert np.abs(seen[1] - seen[0]).max() > 100
 
@@ -170,6 +170,11 @@ def test_a_broken_file_leaves_the_rest_of_the_card(gl: moderngl.Context, tmp_pat
         gl, {"t": CardConfig(name="t", image="logo.png", background="#ffffff")}, tmp_path, said.append
     ).release()
     assert len(said) == 1 and "The card 't' cannot be drawn whole" in said[0]
+    (tmp_path / "own.ttf").write_bytes(b"no font")
+    card = CardConfig(name="t", text="Hamlet", image="logo.png", font="own.ttf")
+    words = content_of(card, tmp_path, said.append)
+    assert words is not None and words[..., 3].any()
+    assert len(said) == 3 and "cannot be drawn whole" in said[1] and "in another one" in said[2]
     Image.new("1", (MOST_PIXELS // 100 + 1, 100)).save(tmp_path / "huge.png")
     with pytest.raises(OSError, match="more than 64 million pixels"):
         read_image(tmp_path / "huge.png")

@@ -13,7 +13,7 @@ from appliance.levers.show_state import ShowState
 from appliance.levers.table import CARD
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import LINES, MOST_WIDE, Image, read_image, texture_of
-from appliance.projector.picture.lettering import forget_fonts, lettered, letters_without_font
+from appliance.projector.picture.lettering import forget_fonts, is_font, lettered, letters_without_font
 from appliance.projector.picture.wall import Wall
 from appliance.show.card import CardConfig
 
@@ -108,28 +108,49 @@ class Cards:
 
 def content_of(card: CardConfig, directory: Path, say: Callable[[str], None]) -> Image | None:
     """(height, width, 4) in pixels of a picture of LINES rows: the image above the words; None: neither."""
-    line = max(1, round(card.size * LINES))
     parts: list[Image] = []
-    try:
-        if card.image is not None:
-            parts.append(_sized(read_image(directory / card.image), round(card.image_size * LINES)))
-        if card.text.strip():
-            font = None if card.font is None else directory / card.font
-            if lacking := letters_without_font(card.text, font):
-                say(
-                    f"No font of this machine has '{lacking[:20]}' of the card '{card.name}'. The audience "
-                    "sees boxes there. Name a font file in the bundle under the card's `font`, or install "
-                    "one (Debian packages fonts-noto-core, fonts-noto-cjk)."
-                )
-            parts.append(lettered(card.text, line, _bytes(card.colour or _WHITE), font))
-    except OSError as error:
-        say(
-            f"The card '{card.name}' cannot be drawn whole ({error}). The audience sees it without that. "
-            "Save its image or font file anew."
-        )
+    for make in (_image_of, _words_of):
+        try:
+            parts += make(card, directory, say)
+        except OSError as error:
+            say(
+                f"The card '{card.name}' cannot be drawn whole ({error}). The audience sees it without that. "
+                "Save its image or font file anew."
+            )
     if not parts:
         return None
-    return _stacked(parts, round(_GAP * line))
+    return _stacked(parts, round(_GAP * _line_of(card)))
+
+
+def _line_of(card: CardConfig) -> int:
+    """Height of a line of its words, in rows."""
+    return max(1, round(card.size * LINES))
+
+
+def _image_of(card: CardConfig, directory: Path, _: Callable[[str], None]) -> list[Image]:
+    """Its image, if it has one. Raises OSError."""
+    if card.image is None:
+        return []
+    return [_sized(read_image(directory / card.image), round(card.image_size * LINES))]
+
+
+def _words_of(card: CardConfig, directory: Path, say: Callable[[str], None]) -> list[Image]:
+    """Its words, if it has any. Raises OSError."""
+    if not card.text.strip():
+        return []
+    font = None if card.font is None else directory / card.font
+    if font is not None and not is_font(font):
+        say(
+            f"{font} cannot be read as a font. The audience sees the words of the card '{card.name}' "
+            "in another one. Save it anew."
+        )
+    if lacking := letters_without_font(card.text, font):
+        say(
+            f"No font of this machine has '{lacking[:20]}' of the card '{card.name}'. The audience "
+            "sees boxes there. Name a font file in the bundle under the card's `font`, or install "
+            "one (Debian packages fonts-noto-core, fonts-noto-cjk)."
+        )
+    return [lettered(card.text, _line_of(card), _bytes(card.colour or _WHITE), font)]
 
 
 def _sized(image: Image, lines: int) -> Image:

@@ -32,7 +32,7 @@ def lettered(
     size_px: height of a line of type, less where an image would be wider than MOST_WIDE or higher than
     MOST_HIGH; font: tried first.
     Scripts from right to left and those that join letters need the library libraqm, which Pillow's wheels
-    bring along. Raises OSError for a broken font.
+    bring along. A file that is no font counts as one without letters.
     """
     lines = [_Line(line, size_px, font) for line in text.splitlines()]
     width = max((line.width for line in lines), default=0) + size_px
@@ -45,6 +45,14 @@ def lettered(
     for row, line in enumerate(lines):
         line.write(draw, (width - line.width) / 2, size_px * (_LINE * row + 1.1), (*colour, 255))
     return np.asarray(image)
+
+
+def is_font(path: Path) -> bool:
+    """Whether a file is a font that can be drawn with."""
+    try:
+        return bool(ImageFont.truetype(path, 24))
+    except OSError:
+        return False
 
 
 def letters_without_font(text: str, font: Path | None = None) -> str:
