@@ -22,13 +22,14 @@ LOG_HEADER = "sensor,boot_nonce,sequence,sent_s,sampled_s,power_on_s,w,x,y,z,not
 class UdpSender:
     """Datagrams to `host`:`port` from its own address. Raises OSError when the host is unknown.
 
-    Answers are checked by tag, not by address, as in the firmware.
+    IPv4, as the box and the firmware have it: a name may have an IPv6 address too, before that. Answers are
+    checked by tag, not by address, as in the firmware.
     """
 
     def __init__(self, host: str, port: int) -> None:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        self._address = address
-        self._socket = socket.socket(family, kind, protocol)
+        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
+        self._address = found[0][4]
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
 
     @property

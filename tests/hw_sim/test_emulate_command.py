@@ -8,6 +8,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -16,6 +17,7 @@ from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorLink, SensorReading, open_link
 from appliance.sensor.transports.udp import UdpIntake
 from hw_sim.__main__ import main
+from hw_sim.senders import UdpSender
 from tests.hw_sim.conftest import Emulate
 from tests.hw_sim.null_modem import NullModem
 
@@ -132,6 +134,22 @@ def test_over_a_cable_that_is_pulled_out_and_plugged_in_again(
         process.terminate()
         assert process.wait(timeout=PATIENCE_S) == 0
         link.close()
+
+
+def test_a_box_is_found_by_a_name_that_has_an_ipv6_address_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Null: `localhost` has ::1 first on most machines, where no box listens."""
+
+    def found(host: str, port: int, family: int = 0, type: int = 0) -> list[Any]:
+        both = [(socket.AF_INET6, ("::1", port, 0, 0)), (socket.AF_INET, ("127.0.0.1", port))]
+        return [(one, type, 17, "", address) for one, address in both if family in (0, one)]
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as box:
+        box.bind(("127.0.0.1", 0))
+        box.settimeout(PATIENCE_S)
+        monkeypatch.setattr(socket, "getaddrinfo", found)
+        sender = UdpSender("localhost", box.getsockname()[1])
+        assert sender.send_packet(b"hello") and box.recv(10) == b"hello"
+        sender.close()
 
 
 def test_the_first_run_writes_a_key_file_for_its_owner_alone(emulate: Emulate, tmp_path: Path) -> None:
