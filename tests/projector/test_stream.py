@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
+import os
 import signal
 import socket
 import subprocess
@@ -265,6 +267,28 @@ def test_a_thousand_connections_that_say_nothing_leave_room_for_a_client(shown: 
         assert process is not None
         held = list(Path(f"/proc/{process.pid}/fd").iterdir())
         assert len(held) < MOST_FROM_ONE + 40
+
+
+def test_a_process_that_cannot_be_started_is_told_once_and_tried_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """For lack of memory. The picture goes on."""
+    tried: list[float] = []
+    said: list[str] = []
+    clock = 0.0
+
+    def refused(*_: object, **__: object) -> None:
+        tried.append(clock)
+        raise OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
+
+    monkeypatch.setattr("appliance.projector.stream.feed.start_child", refused)
+    descriptors = len(list(Path("/proc/self/fd").iterdir()))
+    stream = Feed(StreamConfig(port=1), said.append)
+    for clock in np.arange(0.0, 11.0, 0.5).tolist():
+        stream.offer(clock, (2, 1), lambda: bytes(8))
+    stream.close()
+    assert tried == [0.0, 5.0, 10.0] and len(said) == 1 and "Cannot allocate memory" in said[0]
+    assert len(list(Path("/proc/self/fd").iterdir())) == descriptors
 
 
 def test_a_process_that_hangs_is_started_again() -> None:

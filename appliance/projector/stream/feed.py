@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -26,13 +27,13 @@ class Feed:
         self._config, self._say = config, say
         self._process: subprocess.Popen[bytes] | None = None
         self._pictures: RawStream | None = None
-        self._begun_at = self._hangs_at = 0.0
+        self._begun_at, self._hangs_at = -math.inf, 0.0
         self._is_said = False
 
     def offer(self, now: float, size: Size, read: Callable[[], bytes]) -> None:
         """Give the picture of this moment where one is wanted. read: its bytes as OpenGL gives them."""
         if self._pictures is None or self._pictures.is_closed or self._is_over():
-            if self._process is None or now - self._begun_at >= AGAIN_S:
+            if now - self._begun_at >= AGAIN_S:
                 self._begin(now)
             return
         asked = self._asked()
@@ -67,8 +68,20 @@ class Feed:
         self._begun_at, self._hangs_at = now, now + _STARTS_WITHIN_S
         pictures, into = os.pipe()
         command = [sys.executable, "-m", "appliance.projector.stream", self._config.model_dump_json()]
-        self._process = start_child(command, stdin=pictures, stdout=subprocess.PIPE)
-        os.close(pictures)
+        try:
+            self._process = start_child(command, stdin=pictures, stdout=subprocess.PIPE)
+        except OSError as error:
+            os.close(into)
+            if not self._is_said:
+                self._is_said = True
+                self._say(
+                    f"The stream's process cannot be started ({error.strerror}). The audience sees the "
+                    "picture; media servers and mixers do not. It is tried again every "
+                    f"{AGAIN_S:g} s: is the machine out of memory?"
+                )
+            return
+        finally:
+            os.close(pictures)
         assert self._process.stdout is not None
         os.set_blocking(self._process.stdout.fileno(), False)
         self._pictures = RawStream(into, head)
