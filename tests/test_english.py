@@ -101,6 +101,9 @@ def test_comments_of_the_firmware_and_of_scripts_are_read(tmp_path: Path) -> Non
     script.write_text("#!/bin/sh\n# for want of a disk\nls # of a box\n")
     assert [one.tic for one in english.findings_in(header, tmp_path)] == ["what", "of"]
     assert [one.tic for one in english.findings_in(script, tmp_path)] == ["want", "of"]
+    shader = tmp_path / "a.glsl"
+    shader.write_text("// What it draws.\nin vec2 uv;\n")
+    assert [one.tic for one in english.findings_in(shader, tmp_path)] == ["what"]
     page = tmp_path / "a.js"
     page.write_text("const A = 1; // of a frame\nconst b = c * of + d; // a frame's\n")
     assert [one.line for one in english.findings_in(page, tmp_path)] == [1]

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TABLE = ROOT / "tests" / "english_findings.txt"
 FOLDERS = ("appliance", "hw_sim", "firmware", "tools", "deploy")
 PAGES = ("*.md", "docs/*.md", "firmware/*.md")
-C_LIKE = {".h", ".hpp", ".c", ".cpp", ".ino", ".js"}
+C_LIKE = {".h", ".hpp", ".c", ".cpp", ".ino", ".js", ".glsl", ".css"}
 WORDS = "appliance/console/page/words/en.json"
 SCRIPTS = {".sh", ".service", ".conf", ".target", ".path", ".mount", ".rules", ".cmake", ".yaml"}
 

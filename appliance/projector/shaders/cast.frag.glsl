@@ -1,4 +1,4 @@
-// What is near the floor casts a sharp shadow, what is high a soft one: red, green and blue are blurred apart.
+// A part near the floor casts a sharp shadow, a high one a soft one: red, green and blue are blurred apart.
 in float height;
 out vec4 colour;
 

@@ -1,5 +1,5 @@
 // The picture's four corners on the wall: its perspective is the vertices' w, so that pixels need no division.
-// With MARKS one triangle that covers the display: text and rings may lie beside the picture.
+// With MARKS one triangle that covers the display: text and rings may be outside of the picture.
 
 #ifdef MARKS
 void main() {

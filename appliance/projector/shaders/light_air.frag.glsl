@@ -1,4 +1,4 @@
-// What light in the dark leaves in the room: its glow near and far, haze, a floor that mirrors and catches some of it.
+// Light in the dark, in the air of the room: its glow near and far, haze, a floor that mirrors and catches some of it.
 in vec2 uv;
 in vec3 ray;
 uniform sampler2D near_glow;

@@ -1,4 +1,4 @@
-// The plaster figure, its outline smoothed, before the air around it; with FRAME the air alone.
+// The plaster figure, its outline smoothed, before the air around it; with FRAME only the air.
 in vec2 uv;
 uniform sampler2D picture;
 uniform sampler2D air;

@@ -1,4 +1,4 @@
-// What a look shows, as bright as the wall wants it.
+// The picture of a look, as bright as the wall wants it.
 uniform float level;
 uniform float opacity;
 #ifdef GAMMA
