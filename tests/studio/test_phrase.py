@@ -16,6 +16,7 @@ from appliance.dancer.grounding import survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
 from appliance.dancer.material.carrying import smoothed
 from appliance.dancer.material.improviser_network import ImproviserNetwork
+from appliance.dancer.material.steps import Steps
 from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
@@ -24,9 +25,11 @@ from appliance.studio import dance_files
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.export.chosen_phrase import choose_phrase
-from appliance.studio.improviser import naturalness
+from appliance.studio.improviser import naturalness, phrase
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.improvisation import ImproviseOptions, run
+from appliance.studio.improviser.improviser import Improviser
+from appliance.studio.improviser.moves import MovesShape
 from appliance.studio.improviser.naturalness import Yardstick, distances, measure
 from appliance.studio.improviser.pace import pace
 from appliance.studio.improviser.phrase import STAGE_M, PhraseOptions, closed_loop, on_stage
@@ -369,3 +372,9 @@ def test_a_full_disk_leaves_the_phrase_that_was_there(
     with pytest.raises(OSError, match="space"):
         dance_files.write_recording(tmp_path / "phrase.bvh", swaying(1.0))
     assert [file.read_text() for file in tmp_path.iterdir()] == ["the one before"]
+
+
+def test_recordings_too_short_to_go_on_from_are_refused() -> None:
+    short = Steps(np.zeros((20, 8), np.float32), np.zeros((20, 4), np.float32))
+    with pytest.raises(StudioError, match=r"No recording has 2\.8 s .* to go on from"):
+        phrase.improvise(Improviser(MovesShape(8, 6, 4, 4, 24), 12, 1, 2), [short], PhraseOptions(), print)

@@ -70,9 +70,14 @@ def make_phrase(
 def improvise(
     improviser: Improviser, recorded: Sequence[Steps], options: PhraseOptions, say: Callable[[str], None]
 ) -> list[Steps]:
-    """Dances, each of which continues another recorded stretch."""
+    """Dances, each of which continues another recorded stretch. Raises StudioError without a long one."""
     rng = np.random.default_rng(options.seed)
     long = [stretch for stretch in recorded if len(stretch) >= PRIMER]
+    if not long:
+        raise StudioError(
+            f"No recording has {PRIMER / STEPS_S:.1f} s without a capture error to go on from. Give the "
+            "recordings that the improviser was trained on."
+        )
     starts = []
     for number in rng.choice(len(long), options.dances, replace=len(long) < options.dances):
         first = int(rng.integers(len(long[number]) - PRIMER + 1))
