@@ -99,6 +99,8 @@ class Puppeteer:
         grip = 1.0
         if (phrases_own := self._phrases_own) is not None:
             grip = self.GRIP
+            if self._presence == 0.0:  # the first tick of all, too
+                before = phrases_own.tolist()
             if holds != self._holding:
                 rest_s = TAKE_S * (1.0 - self._presence) if holds else GIVE_BACK_S * self._presence
                 self._lead_over_s = max(self._lead_over_s, rest_s)

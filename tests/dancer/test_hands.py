@@ -160,6 +160,18 @@ def test_a_hand_that_comes_or_goes_near_the_phrases_opposite_does_not_turn_its_j
     assert steps.max() < own + 1.6 * math.pi * TICK_S / TAKE_S  # half a turn at most, eased
 
 
+def test_a_hand_that_holds_from_the_first_tick_leads_its_joint_from_the_phrase_too() -> None:
+    both = quaternion.from_axis_angle([1.0, 0.0, 0.0], np.radians([90.0, 120.0]))
+    raised, further = both.astype(np.float32)
+    hands, danced = Hands([FixedOrientation("lShldr", further.tolist())], JOINTS), []
+    for tick in range(40):
+        hands.pull(tick * TICK_S, np.tile(raised, (8, len(JOINTS), 1)))
+        danced.append(quaternion.slerp(raised, hands.targets[0, 1], float(hands.weights[1])))
+    away = np.degrees(quaternion.angle_between(np.array(danced), raised))
+    assert away[0] < 0.1 and away[-1] == pytest.approx(30.0, abs=0.1)
+    assert np.diff(away).min() > -0.1 and np.diff(away).max() < 2.0
+
+
 def held_course(hands: Hands, ticks: int, act: Callable[[int], None]) -> tuple[np.ndarray, np.ndarray]:
     """Targets (ticks, 8, 4) of the joint lShldr and whether it was held (ticks,)."""
     targets, held = [], []
