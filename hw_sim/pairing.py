@@ -129,5 +129,5 @@ class Pairing:
         return True
 
     def _look_for_the_box(self, now: float) -> None:
-        self.lane = None
+        self.lane, self.round_trip = None, wire.ROUND_TRIP_UNKNOWN
         self._hello_at = dict.fromkeys(self._lanes_up, now)

@@ -115,6 +115,11 @@ def test_a_link_is_not_kept_by_assignments() -> None:
         answer = wire.Assignment(KEY.device_id, 1, 0x5E55, hello, hello, 0, 50, led)
         assert pairing.take_assignment(answer, at + 0.1, Lane.NETWORK) == is_taken
     assert pairing.led == wire.LED_ON and pairing.next_at == pytest.approx(0.1 + LOST_S)
+    pairing.reading_sent(5, 2.2)
+    pairing.take_heartbeat(wire.Heartbeat(KEY.device_id, 1, 0x5E55, 1, 5, 0, wire.LED_ON), 2.21)
+    assert pairing.round_trip == 100
+    assert pairing.due_hellos(2.21 + LOST_S) != []
+    assert pairing.round_trip == wire.ROUND_TRIP_UNKNOWN, "it is that of the link"
 
 
 class TestRoaming:
