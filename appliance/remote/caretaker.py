@@ -26,7 +26,7 @@ FILE = "opening-hours"
 _LARGEST = 1024
 _LOOK_S = 1.0
 _FADE_S = 5.0  # for the strings
-_TRIES = 30  # once a second: show control has started again by then; one that refuses is not asked for ever
+_TRIES = 10  # once a second: show control has started again by then; one that refuses is not asked for ever
 
 
 class Memory(NamedTuple):
@@ -35,7 +35,8 @@ class Memory(NamedTuple):
     is_open: whether it opened or closed, None: neither yet; goes: how often /go may still be given until the
     show goes; stands: the show has stopped since; ends: the cue of the end was called.
     loud: the strings before the quiet hours, None outside of them. fades: from which strings to which, how
-    often that may still be given until they have changed. before: the cue before nobody was there.
+    often that may still be given until they have changed. calls: the same of a cue.
+    before: the cue before nobody was there.
     """
 
     is_open: bool | None = None
@@ -44,6 +45,7 @@ class Memory(NamedTuple):
     ends: bool = False
     loud: float | None = None
     fades: Sequence[float] = ()
+    calls: Sequence[Any] = ()
     before: str | None = None
 
 
@@ -67,11 +69,13 @@ class Caretaker:
         if now < self._look_at:
             return
         self._look_at = now + _LOOK_S
-        wall = self._wall()
+        wall, called = self._wall(), self._memory.calls
         self._open_and_close(state, wall)
         self._quieten(state, wall)
         if self._config.attract is not None:
             self._attract(state, _anybody(health) or bool(live), now)
+        if called and self._memory.calls is called:
+            self._call_again(state)
         for projector in self.projectors:
             projector.want(self._hours.is_warm(wall))
         self._reported = {"open": self._hours.is_open(wall), "next": self._hours.next_change(wall)}
@@ -108,11 +112,11 @@ class Caretaker:
             if is_open:
                 self._watch_anew(state)
             if goes:
-                self._open()
+                self._go(state)
         elif self._memory.goes and (state.going or state.panic):
             self._memory = self._memory._replace(goes=0)
         elif self._memory.goes:  # again, until show control is there to hear it
-            self._open()
+            self._go(state)
         elif not is_open and not self._memory.stands:  # again too
             self._memory = self._memory._replace(stands=not state.going)
             if state.going:
@@ -120,13 +124,27 @@ class Caretaker:
         elif self._hours.closes_soon(wall) and not self._memory.ends:
             self._memory = self._memory._replace(ends=True)
             if self._config.close_cue:
-                self._give(("/cue", self._config.close_cue))
+                self._call(self._config.close_cue, state)
 
-    def _open(self) -> None:
+    def _go(self, state: ShowState) -> None:
+        first = self._memory.goes == _TRIES
         self._memory = self._memory._replace(goes=self._memory.goes - 1)
         self._give(("/go",))
-        if self._config.open_cue:
-            self._give(("/cue", self._config.open_cue))
+        if self._config.open_cue and first:
+            self._call(self._config.open_cue, state)
+
+    def _call(self, cue: str, state: ShowState) -> None:
+        self._memory = self._memory._replace(calls=[cue, state.cue, _TRIES - 1])
+        self._give(("/cue", cue))
+
+    def _call_again(self, state: ShowState) -> None:
+        """Until another cue is in force: show control may have been away."""
+        cue, before, left = self._memory.calls
+        if left and before == state.cue != cue:
+            self._memory = self._memory._replace(calls=[cue, before, left - 1])
+            self._give(("/cue", cue))
+        else:
+            self._memory = self._memory._replace(calls=[])
 
     def _watch_anew(self, state: ShowState) -> None:
         """A new day: nobody was missed yet, and yesterday's cue only counts while its stand-in is there."""
@@ -155,12 +173,12 @@ class Caretaker:
             self._somebody_at = now
         before = self._memory.before
         if somebody and before is not None:
-            self._memory = self._memory._replace(before=None)
+            self._memory = self._memory._replace(before=None, calls=[])
             if state.cue == attract.cue and (back := attract.back or before):
-                self._give(("/cue", back))
+                self._call(back, state)
         elif before is None and state.going and now - self._somebody_at >= attract.after_s:
             self._memory = self._memory._replace(before=state.cue)
-            self._give(("/cue", attract.cue))
+            self._call(attract.cue, state)
 
 
 def _anybody(health: Mapping[str, Any]) -> bool:
