@@ -26,7 +26,7 @@ from appliance.studio.partner.measure import Row, what_is_dead
 from appliance.studio.partner.training import Partner, train
 from tests.bundles import FIGURE, MOVING
 from tests.sources import LATENT, write_improviser_network, write_show_with_sources
-from tests.studio.tiny import write_recordings
+from tests.studio.tiny import skeleton, write_recordings
 
 JOINTS = ("hips", "spine", "LeftArm", "RightArm", "LeftUpLeg", "RightUpLeg")
 PAIRS = (0, 1, 3, 2, 5, 4)
@@ -156,6 +156,13 @@ def test_recordings_without_couples_are_refused_with_the_cure(tmp_path: Path) ->
     result = CliRunner().invoke(app, ["duet", str(tmp_path / "takes"), "--show", str(show)])
     assert result.exit_code == 2, result.output
     assert "No couple is kept apart" in result.output and "catalogue.yaml" in result.output
+
+
+def test_a_joint_whose_counterpart_never_moves_counts_as_its_own() -> None:
+    """A hand that only one side has a sensor for."""
+    bones = skeleton()
+    joints = [0, bones.index("lShldr"), bones.index("rShldr"), bones.index("lHand")]
+    assert measure._counterparts(bones, joints) == [0, 2, 1, 3]
 
 
 def test_couples_that_are_too_short_to_be_measured_get_no_verdict(tmp_path: Path) -> None:

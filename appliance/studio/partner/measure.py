@@ -21,6 +21,7 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
 from appliance.show.show import Show, load_show
 from appliance.studio.dance_files import write_report
 from appliance.studio.data.dataset import FPS, Dataset, Take, load_folder
@@ -169,8 +170,7 @@ def _rows(
 ) -> Iterator[Row]:
     """danced: takes the first couple's duets by their names."""
     joints, moving = dataset.moving_names, list(dataset.moving)
-    counterparts = mirror_pairs(dataset.skeleton)
-    pairs = [moving.index(counterparts[joint]) for joint in moving]
+    pairs = _counterparts(dataset.skeleton, moving)
     couples = [one for pair in apart for one in (pair, pair[::-1])]
     whole = {take.name: _seen(take.recording, moving) for pair in couples for take in pair}
     accords = _accords(dataset, moving)
@@ -254,6 +254,15 @@ def draw_duets(path: Path, duets: Mapping[str, tuple[Recording, Recording]], sec
             )
         )
     draw_rows(path, second.skeleton, rows, FPS, path.stem, "")
+
+
+def _counterparts(skeleton: Skeleton, moving: Sequence[int]) -> list[int]:
+    """For each moving joint the place of its counterpart; its own where that never moves."""
+    others = mirror_pairs(skeleton).tolist()
+    return [
+        moving.index(other if other in moving else joint)
+        for joint, other in ((joint, others[joint]) for joint in moving)
+    ]
 
 
 def _unknown(first: Array, second: Array) -> float:
