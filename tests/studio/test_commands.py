@@ -212,6 +212,7 @@ def test_a_ctrl_c_while_the_files_are_replaced_waits_for_the_checksums(
 ) -> None:
     show = shutil.copytree(trained[0], tmp_path / "show")
     (show / "answer.png").write_bytes(b"of the dancer before")
+    (show / ".export-killed" / "show").mkdir(parents=True)
     (show / "puppet.onnx").write_bytes(b"another network")
     write_checksums(show)
     replace_file, moved = Path.replace, list[str]()
@@ -229,6 +230,7 @@ def test_a_ctrl_c_while_the_files_are_replaced_waits_for_the_checksums(
     assert "puppet.onnx" in moved and "show.yaml" not in moved
     assert "show.yaml stays as it is: --name and --hand are for a new one" in said(result)
     assert verify_bundle(show) == [] and not (show / "answer.png").exists()
+    assert not list(show.glob(".export-*"))
 
 
 def test_a_wrong_hand_or_phrase_is_refused_before_anything_is_measured(

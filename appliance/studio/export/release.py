@@ -47,6 +47,7 @@ HANGING_DEGREES = 80.0  # below horizontal: a hanging arm does not touch the hip
 LEVEL_DEGREES = 45.0  # above horizontal: a bone that points further up is no arm
 _PHRASE_OF_ITS_OWN = "Its own: bunraku improvise CHECKPOINT --out FILE, then bunraku export --phrase FILE."
 ANSWER = "answer.png"  # there only if the answer to a hand was measured
+_MADE = ".export-"
 FIRST_HANDS = ("left upper arm", "left forearm", "left hand", "right upper arm", "head")
 
 
@@ -70,7 +71,9 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     Its files take the place of those in `out` once all are made: after an error or Ctrl-C nothing is changed.
     """
     request.out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".export-", dir=request.out) as folder:
+    for left in request.out.glob(f"{_MADE}*"):  # by an export that was killed
+        shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=_MADE, dir=request.out) as folder:
         made = Path(folder) / "show"
         made.mkdir()
         report = _make(request, dataset, made, console)
