@@ -230,13 +230,14 @@ class Springs(Puppeteer):
         """Write the orientations that turn the phrase's bones to where the masses are.
 
         The shortest arc a of a joint turns its world rotation W; local to its parent, which the arc b
-        turns, that is W_parent^-1 b^-1 a W.
+        turns, that is W_parent^-1 b^-1 a W. Beyond a right angle an arc is less again, down to none at the
+        opposite: there it would change sides in one tick.
         """
         there, here = self._points_to @ self._body.positions, self._points_to @ stands
         lengths = np.sqrt((there * there) @ _SUM * ((here * here) @ _SUM))
         arcs = np.zeros((len(there) + 1, 4))
         arcs[-1, 0] = 1.0
-        arcs[:-1, :1] = np.maximum((there * here) @ _SUM + lengths, _SMALLEST)
+        arcs[:-1, :1] = np.maximum((there * here) @ _SUM, 0.0) + np.maximum(lengths, _SMALLEST)
         arcs[:-1, 1:] = _cross(here, there)
         arcs /= np.sqrt(np.einsum("hk,hk->h", arcs, arcs))[:, None]
         world = self._phrase.world

@@ -104,6 +104,17 @@ def test_a_kick_swings_the_body_and_it_comes_to_rest_again() -> None:
     assert turned[:50].max() > 0.15 and turned[-1] < 0.01
 
 
+def test_a_mass_that_flies_past_the_opposite_does_not_turn_its_joint_over() -> None:
+    dance, rng = Dance("heavy"), np.random.default_rng(3)
+    course = []
+    for _ in range(60):
+        dance.springs.kick(rng.uniform(-3.0, 3.0, 3).tolist())
+        course.append(dance.tick(20))
+    turned = np.concatenate(course)[:, MOVING.index("Chest")]
+    assert quaternion.angle_between(turned, REST[0]).max() < np.radians(91)
+    assert quaternion.angle_between(turned[1:], turned[:-1]).max() < np.radians(45)
+
+
 def test_a_setting_brings_its_kick_once() -> None:
     dance = Dance()
     dance.tick(20)
