@@ -17,7 +17,6 @@ from appliance.show.show import load_show
 
 SIZE = 200, 250  # pixels of one instant
 INSTANTS, APART_S, BEGINS_S = 6, 0.6, 5.0
-COLOURS = 128
 CAMERA = CameraConfig(move="still", figure=0.85)
 
 
@@ -37,8 +36,7 @@ def draw_dancers(folder: Path) -> list[Path]:
             pictures = [shrink(draw_still(ctx, renderer, moment, look.name, size)) for moment in moments]
             renderer.release()
         paths.append(folder / f"dancer-{name}.png")
-        strip = Files.fromarray(np.hstack(pictures))
-        strip.quantize(COLOURS, method=Files.Quantize.MAXCOVERAGE, kmeans=2).save(paths[-1], optimize=True)
+        Files.fromarray(np.hstack(pictures)).save(paths[-1], optimize=True)
     return paths
 
 

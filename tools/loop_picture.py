@@ -1,4 +1,4 @@
-"""docs/pictures/loop.gif, by `python -m tools.loop_picture [file]`: a hand, and the AI dancer's answer.
+"""docs/pictures/loop.webp, by `python -m tools.loop_picture [file]`: a hand, and the AI dancer's answer.
 
 The built-in show dances in its own tick. Its worn sensor gets an arm that swings, and nothing else of a
 dancer: the figure on the left only moves that arm.
@@ -11,15 +11,19 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from appliance.box.clock import TICK_S, Slot
-from appliance.pictures.filmstrip_stage import COLUMN_PX, HEADER_PX, Row, Stage, straight
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.projector.context import offscreen
+from appliance.projector.picture.renderer import Renderer
+from appliance.projector.still import FINER, draw_still, moment_of, shrink
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.bundle import default_show_path
+from appliance.show.look import CameraConfig, LookConfig
 from appliance.show.show import load_show
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
@@ -28,9 +32,11 @@ from appliance.stage.tick import Tick
 
 SECONDS, MELT_S, BEFORE_S = 6.0, 0.6, 6.0  # the end melts into the beginning; danced before it is seen
 EVERY = 4  # ticks a picture: 12.5 pictures a second
-HALF, FLOOR_PX = (340, 400), 350  # pixels of one figure; how far below the top its floor is
-COLOURS = 64
-TRAIL = 150, 52, 30
+HALF = 340, 400  # pixels of one figure
+QUALITY = 80
+LOOK = LookConfig(
+    name="plaster", style="plaster", camera=CameraConfig(move="still", angle_deg=-15.0, figure=0.8)
+)
 SENSOR, JOINT = "left-wrist", "lShldr"
 HANG = -80.0  # degrees about z, from the T of the rest pose
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
@@ -38,7 +44,7 @@ CAPTIONS = "A dancer wears one sensor on one arm", "The AI dancer answers with t
 
 
 def draw_loop(path: Path) -> Path:
-    """Dance, draw both figures, and write them as a GIF that repeats."""
+    """Dance, draw both figures, and write them as a WebP that repeats."""
     worn, danced = _dance()
     count = round(SECONDS / TICK_S / EVERY)
     melted = round(MELT_S / TICK_S / EVERY)
@@ -48,10 +54,10 @@ def draw_loop(path: Path) -> Path:
         mixed = share * pictures[number] + (1 - share) * pictures[count + number]
         pictures[number] = mixed.astype(np.uint8)
     frames = [_captioned(picture) for picture in pictures[:count]]
-    palette = Image.fromarray(np.vstack([np.asarray(one) for one in frames[:: count // 6]]))
-    palette = palette.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, kmeans=2)
-    flat = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
-    flat[0].save(path, append_images=flat[1:], duration=round(1000 * TICK_S * EVERY), loop=0, optimize=True)
+    length_ms = round(1000 * TICK_S * EVERY)
+    frames[0].save(
+        path, save_all=True, append_images=frames[1:], duration=length_ms, loop=0, quality=QUALITY, method=6
+    )
     return path
 
 
@@ -96,28 +102,21 @@ def _dance() -> tuple[Recording, Recording]:
     )
 
 
-def _drawn(recording: Recording) -> list[Array]:
-    """Every picture of a dance on its floor, the held joint and its trail in colour."""
-    holds = np.zeros((len(recording), len(recording.skeleton)))
-    holds[:, recording.skeleton.index(JOINT)] = 1.0
-    pictures = []
-    for number in range(0, len(recording), EVERY):
-        chosen = np.array([number])
-        row = Row(recording.poses, recording.roots, chosen, holds=holds, stamps=("",))
-        stage = Stage(recording.skeleton, [row], recording.fps)
-        image = Image.fromarray((255 * np.clip(stage.floor, 0, 1)).astype(np.uint8))
-        for pixels, _ in stage.trails:
-            ImageDraw.Draw(image).line([tuple(pixel) for pixel in pixels], fill=TRAIL, width=2)
-        figures = Image.fromarray((255 * np.clip(straight(stage.figures), 0, 1)).astype(np.uint8), "RGBA")
-        image.paste(figures, mask=figures)
-        left, top = stage.margin_px + COLUMN_PX // 2, HEADER_PX + stage.floor_px - FLOOR_PX  # its place
-        wide = np.pad(np.asarray(image), ((0, 0), (HALF[0] // 2, HALF[0] // 2), (0, 0)), mode="edge")
-        pictures.append(wide[top : top + HALF[1], left : left + HALF[0]])
+def _drawn(recording: Recording) -> list[NDArray[np.uint8]]:
+    """Every picture of a dance as the wall shows it, the held joint in colour."""
+    holds = np.zeros(len(recording.skeleton), np.float32)
+    holds[recording.skeleton.index(JOINT)] = 1.0
+    size, times = (HALF[0] * FINER, HALF[1] * FINER), np.arange(0, len(recording), EVERY) / recording.fps
+    with offscreen(size) as ctx:
+        renderer = Renderer(ctx, recording.skeleton, {LOOK.name: LOOK}, default_show_path())
+        moments = (moment_of(recording, float(time_s), holds) for time_s in times)
+        pictures = [shrink(draw_still(ctx, renderer, moment, LOOK.name, size)) for moment in moments]
+        renderer.release()
     return pictures
 
 
-def _captioned(picture: Array) -> Image.Image:
-    image = Image.fromarray(np.asarray(picture, np.uint8))
+def _captioned(picture: NDArray[np.uint8]) -> Image.Image:
+    image = Image.fromarray(picture)
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(15)
     for number, text in enumerate(CAPTIONS):
         middle = (number + 0.5) * HALF[0], HALF[1] - 18
@@ -126,5 +125,5 @@ def _captioned(picture: Array) -> Image.Image:
 
 
 if __name__ == "__main__":
-    drawn = draw_loop(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures/loop.gif"))
+    drawn = draw_loop(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures/loop.webp"))
     print(f"{drawn} ({drawn.stat().st_size // 1000} kB)")
