@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 from appliance.pose.ease import ease
-from appliance.pose.turns import Vector, about, inverse, multiplied
+from appliance.pose.turns import Vector, about, axis_angle, inverse, multiplied
 
 HOLD_S = 0.1  # seconds of silence after which a sensor's joint is released
 GIVE_BACK_S = 1.0
 TAKE_S = 0.5
 AHEAD_S = 0.01  # how far a reading is turned on, by its angular velocity; further it would overshoot
 PAIR_S = 0.001, 0.05  # two readings this far apart tell an angular velocity
-_LEAST_TURN = 1e-6  # sine of half an angle
-_STILL = 0.0, (1.0, 0.0, 0.0)  # angular velocity in radians a second, and its axis
+_STILL: tuple[Vector, float] = (1.0, 0.0, 0.0), 0.0  # an axis, and radians, or radians a second, about it
 LONGEST_STEP_S = 0.12  # six ticks; after a longer stall the targets continue from their last state
 
 
@@ -65,7 +64,7 @@ class Puppeteer:
         self._holding = False
         self._lead_over_s = 0.0  # how long the next pull begins to lead the target
         self._leading_s = self._led_s = 0.0  # rest and total of the time in which it is led
-        self._apart = 0.0, 0.0, 0.0, 0.0  # half the angle to the target from where it is led to, and its axis
+        self._apart = _STILL  # the turn from the target to where it is led from: axis, and radians
 
     @property
     def is_holding(self) -> bool:
@@ -128,19 +127,12 @@ class Puppeteer:
             return
         present = _four(orientation.tolist())
         if self._lead_over_s:
-            w, *axis = multiplied(_four(before), inverse(present))
-            sine = math.hypot(*axis)
-            half_angle, scale = math.atan2(sine, abs(w)), math.copysign(1.0 / max(sine, _LEAST_TURN), w)
-            x, y, z = (scale * part for part in axis)
-            self._apart = half_angle, x, y, z
-            self._leading_s = self._led_s = max(self._lead_over_s, TAKE_S * 2.0 * half_angle / math.pi)
+            self._apart = axis, angle = axis_angle(multiplied(_four(before), inverse(present)))
+            self._leading_s = self._led_s = max(self._lead_over_s, TAKE_S * angle / math.pi)
             self._lead_over_s = 0.0
         self._leading_s = max(0.0, self._leading_s - elapsed)
-        half_angle, *axis = self._apart
-        x, y, z = axis
-        orientation[:] = multiplied(
-            about((x, y, z), 2.0 * half_angle * ease(self._leading_s / self._led_s)), present
-        )
+        axis, angle = self._apart
+        orientation[:] = multiplied(about(axis, angle * ease(self._leading_s / self._led_s)), present)
 
     def _holds(self, now: float) -> bool:
         """Whether the joint should be held at the time `now`."""
@@ -225,23 +217,19 @@ class WornSensor(Puppeteer):
     def _holds(self, now: float) -> bool:
         return self.silent_s(now) <= HOLD_S
 
-    def _turned_since(self, before: Sequence[float], measured_at: float | None) -> tuple[float, Vector]:
+    def _turned_since(self, before: Sequence[float], measured_at: float | None) -> tuple[Vector, float]:
         """The angular velocity from the reading before to the newest one; none where a time is unknown."""
         if measured_at is None or self._measured_at is None:
             return _STILL
         between_s = measured_at - self._measured_at
         if not PAIR_S[0] <= between_s <= PAIR_S[1]:
             return _STILL
-        w, *axis = multiplied(_four(self._local.tolist()), inverse(_four(before)))
-        sine = math.hypot(*axis)
-        if sine < _LEAST_TURN:
-            return _STILL
-        x, y, z = (math.copysign(part, part * w) / sine for part in axis)
-        return 2.0 * math.atan2(sine, abs(w)) / between_s, (x, y, z)
+        axis, angle = axis_angle(multiplied(_four(self._local.tolist()), inverse(_four(before))))
+        return axis, angle / between_s
 
     def _turned_on(self, now: float) -> Sequence[float]:
         """The newest reading, turned on to the time `now`."""
-        rate, axis = self._turn
+        axis, rate = self._turn
         local: list[float] = self._local.tolist()
         if self._measured_at is None or rate == 0.0:
             return local

@@ -50,6 +50,16 @@ def about(axis: Vector, radians: float) -> Quaternion:
     return math.cos(0.5 * radians), sine * axis[0], sine * axis[1], sine * axis[2]
 
 
+def axis_angle(turn: Quaternion) -> tuple[Vector, float]:
+    """Unit axis and angle, 0 to pi radians, the short way; the axis of no turn is x."""
+    w, *axis = turn
+    sine = math.hypot(*axis)
+    if sine < _SHORTEST:
+        return (1.0, 0.0, 0.0), 0.0
+    x, y, z = (math.copysign(part, part * w) / sine for part in axis)
+    return (x, y, z), 2.0 * math.atan2(sine, abs(w))
+
+
 def swing(start: Vector, end: Vector) -> Quaternion:
     """The shortest turn from one unit vector to another."""
     cosine = dot(start, end)
