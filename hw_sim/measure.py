@@ -186,7 +186,7 @@ def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool)
 def _followed(
     show: Path, config: dict[str, Any], venue: dict[str, Any], is_venue: bool, scratch: Path, firmware: bool
 ) -> Setting:
-    """The setting for the sensor that the tick follows. Raises ProbeError where there is none."""
+    """The setting that measures the show's primary sensor. Raises ProbeError for a show without a sensor."""
     hands = [hand for hand in config.get("hands") or [] if isinstance(hand, dict) and hand.get("sensor")]
     if not hands:
         raise ProbeError(f"{show}: no sensor holds a joint in this show, so there is no way to follow.")

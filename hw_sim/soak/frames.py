@@ -84,13 +84,14 @@ class FrameWatch:
 
     def _hear(self, datagram: bytes, arrival: float) -> None:
         try:
-            (_, (tick, second, sequence, late, rest)), *_ = decode(datagram)
-            deadline = float(second) + float(rest)  # type: ignore[arg-type]
+            (_, values), *_ = decode(datagram)
+            tick, second, sequence, late, rest = (one for one in values if isinstance(one, int | float))
+            deadline = second + rest
         except (MalformedOscError, ValueError):
             return
         lateness_ms = 1000.0 * (arrival - deadline)
-        self._note_reading(int(sequence), arrival)  # type: ignore[arg-type]
-        self._count(int(tick), arrival)  # type: ignore[arg-type]
+        self._note_reading(int(sequence), arrival)
+        self._count(int(tick), arrival)
         bad = bool(late) or lateness_ms > self._late_ms
         self.heard += 1
         self.late += bad

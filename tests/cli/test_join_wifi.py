@@ -115,7 +115,7 @@ def test_a_stick_that_is_pulled_while_its_network_is_looked_for_has_done_its_wor
 
 
 def test_a_file_is_read_once(box: Box, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is kept is what was applied, though a stick is written to meanwhile."""
+    """The stored file is the applied one, also when the stick is written to meanwhile."""
     stick = box.folder / "stick" / NAME
     stick.write_text(GOOD)
     looks = list[bytes]()

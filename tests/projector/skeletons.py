@@ -40,7 +40,7 @@ def point() -> Skeleton:
 
 
 def rope(joints: int) -> Skeleton:
-    """Three metres of rope in so many joints."""
+    """A rope of three metres with so many joints."""
     long = 3.0 / joints
     bones: list[Bone] = [
         (f"j{n}", f"j{n - 1}" if n else None, (0, long if n else 0, 0)) for n in range(joints)

@@ -28,7 +28,7 @@ DOUBLE = """import pathlib, sys, time
 arguments = " ".join(sys.argv[1:])
 pathlib.Path(__file__).with_name("asked").write_text(arguments)
 assert "-stream_loop -1 -re -i" in arguments and "vflip -f image2pipe -c:v ppm -" in arguments
-most = b"255" if "-pix_fmt rgb24" in arguments else b"65535"  # of a video in ten bits
+most = b"255" if "-pix_fmt rgb24" in arguments else b"65535"  # a ten-bit video is asked for in 16 bits
 for number in range({pictures}):
     sys.stdout.buffer.write(b"P6\\n3 2\\n" + most + b"\\n" + bytes([10 * number, 0, 200] * 6))
     sys.stdout.buffer.flush()

@@ -112,7 +112,7 @@ def view(
     ways: Ways | None = None,
 ) -> View:
     """The camera at time_s; mix 0: as in `before`, 1: as in `now`; aspect: the picture's width / height;
-    ways: of the pictures before this one, None: it is alone."""
+    ways: the same object for every picture of a wall; None: for a single picture."""
     ways = ways or Ways()
 
     def between(name: str, a: _Stand, b: _Stand, share: float) -> _Stand:
