@@ -6,28 +6,22 @@ It stays in force for its process; sleeping moves it on.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+
+from tests.fake_clock import FakeTime
 
 
-class FastClock:
-    """Monotonic seconds. meanwhile: called in each sleep, with its end; it may move the clock on to there."""
+class FastClock(FakeTime):
+    """meanwhile: called in each sleep, with its end; it may move the clock on to there."""
 
     def __init__(self) -> None:
-        self.meanwhile: Callable[[float], None] = lambda until: None
-        self._now = time.monotonic()
-
-    def now(self) -> float:
-        return self._now
-
-    def go_to(self, now: float) -> None:
-        """Move on to this time, never back."""
-        self._now = max(self._now, now)
+        super().__init__()
+        self.now, self.meanwhile = time.monotonic(), lambda until: None
 
     def sleep(self, seconds: float) -> None:
-        until = self._now + seconds
+        until = self.now + seconds
         self.meanwhile(until)
-        self.go_to(until)
+        self.now = max(self.now, until)
 
 
 CLOCK = FastClock()
-time.monotonic, time.sleep = CLOCK.now, CLOCK.sleep
+time.monotonic, time.sleep = CLOCK.monotonic, CLOCK.sleep

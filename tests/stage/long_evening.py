@@ -67,7 +67,7 @@ class Evening:
         box_file.write_text(yaml.safe_dump(_settings(folder, port)))
         self.stage = Stage(show, load_box(box_file), lambda _: None, box_file)
         self.stage.lead_s = 0.0  # nothing cools down where nothing waits
-        self.begun = CLOCK.now()
+        self.begun = CLOCK.now
         self.faults: Counter[str] = Counter()
         self.ticks, self.farthest_m, self.turned = 0, 0.0, np.zeros(181, np.int64)
         self._facts: Facts = facts_of(show, box_file, self.stage.iterations, self.begun, False)
@@ -77,7 +77,7 @@ class Evening:
         self._devices = [EmulatedSensor(keys[name], Wearer(dance(seed), 3.0)) for name in names]
         senders = [{Lane.NETWORK: UdpSender(HOST, port)} for _ in names]
         network = VenueNetwork(VENUE, seed)
-        self._sensors = Emulator(self._devices, senders, network=network, clock=CLOCK.now)
+        self._sensors = Emulator(self._devices, senders, network=network, clock=CLOCK.monotonic)
         self._sensors.start(self.begun)
         self._sensors_due, self._act_at, self._go_at = 0.0, self.begun + 20.0, float("inf")
         self._before: list[np.ndarray] = []
@@ -97,9 +97,9 @@ class Evening:
 
     def _pass(self, until: float) -> None:
         """Until the next tick: what sensors and desk do, and a look at the frame that has left."""
-        while max(self._sensors_due, CLOCK.now()) <= until:
-            CLOCK.go_to(self._sensors_due)
-            self._sensors_due = max(self._sensors.step(CLOCK.now()), CLOCK.now() + 1e-4)
+        while max(self._sensors_due, CLOCK.now) <= until:
+            CLOCK.now = max(CLOCK.now, self._sensors_due)
+            self._sensors_due = max(self._sensors.step(CLOCK.now), CLOCK.now + 1e-4)
         self._look()
         if until >= self._go_at:
             self._go_at = float("inf")
