@@ -15,7 +15,7 @@ from appliance.show.box import OutputsConfig
 _ROUTES, _CARDS = Path("/proc/net/route"), Path("/sys/class/net")
 _SETTLE_S = 0.08  # a box hears the other one within that time
 _FORWARDS_S = 32.0  # IEEE 802.1D: a switch may pass nothing on for two times 15 s after a cable came in
-_ON_THE_WAY_S = 0.02  # a datagram from an unknown link, so soon after the cable was out, came by the cable
+_ON_THE_WAY_S = 0.004  # a datagram from an unknown link, so soon after the cable was out, came by the cable
 _FIND_EACH_S = 0.25
 _Network = tuple[int, int]  # its address and its mask, as the kernel has them
 
@@ -85,14 +85,15 @@ class Carrier:
         """
         return not self.is_out and (heard > self._changed_at or now - self._changed_at >= _SETTLE_S)
 
-    def is_heard_nonetheless(self, now: float, heard: float, heard_from: Mapping[str, float]) -> bool:
+    def is_heard_nonetheless(self, now: float, came_after: float, heard_from: Mapping[str, float]) -> bool:
         """Whether another link still joins the two boxes while the receivers' cable is out.
 
-        heard_from: when each of the other box's addresses was last heard.
+        came_after: the other box's newest datagram came later than that, whenever it was read. heard_from:
+        when each of its addresses was last heard.
         """
         if not self.is_out:
             return False
-        return heard > self._changed_at + _ON_THE_WAY_S or any(
+        return came_after > self._changed_at + _ON_THE_WAY_S or any(
             now - heard_from.get(one, float("-inf")) < FRESH_S for one in self._beside
         )
 

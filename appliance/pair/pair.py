@@ -60,7 +60,8 @@ class Pair:
     is_ready: this box could take over; reaches: see Roles.look; newest_frame: deadline of the newest frame
     that this box has sent. The stage sets these. wants_keyframe: the other box asked for one.
     same_show: whether the other box has the same show and software, as far as it was heard.
-    heard_from: when each of its addresses was last heard.
+    heard_from: when each of its addresses was last heard. came_after: its newest datagram has waited here
+    no longer than since then.
     """
 
     ROLES: type[Roles] = Roles
@@ -87,7 +88,7 @@ class Pair:
         self._links = [(_udp_socket(), (peer, settings.port)) for peer in settings.peers]
         self._socket: socket.socket | None = None
         self._poll = select.poll()
-        self._open_at = self._heard_at = float("-inf")
+        self._open_at = self._heard_at = self.came_after = float("-inf")
         self._outgoing, self._incoming = Outgoing(), Incoming()
         self._before: deque[list[bytes]] = deque(maxlen=REPEATS)  # bodies of the newest messages
         self._to_repeat: deque[int] = deque(maxlen=64)
@@ -259,6 +260,7 @@ class Pair:
                 self._greet(now)
             if found is not None:
                 self._take(found, now, now - before)
+                self.came_after = before
                 if sender in self.heard_from:
                     self.heard_from[sender] = now
         self._heard_at = now

@@ -65,7 +65,7 @@ class Roles:
         self.patience_s = self.silent_s
         self.since = self.now
         self._heard_leader = self._heard = float("-inf")
-        self._deposed_at = float("-inf")
+        self._deposed_at = self._deaf_until = float("-inf")
         self._peer: Heard | None = None
 
     @property
@@ -126,8 +126,10 @@ class Roles:
         if self.role is Role.WAITS:
             if now - self.since >= (FIRST_WAITS_S if self.is_first else SECOND_WAITS_S):
                 self._lead(now, "no other box leads", int(reaches))
-        elif self.role is Role.FOLLOWS and reaches:
-            if now > self.takes_over_at(is_ready):
+        elif self.role is Role.FOLLOWS:
+            if not reaches:
+                self._deaf_until = now
+            elif now > self.takes_over_at(is_ready):
                 self.takeovers += 1
                 self._lead(now, SILENCE)
         elif self.role is Role.YIELDS and now - self.since > YIELDS_S:
@@ -137,9 +139,13 @@ class Roles:
             self._become(Role.FOLLOWS, now, CABLE)
 
     def takes_over_at(self, is_ready: bool) -> float:
-        """When a follower that hears nothing more of the leader takes over."""
+        """When a follower that hears nothing more of the leader takes over.
+
+        Silence counts from when this box could hear: of a cable that comes back, a datagram comes first that
+        waited in the network for an address to answer.
+        """
         patience_s = self.patience_s if is_ready else max(UNREADY_WAITS_S, self.patience_s)
-        return max(self._heard_leader, self.since) + patience_s
+        return max(self._heard_leader, self._deaf_until, self.since) + patience_s
 
     def give_back(self, now: float) -> bool:
         """Ask the other box to lead, which could; whether it is asked."""

@@ -47,7 +47,7 @@ _AT_ONCE = 3  # ticks that a follower runs before it looks at the network again
 _REST_S = 0.001  # between as many, when it is far behind: others need the processor too
 _MOST_BEHIND = 25  # messages, so some 0.5 s: a jump that far is better than no dance
 _CALL_EACH_S, _CALLS_FOR_S = 0.25, 3.0  # after that a wearable greets by itself
-_OWN_STATE_S = 1.0  # a box that lost the lead may take it back from where it stood, until it follows
+_OWN_STATE_S = 0.5  # so long after its last frame a box that lost the lead may take it back, until it follows
 _FRESH_LOOK_S = 0.004
 _LATE_S = TICK_S / 2.0  # a frame that left later counts from when it left: its box was held up, and lives
 _GIVE_EACH_S = 1.0
@@ -130,7 +130,7 @@ class PairedStage:
         self._last = 0, 0.0  # tick, deadline of the newest one that was followed
         self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
         self._role = self.pair.roles.role
-        self._led_until = self._took_over_at = self._call_at = float("-inf")
+        self._spoke_at = self._took_over_at = self._call_at = float("-inf")
         self._looked_at = self._beat_at = 0.0
         self.resyncs = 0
         self._hear_leader()
@@ -229,7 +229,7 @@ class PairedStage:
         else:
             time.sleep(_REST_S)
         follows = self._has_danced and self.pair.behind <= _MOST_BEHIND
-        own = now - self._led_until < _OWN_STATE_S
+        own = now - self._spoke_at < _OWN_STATE_S
         self.pair.is_ready = (follows or own) and not self._carrier.is_out
 
     def give_back(self, now: float) -> tuple[bool, str]:
@@ -301,7 +301,7 @@ class PairedStage:
             return
         self._say(self._sentence(role))
         if before is Role.LEADS:
-            self._has_danced, self._led_until = False, now
+            self._has_danced = False
             self._hear_leader()
         self._write_part(now)
 
@@ -339,7 +339,7 @@ class PairedStage:
         if (
             roles.leads
             and now >= self._give_at
-            and carrier.is_heard_nonetheless(now, roles.heard, self.pair.heard_from)
+            and carrier.is_heard_nonetheless(now, self.pair.came_after, self.pair.heard_from)
         ):
             self._give_at = now + _GIVE_EACH_S
             self.give_back(now)
@@ -350,7 +350,8 @@ class PairedStage:
 
     def _write_part(self, now: float) -> None:
         roles = self.pair.roles
-        speaks = roles.leads and self._carrier.may_speak(now, roles.heard)
+        if speaks := roles.leads and self._carrier.may_speak(now, roles.heard):
+            self._spoke_at = now
         flags = roles.leads, speaks, self.pair.is_ready, roles.peer_lives(now)
         self._part.write(BoxPart(*flags, roles.epoch, now))
 
@@ -367,7 +368,7 @@ class PairedStage:
         except DAMAGED as error:
             self._lose_step(f"The leader's state does not fit here ({type(error).__name__}: {error}).")
             return
-        self._has_danced, self._led_until = True, float("-inf")
+        self._has_danced, self._spoke_at = True, float("-inf")
         self._comparison = Comparison(0.0, TOLERANCE_DEGREES)
 
     def _run(self, message: bytes, clock: TickClock, pulse: Callable[[float, float], None]) -> None:

@@ -131,6 +131,21 @@ def test_a_follower_whose_cable_is_out_leaves_the_lead_where_it_is() -> None:
     assert one.role is Role.FOLLOWS and one.epoch == 3
 
 
+def test_a_follower_whose_cable_comes_back_takes_no_leader_for_silent_whose_datagram_was_held_up() -> None:
+    """Datagrams wait in the network until an address answers, and come one after the other."""
+    one = following(epoch=3)
+    one.look(1.0, True, reaches=False)
+    late_s = 0.09
+    one.hear(Heard(Role.LEADS, 4, True, 1.002 - late_s), 1.002, True)
+    one.look(1.002, True)
+    assert one.role is Role.FOLLOWS
+    one.hear(Heard(Role.LEADS, 4, True, 1.01), 1.02, True)
+    one.look(1.057, True)
+    assert one.role is Role.FOLLOWS
+    one.look(1.059, True)
+    assert one.leads, "the leader was heard, and is silent"
+
+
 def test_a_follower_that_took_over_before_its_card_told_of_the_cable_steps_back() -> None:
     first, second = following(True, epoch=3), following(epoch=3)
     second.look(1.0, True)

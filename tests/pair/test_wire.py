@@ -194,6 +194,19 @@ def test_a_box_that_was_held_up_takes_none_for_silent_and_a_late_datagram_for_no
     one.close(), other.close()
 
 
+def test_a_datagram_that_waited_here_says_nothing_of_the_time_since_the_look_before() -> None:
+    """It came while the cable was still in, and is read once it is out."""
+    clock = [0.0]
+    one, other = leading_pair(clock)
+    clock[0] = 1.02
+    other.look(1.02)
+    one.beat(1.02)
+    clock[0] = 1.06
+    other.look(1.06)
+    assert other.roles.heard == 1.06 and other.came_after == 1.02
+    one.close(), other.close()
+
+
 def leading_pair(clock: list[float]) -> tuple[Pair, Pair]:
     """The first box leads, and the frame of 1.000 has left; the second one is ready."""
     one, other = pair_of(KEY, KEY, clock=clock)
