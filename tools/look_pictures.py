@@ -1,4 +1,7 @@
-"""docs/pictures/look*.png, by `python -m tools.look_pictures [folder]`: what each look looks like."""
+"""docs/pictures/look*.png, by `python -m tools.look_pictures [folder]`: what each look looks like.
+
+From those pictures it makes the small ones on the page's buttons, one a style.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,7 @@ HELD, COLOURS = "lShldr", 256
 UPRIGHT, TOGETHER_S = (320, 400), 49.6  # for the four looks side by side
 STROKES_S, STROKES_STEP_S, SMALL = 30.0, 0.2, (192, 108)  # the dance whose strokes ink's paper has kept
 SHOW = default_show_path()
+SMALL_ONES, SMALL_SIZE, QUALITY = Path("appliance/console/page/looks"), (192, 144), 60  # 2 kB each
 Turns = dict[str, tuple[tuple[float, float, float], float]]  # joint: axis, degrees
 _DOWN: Turns = {"lShldr": ((0, 0, 1), -72), "rShldr": ((0, 0, 1), 72)}
 BODY: tuple[tuple[float, Turns], ...] = (  # where the camera stands, degrees; the pose
@@ -93,6 +97,20 @@ def draw_looks(folder: Path) -> list[Path]:
     return paths
 
 
+def draw_small_ones(pictures: Path, folder: Path = SMALL_ONES) -> list[Path]:
+    """Cut the figure out of the picture of each style, for the page's buttons; return their paths."""
+    from PIL import Image as Files
+
+    folder.mkdir(exist_ok=True)
+    paths = [folder / f"{style}.webp" for style in STYLES]
+    for path in paths:
+        whole = Files.open(pictures / f"look-{path.stem}.png").convert("RGB")
+        left = (whole.width - whole.height * SMALL_SIZE[0] / SMALL_SIZE[1]) / 2
+        part = (left, 0.0, whole.width - left, float(whole.height))
+        whole.resize(SMALL_SIZE, Files.Resampling.LANCZOS, part).save(path, quality=QUALITY, method=6)
+    return paths
+
+
 def _body(ctx: moderngl.Context, recording: Recording) -> Image:
     """The plaster figure in the poses of BODY, beside each other."""
     skeleton, pictures = recording.skeleton, []
@@ -146,5 +164,6 @@ def _side_by_side(ctx: moderngl.Context, recording: Recording, holds: Floats | N
 
 
 if __name__ == "__main__":
-    for path in draw_looks(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures")):
+    into = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures")
+    for path in [*draw_looks(into), *draw_small_ones(into)]:
         print(f"{path} ({path.stat().st_size // 1000} kB)")

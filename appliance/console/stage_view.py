@@ -28,6 +28,16 @@ from appliance.show_control.status_messages import SeenFacts
 
 STALE_S = 0.5
 _LOOK_S = 0.1
+_OF_A_CUE = (
+    "name",
+    "look",
+    "lights",
+    "phrase",
+    "hands",
+    "master",
+    "fade_s",
+    "at",
+)  # for the cue list
 
 
 class StageView:
@@ -146,6 +156,8 @@ def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:
         "most_iterations": facts["most_iterations"],
         "rehearsal": facts["rehearsal"],
         "motion": facts.get("motion", {}),
+        "cues": [{key: one[key] for key in _OF_A_CUE if one.get(key) is not None} for one in facts["cues"]],
+        "look_styles": facts.get("look_styles", {}),
         "springs": facts.get("springs", []),
         "springs_feedback": facts.get("springs_feedback", {}),
         "has_strings": facts.get("has_strings", False),

@@ -57,6 +57,7 @@ class Facts:
     goes_on: bool = False
     rehearsal: bool = False  # its sensors are emulated: nothing is kept
     cards: tuple[str, ...] = ()
+    look_styles: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  # style, own colours
     motion: Mapping[str, Any] = field(default_factory=dict)  # sources that are made ahead, as in show.yaml
     trackers: Mapping[str, Sequence[str]] = field(default_factory=dict)  # joints that each VMC tracker moves
 

@@ -14,6 +14,7 @@ from appliance.outputs.puppet_facts import HandFacts, PuppetFacts
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show.box import BoxConfig
 from appliance.show.hand import HandConfig
+from appliance.show.look import LookConfig, looks_by_name
 from appliance.show.show import Show
 from appliance.show.springs import springs_by_name
 from appliance.stage.health import Health
@@ -46,6 +47,7 @@ def facts_of(
         phrases=names["phrase"],
         cues=tuple(cue.model_dump(mode="json") for cue in config.cues),
         looks=names["look"],
+        look_styles={name: _style(look) for name, look in looks_by_name(config.looks).items()},
         lights=names["lights"],
         springs=names["springs"],
         springs_feedback={name: one.feedback for name, one in springs_by_name(config.springs).items()},
@@ -63,6 +65,13 @@ def facts_of(
             name: section.model_dump(mode="json", by_alias=True)
             for name, section in config.motion.made_sources.items()
         },
+    )
+
+
+def _style(look: LookConfig) -> dict[str, str]:
+    """How a look is drawn: its style, and the colours that the show gives it."""
+    return look.model_dump(
+        mode="json", include={"style", "figure", "light", "accent", "background"}, exclude_none=True
     )
 
 

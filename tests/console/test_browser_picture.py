@@ -14,6 +14,8 @@ from playwright.sync_api import BrowserContext, expect
 from playwright.sync_api import Page as Tab
 from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
+from appliance.levers.table import LOOK
+from appliance.show.look import STYLES
 from tests.bundles import write_show
 from tests.console.browser import ON_BOTH, await_true, declared, press, unlocked_tab
 from tests.console.page import Page, box_with_page
@@ -25,6 +27,7 @@ from tests.system.test_projector import Projection
 pytestmark = pytest.mark.realtime
 
 RED = PAR + 1
+WALL_PART, RIG_PART = '[data-part="wall"]', '[data-part="rig"]'
 TRIES_FOR_S = 15.0  # after a drag the page tries its last step three times
 
 
@@ -54,6 +57,7 @@ def test_the_rig_shines_on_the_page_and_is_walked_while_the_show_stands(
 ) -> None:
     box, page, lamps = hall
     tab = unlocked_tab(context, page, "picture")
+    press(tab, RIG_PART)
     tab.evaluate(WALKED)
     expect(tab.locator("#lamps button")).to_have_text(["head · 100 %", "par · 100 %", "second · 100 %"])
     await_true(tab, f"({LIT})() > 200")
@@ -111,12 +115,26 @@ LIT = """() => {
 }"""
 
 
+def test_a_look_is_chosen_by_its_picture(context: BrowserContext, hall: tuple[Box, Page, Node]) -> None:
+    """Each look has the picture of its style; one that does not load has no width."""
+    box, page, _ = hall
+    tab = unlocked_tab(context, page, "picture")
+    pictures = tab.locator("#looks img")
+    expect(pictures).to_have_count(len(STYLES))
+    await_true(tab, "[...document.querySelectorAll('#looks img')].every((one) => one.naturalWidth > 100)")
+    assert len({one.get_attribute("src") for one in pictures.all()}) == len(STYLES)
+    press(tab, f"#looks >> text={STYLES[1]}")
+    wait_until(lambda: declared(box)[LOOK].value == STYLES[1], lambda: tab.inner_text("#said"))
+    expect(tab.locator(f'#looks button:has-text("{STYLES[1]}")')).to_have_attribute("aria-pressed", "true")
+
+
 @ON_BOTH
 def test_the_test_card_takes_the_place_of_the_dance_and_goes_again(
     context: BrowserContext, hall: tuple[Box, Page, Node], wall: Projection
 ) -> None:
     _, page, _ = hall
     tab = unlocked_tab(context, page, "picture")
+    press(tab, WALL_PART)
     expect(tab.locator("#test_card")).to_have_text(re.compile("Test card|Testbild|Mire"))
     expect(tab.locator("#info")).to_have_text(re.compile("Figures|Zahlen|Chiffres"))
     for on in (True, False):
@@ -129,6 +147,7 @@ def test_a_corner_follows_the_finger_on_the_wall(
 ) -> None:
     box, page, _ = hall
     tab = unlocked_tab(context, page, "picture")
+    press(tab, WALL_PART)
     switch(tab, wall, "#grid", lambda picture: picture[:3, :3].any(), True)
     pull(tab, "#corners button >> nth=0", lambda: _corner(box), (0.25, 0.25))
     wall.await_picture(lambda picture: not np.any(picture[:12, :20]))
@@ -144,7 +163,9 @@ def test_a_corner_follows_the_finger_on_the_wall(
     expect(tab.locator("#corners-shape")).to_have_attribute("points", re.compile(r"^0\.2\d+,0\.2\d+ 1,0 "))
     repeat(tab, lambda: hold(tab, "#corners-reset"), lambda: _corner(box) == (0.0, 0.0))
     switch(tab, wall, "#grid", lambda picture: picture[:3, :3].any(), False)
+    press(tab, RIG_PART)
     expect(tab.locator("#rig")).to_be_visible()
+    expect(tab.locator("#corners")).to_be_hidden()
     assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
@@ -153,6 +174,7 @@ def test_a_point_of_the_mesh_follows_the_finger_on_the_wall(
 ) -> None:
     box, page, _ = hall
     tab = unlocked_tab(context, page, "picture")
+    press(tab, WALL_PART)
     point = tab.locator('[data-point="12"]')
     expect(point).to_be_hidden()
     press(tab, "#mesh")

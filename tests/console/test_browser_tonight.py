@@ -256,6 +256,7 @@ def _measure(taps: Taps) -> None:
 
 def _corner(taps: Taps) -> None:
     taps.press('[data-page="picture"]')
+    taps.press('[data-part="wall"]')
     box = taps.tab.locator("#corners button").nth(0).bounding_box()
     assert box is not None
     drag(taps.tab, box["x"] + 30, box["y"] + 30, 20, 20)

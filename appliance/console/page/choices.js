@@ -1,19 +1,35 @@
 // Buttons of which one is in force. They stay the same elements: one that is replaced under a finger gets no click.
+// An entry may have a picture (its address) and colours.
 export function showChoices(parent, part, entries, act) {
   part.hidden = entries.length === 0;
-  const names = JSON.stringify(entries.map((one) => one.name));
-  if (parent.dataset.names !== names) {
-    parent.dataset.names = names;
+  const made = JSON.stringify(entries.map(({ name, picture, colours }) => [name, picture, colours]));
+  if (parent.dataset.made !== made) {
+    parent.dataset.made = made;
     parent.replaceChildren(...entries.map((one) => {
-      const button = document.createElement("button");
+      const button = document.createElement("button"), label = document.createElement("span");
       button.type = "button";
       button.addEventListener("click", () => act(one.name, button.getAttribute("aria-pressed") === "true"));
+      if (one.picture) button.append(pictureOf(one));
+      button.append(label);
       return button;
     }));
   }
   entries.forEach((one, place) => {
-    const button = parent.children[place], said = one.label ?? one.name;
-    if (button.textContent !== said) button.textContent = said;
+    const button = parent.children[place], label = button.lastChild, said = one.label ?? one.name;
+    if (label.textContent !== said) label.textContent = said;
     button.setAttribute("aria-pressed", one.now);
   });
+}
+
+function pictureOf({ picture, colours = [] }) {
+  const whole = document.createElement("span"), image = document.createElement("img");
+  whole.className = "tile";
+  image.src = picture;
+  image.alt = "";
+  whole.append(image, ...colours.map((colour) => {
+    const dot = document.createElement("i");
+    dot.style.background = colour;
+    return dot;
+  }));
+  return whole;
 }

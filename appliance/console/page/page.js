@@ -5,7 +5,7 @@ import { showChoices } from "./choices.js";
 import { goOn, showCues } from "./cues.js";
 import { Dance } from "./dance.js";
 import { command, initDevice, panic } from "./device.js";
-import { byId, every } from "./elements.js";
+import { byId, every, first } from "./elements.js";
 import { initFleet } from "./fleet.js";
 import { initHelp, readNight } from "./help.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
@@ -34,6 +34,8 @@ function show(page) {
     else button.removeAttribute("aria-current");
   }
   document.body.dataset.shown = known;
+  const tabs = first("nav"), tab = first(`[data-page="${known}"]`);
+  tabs.scrollLeft = tab.offsetLeft - (tabs.clientWidth - tab.offsetWidth) / 2;
   if (location.hash !== `#${known}`) history.replaceState(null, "", `#${known}`);
   scrollTo(0, 0);
   if (known === "happened") readHappened();
@@ -72,7 +74,7 @@ function verdict() {
   const said = { ...values };
   if ("since" in said) said.since = clock(said.since);
   if ("rate" in said) said.rate = number(said.rate, 1);
-  if (key === "fallbacks") said.message = beginning(spoken(value.fallbacks.find((one) => one.active) ?? said));
+  if (key === "fallbacks") said.message = beginning(value.fallbacks.find((one) => one.active) ?? said);
   setText(byId("verdict"), words(`verdict_${key}`, said));
 }
 
@@ -85,7 +87,10 @@ function spoken({ name, about, message: said }) {
 }
 
 // The first clause: the slot below has the whole sentence.
-const beginning = (sentence) => `${sentence.split(/\s?[.:;] /)[0].replace(/\.$/, "")}.`;
+function beginning(fallback) {
+  const sentence = spoken(fallback), lead = `${fallback.about}: `, at = sentence.startsWith(lead) ? lead.length : 0;
+  return `${sentence.slice(0, at)}${sentence.slice(at).split(/\s?[.:;] /)[0].replace(/\.$/, "")}.`;
+}
 
 function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
@@ -125,7 +130,8 @@ function tonight(value) {
   }));
   showMidi(value.remote ?? {});
   showCues(value);
-  showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
+  const styles = dance.show?.look_styles ?? {};
+  showChoices(byId("looks"), byId("looks-part"), value.looks.map((one) => drawn(one, styles[one.name])), (name) => command("/look", name));
   const cards = value.cards.map((one) => one.name === "none" ? { ...one, label: words("card_none") } : one);
   showChoices(byId("overlays"), byId("overlays-part"), cards, (name) => command("/card", name));
   if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
@@ -139,6 +145,13 @@ function tonight(value) {
   const active = value.fallbacks.filter((one) => one.active);
   byId("slot-none").hidden = active.length > 0;
   byId("fallbacks-now").replaceChildren(...active.map(fallbackItem));
+}
+
+// A look with the picture of its style, and the colours that the show gives it.
+function drawn(look, style) {
+  if (!style) return look;
+  const { style: name, ...colours } = style;
+  return { ...look, picture: `/looks/${name}.webp`, colours: Object.values(colours) };
 }
 
 function fallbackItem(fallback) {

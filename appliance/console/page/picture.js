@@ -1,6 +1,6 @@
-// Picture: brightness, grid, test card, figures, and corners that move on the wall as far as a finger moves here.
+// Picture, in three parts: looks and cards; the wall; the rig (rig.js). The wall: brightness, grid, test card, figures, and corners that move on the wall as far as a finger moves here.
 import { command, say } from "./device.js";
-import { byId, first } from "./elements.js";
+import { byId, every, first } from "./elements.js";
 import { held } from "./hold.js";
 import { words } from "./words.js";
 
@@ -11,6 +11,8 @@ const OWN_MS = 2500; // the projector tells once a second: until then this page'
 const before = []; // for undo: the corners and the mesh, or the pull of one of its points, before each change made here
 const MESH = 5; // points across and down
 const INNER = [...Array(MESH * MESH).keys()].filter((place) => ![0, MESH - 1, MESH * (MESH - 1), MESH * MESH - 1].includes(place));
+const PARTS = ["looks", "wall", "rig"];
+let part = "looks"; // as it was chosen here; one that the box does not have gives way to the first that it has
 let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]), pulls = [];
 
 // A handle: its place, how it is drawn under a finger, and the order for a step.
@@ -34,6 +36,12 @@ const BLEND = {
 };
 
 export function initPicture() {
+  for (const button of every("#picture-parts button")) {
+    button.addEventListener("click", () => {
+      part = button.dataset.part;
+      showParts();
+    });
+  }
   for (const id of SWITCHES) {
     byId(id).addEventListener("click", () => switchOn(id, `/projector/${id}`, byId(id).getAttribute("aria-pressed") !== "true"));
   }
@@ -73,8 +81,10 @@ export function initPicture() {
 export function showPicture(value) {
   const runs = (name) => value.processes.some((one) => one.process === name && !one.late);
   const projects = runs("projector");
-  first('[data-page="picture"]').hidden = !projects && !runs("lights") && value.looks.length === 0;
-  byId("wall-part").hidden = !projects;
+  const has = { looks: value.looks.length > 0, wall: projects, rig: runs("lights") };
+  for (const name of PARTS) first(`[data-part="${name}"]`).hidden = !has[name];
+  first('[data-page="picture"]').hidden = !PARTS.some((name) => has[name]);
+  showParts();
   wall = value.wall;
   if (!wall?.corners || performance.now() < ownUntil) return;
   if (document.activeElement !== byId("brightness")) byId("brightness").value = Math.round(100 * wall.brightness);
@@ -84,6 +94,14 @@ export function showPicture(value) {
   for (const [id, [, said]] of Object.entries(BLEND)) if (wall.overlap) byId(id).textContent = said(wall[id]);
   pulls = wall.warp ?? [];
   put(wall.corners);
+}
+
+function showParts() {
+  const there = PARTS.filter((name) => !first(`[data-part="${name}"]`).hidden), chosen = there.includes(part) ? part : there[0];
+  for (const name of PARTS) {
+    first(`[data-part="${name}"]`).setAttribute("aria-pressed", String(name === chosen));
+    byId(`picture-${name}`).hidden = name !== chosen;
+  }
 }
 
 function tellBrightness() { byId("brightness-said").textContent = `${byId("brightness").value} %`; }

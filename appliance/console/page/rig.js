@@ -16,21 +16,18 @@ export function initRig() {
   setInterval(look, LOOK_MS);
 }
 
-// Only where lights run.
 export function showRig(value) {
   isLit = value.processes.some((one) => one.process === "lights" && !one.late);
-  if (!isLit) byId("rig-part").hidden = true;
 }
 
 async function look() {
-  if (!isLit || isAsking || document.hidden || byId("picture").hidden) return;
+  if (!isLit || isAsking || document.hidden || byId("rig").offsetParent === null) return;
   isAsking = true;
   const answer = await request("/api/rig");
   isAsking = false;
   if (answer.status !== 200) return;
   beams = answer.value.beams;
   const walk = answer.value.walk;
-  byId("rig-part").hidden = beams.length === 0;
   byId("rig-said").textContent = walk && words("rig_now", { description: walk });
   byId("rig-walk").hidden = Boolean(walk);
   byId("rig-end").hidden = !walk;
