@@ -133,7 +133,7 @@ class Roles:
                 self.takeovers += 1
                 self._lead(now, SILENCE)
         elif self.role is Role.YIELDS and now - self.since > YIELDS_S:
-            self._lead(now, "the other one did not take it")
+            self._lead(now, "the other one did not take it", int(reaches))
         elif self.leads and not reaches and self.why == SILENCE and now - self.since < CABLE_S:
             self.epoch -= 1
             self._become(Role.FOLLOWS, now, CABLE)

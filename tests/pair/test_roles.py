@@ -116,6 +116,19 @@ def test_a_lead_that_nobody_takes_is_taken_up_again() -> None:
     assert one.leads
 
 
+def test_a_box_that_reaches_nobody_does_not_take_its_lead_back_from_the_one_that_took_over() -> None:
+    """Its question was lost with the cable; the other box has found out by the silence, in the same moment."""
+    first, second = leading(), following()
+    first.hear(Heard(Role.FOLLOWS, 1, True), 7.0, True)
+    assert first.give_back(7.05)
+    first.look(7.05 + YIELDS_S + 0.001, True, reaches=False)
+    second.look(7.2, True)
+    assert first.leads and second.leads
+    second.hear(Heard(Role.LEADS, first.epoch, True), 8.0, True)
+    first.hear(Heard(Role.LEADS, second.epoch, True), 8.0, True)
+    assert second.leads and not first.leads
+
+
 def test_a_lead_that_was_short_makes_the_next_takeover_slower() -> None:
     one = following()
     one.look(1.0, True)
