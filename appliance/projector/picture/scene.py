@@ -171,6 +171,7 @@ class Easel:
         self._videos: dict[str, Video] = {}
         self._canvases: dict[str, Target] = {}
         self._buffers: list[moderngl.Buffer] = []
+        self._tables: list[moderngl.Texture] = []
         self._drawings: list[Drawing] = []
         self._melt: dict[str, Any] = {}
         self.melt(0.0, 0.0)
@@ -243,6 +244,13 @@ class Easel:
         self._buffers.append(self.ctx.buffer(packed(parts)))
         formats, *names = layout(parts)
         return [(self._buffers[-1], formats + ("/i" if instanced else ""), *names)]
+
+    def table(self, values: Floats) -> moderngl.Texture:
+        """Bring (rows, columns, 4) numbers onto the GPU, for shaders that fetch texels."""
+        texture = self.ctx.texture(values.shape[1::-1], 4, values.tobytes(), dtype="f4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._tables.append(texture)
+        return texture
 
     def indices(self, values: NDArray[np.int32]) -> moderngl.Buffer:
         """Bring the corners of triangles onto the GPU."""
@@ -346,7 +354,7 @@ class Easel:
     def release(self) -> None:
         shared: list[Any] = [self.body, *self._figures, self._coupled, self.noise]
         shared += [*self._canvases.values(), *self._backdrops.values(), *self._videos.values()]
-        for owned in (*self._drawings, *self._buffers, *shared):
+        for owned in (*self._drawings, *self._buffers, *self._tables, *shared):
             owned.release()
 
 

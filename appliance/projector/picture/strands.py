@@ -31,7 +31,7 @@ def ribbons_of(
     """
     first, _ = merged(body.positions, body.faces, 0.016)
     places, normals = body.positions[first], body.normals[first]
-    along = _along(skeleton, bind_positions)
+    along = along_limbs(skeleton, bind_positions)
     ways = np.einsum("vk,vkc->vc", body.weights[first], along[body.joints[first]])
     ways += TURN * np.cross(normals, ways)
     ways -= normals * np.sum(ways * normals, axis=1, keepdims=True)
@@ -105,7 +105,7 @@ def _tapered(runs_on: NDArray[np.bool_]) -> Floats:
     return np.asarray(np.clip(from_end, 0, 1), np.float32)
 
 
-def _along(skeleton: Skeleton, bind_positions: Array) -> Array:
+def along_limbs(skeleton: Skeleton, bind_positions: Array) -> Array:
     """(J, 3) along the body beyond each joint, to its longest branch; it runs on from its parent."""
     length, along = np.zeros(len(skeleton)), np.zeros((len(skeleton), 3))
     for joint, offset in skeleton.ends if skeleton.stance is None else ():  # else they point elsewhere

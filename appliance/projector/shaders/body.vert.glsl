@@ -17,8 +17,10 @@ out float open;
 out float mark;
 #ifdef BRUSH
 uniform highp sampler2D led;  // how hard the brush is pressed at each joint
+uniform highp sampler2D brush_ways;  // three rows: how far a place is along the joint's limb, and to two sides
 uniform float swell;
 out float pressed;
+out vec4 drawn;
 #endif
 
 void main() {
@@ -30,7 +32,13 @@ void main() {
     skin = in_position;
 #ifdef BRUSH
     pressed = 0.0;
-    for (int i = 0; i < 4; i++) pressed += in_weights[i] * texelFetch(led, ivec2(int(in_joints[i]), 0), 0).r;
+    drawn = vec4(0.0);
+    for (int i = 0; i < 4; i++) {
+        ivec2 joint = ivec2(int(in_joints[i]), 0);
+        pressed += in_weights[i] * texelFetch(led, joint, 0).r;
+        mat3x4 way = mat3x4(texelFetch(brush_ways, joint, 0), texelFetch(brush_ways, joint + ivec2(0, 1), 0), texelFetch(brush_ways, joint + ivec2(0, 2), 0));
+        drawn += in_weights[i] * vec4(vec4(in_position, 1.0) * way, in_weights[i]);
+    }
     place += normal * swell * (max(pressed, 0.25) - 0.4);  // fingers and toes stay whole
 #endif
     mark = held_at(in_joints, in_weights);

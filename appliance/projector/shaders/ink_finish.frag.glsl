@@ -16,7 +16,9 @@ uniform vec3 held_colour;
 uniform float fog;
 uniform float dry;  // 1: a fast limb is the mean of several moments, and its brush runs dry there
 uniform vec2 texel;
+uniform bool is_light;  // chalk: it does not spread, and catches on the grain
 #include wall
+#include ink_drawn
 
 // A mean of the pixels around: in a coarser picture an outline is steps, which would be drawn as such.
 vec4 soft(vec2 at) {
@@ -32,7 +34,7 @@ void main() {
 #else
     vec3 paper_colour = air_colour;
 #endif
-    vec3 blank = paper_colour * (0.95 + 0.10 * (sheet.r - 0.5) + 0.12 * rough);
+    vec3 blank = paper_colour * (0.95 + 0.10 * (sheet.r - 0.5) + 0.08 * rough);
     vec2 at = uv + (sheet.rg - 0.5) * reach, old = texture(kept, at).rg * (0.85 + 0.6 * rough);
     blank = mix(blank, mix(accent_colour, blank, 0.3), old.g);
     vec3 shown = mix(blank, accent_colour, old.r);
@@ -40,19 +42,21 @@ void main() {
     vec4 wet = texture(wet_picture, at);
     if (wet.r + wet.g + wet.b > 0.004) {
         vec4 ink = soft(at);
-        vec4 damp = texture(noise, vec2(uv.x * aspect, uv.y) * 1.1);  // where the sheet drinks
-        float drinks = fog * 2.0 * smoothstep(0.50, 0.66, damp.g), near = smoothstep(0.0, 0.25, wet.r);
-        float full = 0.6 * wet.r + 0.4 * ink.r + 0.25 * rough + 0.40 * drinks * near;
+        vec4 tooth = texture(noise, vec2(uv.x * aspect, uv.y) * 2.6);
+        float drinks = is_light ? 0.0 : fog * 2.0 * smoothstep(0.50, 0.66, tooth.r);
+        float full = 0.2 * wet.r + 0.8 * ink.r + 0.12 * (tooth.g - 0.5);
         float edge = max(0.06, 0.7 * fwidth(full));
-        float body = smoothstep(0.36 - edge, 0.36 + edge, full);
+        float body = smoothstep(0.26 - edge, 0.26 + edge, full);
         float dried = 1.0 - smoothstep(0.45, 0.8, wet.r);
-        float covers = clamp(body * (ink.r + 0.15 * dried + 0.40 * rough + 0.04), 0.0, 1.0);
-        float bristles = smoothstep(0.30, 0.62, texture(noise, vec2(uv.x * aspect, uv.y) * vec2(3.0, 9.0)).b + 0.5 * rough);
+        float laid = (ink.r / max(body, 0.4) - DRAWN) / (1.0 - DRAWN), catches = 0.6 * tooth.a + 0.4 * tooth.g;
+        float covers = is_light ? 1.7 * (1.45 * laid - catches) : laid + 0.15 * dried + 0.25 * (tooth.g - 0.5);
+        covers = body * clamp(covers, 0.0, 1.0);
+        float bristles = smoothstep(0.30, 0.62, tooth.g);
         covers = max(covers, dry * (1.0 - body) * smoothstep(0.03, 0.40, ink.r) * bristles * 0.85);
-        float echo = smoothstep(0.02, 0.7, 0.55 * wet.g + 0.45 * ink.g) * (0.68 + 0.75 * rough);
+        float echo = smoothstep(0.02, 0.7, 0.55 * wet.g + 0.45 * ink.g) * (is_light ? smoothstep(0.45, 0.85, 1.0 - catches) : 0.68 + 0.6 * (tooth.g - 0.5));
         float stroke = ink.b * (0.85 + 0.6 * rough) * (1.0 - 0.6 * covers);
-        shown = mix(shown, light_colour, fog * (0.35 + 0.8 * drinks) * wet.r * (1.0 - body));
-        shown = mix(shown, mix(light_colour, blank, 0.35), clamp(echo, 0.0, 1.0) * (1.0 - 0.8 * body * smoothstep(0.1, 0.3, ink.r)));  // thin ink shows paper, not the echo
+        shown = mix(shown, light_colour, fog * (is_light ? smoothstep(0.4, 0.8, 1.0 - catches) : 0.35 + 0.8 * drinks) * wet.r * (1.0 - body));
+        shown = mix(shown, mix(light_colour, blank, 0.35), clamp(echo, 0.0, 1.0) * (1.0 - body));  // thin ink shows paper, not the echo
         shown = mix(shown, accent_colour, clamp(max(stroke - old.r, 0.0), 0.0, 1.0));
         float mark = clamp((wet.a + ink.a) / max(wet.r + ink.r, 0.01), 0.0, 1.0);
         shown = mix(shown, mix(figure_colour, held_colour, mark), covers);

@@ -4,8 +4,6 @@
 uniform vec3 head_at;
 uniform mat3 head_axes;
 uniform float head_drawn;  // 0: no person's head, or it has melted
-uniform vec3 lamp;
-uniform bool is_light;
 const float HEAD_REACH = 0.09;
 
 float stroke(vec2 at, vec2 from, vec2 to, vec2 widths) {
@@ -14,18 +12,22 @@ float stroke(vec2 at, vec2 from, vec2 to, vec2 widths) {
     return 1.0 - smoothstep(0.5 * wide, 1.1 * wide, length(at - from - along * way));
 }
 
-float head_ink(vec3 at, vec3 n, float outline) {
+float head_ink(vec3 at, vec3 n, float body) {
     float side = abs(at.z), front = step(0.015, at.x), wide = mix(0.7, 1.15, pressed);
     float bristle = texture(noise, vec2(0.5 * (at.y - at.x) + 0.37, 5.0 * at.z + 0.21)).b;
     float hair = smoothstep(-0.003, 0.003, dot(at.xy - vec2(0.043, 0.034), vec2(-0.72, 0.69)) + 0.014 * (bristle - 0.5));
     float under = 1.0 - smoothstep(-0.006, 0.004, dot(at.xy - vec2(-0.008, -0.034), vec2(0.588, 0.809)));
     float nose = (1.0 - smoothstep(0.012, 0.024, side)) * smoothstep(0.036, 0.046, at.x);
     float shade = 1.0 - smoothstep(-0.40, 0.25, dot(n, lamp));
-    float drawn = 0.70 * shade * (1.0 - 0.7 * nose);
-    drawn = max(drawn, 0.85 * front * stroke(vec2(side, at.y), vec2(0.011, 0.002), vec2(0.036, 0.0035), wide * vec2(0.0050, 0.0018)));
-    drawn = max(drawn, 0.40 * front * (1.0 - smoothstep(0.0025, 0.0060, length(vec2(0.5, 1.0) * (vec2(side, at.y) - vec2(0.020, -0.0105))))));
-    float strand = smoothstep(0.34, 0.52, bristle), edge = outline * outline;
-    if (is_light) return mix(mix(1.0, 0.34, max(drawn, 0.7 * under)), mix(0.80, 0.62, strand), hair) + 0.3 * edge;
-    drawn = max(max(drawn, edge), max(under, hair * max(mix(0.62, 1.0, strand), 0.25 + shade)));
-    return mix(0.34, 1.08, drawn);
+    float brow = stroke(vec2(side, at.y), vec2(0.011, 0.002), vec2(0.036, 0.0035), wide * vec2(0.0050, 0.0018));
+    float lid = 1.0 - smoothstep(0.0025, 0.0060, length(vec2(0.5, 1.0) * (vec2(side, at.y) - vec2(0.020, -0.0105))));
+    float strand = smoothstep(0.34, 0.52, bristle);
+    if (is_light) {
+        float mouth = stroke(vec2(side, at.y), vec2(0.0, -0.043), vec2(0.013, -0.0415), vec2(0.0050, 0.0020));
+        float left_out = max(0.9 * under, front * max(max(0.75 * brow, 0.6 * lid), 0.7 * mouth));
+        return mix(max(body, 0.16 + 0.34 * (1.0 - shade)), body * (0.15 + 0.6 * strand), hair) * (1.0 - left_out);
+    }
+    float drawn = max(0.70 * shade * (1.0 - 0.7 * nose), front * max(0.85 * brow, 0.40 * lid));
+    drawn = max(drawn, max(under, hair * max(mix(0.78, 1.0, strand), 0.25 + shade)));
+    return mix(0.12, 1.0, drawn);
 }

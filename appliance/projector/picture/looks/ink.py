@@ -11,6 +11,7 @@ import numpy as np
 from appliance.body.head import head_frame
 from appliance.body.rest_pose import anatomy_of
 from appliance.outputs.coupling import ROW_S, ROWS
+from appliance.outputs.joint_frame import Floats
 from appliance.pose.anatomy import Anatomy
 from appliance.projector.picture.accents import accents, pressure
 from appliance.projector.picture.glow import Glow
@@ -18,6 +19,7 @@ from appliance.projector.picture.kept_strokes import KeptStrokes
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.particles import traced
 from appliance.projector.picture.scene import Easel, Scene
+from appliance.projector.picture.strands import along_limbs
 from appliance.projector.picture.targets import Target, of_lines
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
@@ -47,6 +49,7 @@ class Ink:
         self._splashes = easel.drawing("splash", "splash", parts=parts)
         self._head = _head(easel)
         anatomy = Anatomy(easel.skeleton)
+        self._ways = easel.table(_brush_ways(easel, anatomy))
         self._ends = [anatomy.chain(first)[-1] for _, first in anatomy.limbs()]
         self._kept = KeptStrokes(easel)
         self._glow = Glow(easel)
@@ -65,15 +68,16 @@ class Ink:
         }
         easel.weigh(pressure)
         moments = scene.shutter(wall)
-        head = self._head | {"lamp": scene.lamp}
+        head = self._head | {"lamp": scene.lamp, "brush_ways": self._ways}
         head["head_drawn"] *= max(0.0, 1.0 - FACE_SINKS * scene.melt)
-        head["is_light"] = bool(colours.figure.sum() > colours.background.sum())
+        inputs["is_light"] = bool(colours.figure.sum() > colours.background.sum())
+        head["pixel_height"] = scene.pixel_height(picture.size[1])
 
         def draw(back: float) -> None:
             picture.start()
             picture.keep("ra")
             easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            own = {"row": 0, "level": 1.0, "hollow": 1.0, "swell": SWELL, "back": back}
+            own = {"row": 0, "level": 1.0, "swell": SWELL, "back": back}
             easel.draw_figures(self._figure, inputs | own | head)
             picture.keep("rgba")
             picture.finish()
@@ -130,7 +134,6 @@ class Ink:
             inputs |= {
                 "row": round((rows - 1) * echo / ECHOES),
                 "level": 0.85 * (1 - echo / (ECHOES + 1)) ** 1.2,
-                "hollow": 0.0,
                 "held": 0.0,
             }
             easel.draw_figures(self._echo, inputs)
@@ -169,6 +172,23 @@ class Ink:
         self._easel.draw_figures(self._strokes, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
         if any(strength for *_, strength in inputs["splash_at"]):
             self._splashes.draw(inputs, moderngl.TRIANGLE_STRIP, 4, MOST_SPLASHES * DROPS)
+
+
+def _brush_ways(easel: Easel, anatomy: Anatomy) -> Floats:
+    """(3, J, 4) planes: how far a place of the rest pose is along each joint's limb, and from its axis to two
+    sides, in figure heights."""
+    along = along_limbs(easel.skeleton, easel.bind_positions)
+    trunk = easel.bind_positions[anatomy.trunk[-1]] - easel.bind_positions[anatomy.trunk[0]]
+    if np.linalg.norm(trunk) > 0.0:
+        chains = [anatomy.chain(first) for _, first in anatomy.limbs()]
+        shoulders = [joint for chain in chains for joint in chain[: anatomy.limb_start(chain)]]
+        along[[*anatomy.trunk, *shoulders]] = trunk / np.linalg.norm(trunk)
+    aside = np.cross(along, (0.12, 0.1, 1.0))
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    axes = np.stack([along, aside, np.cross(along, aside)])
+    off = -np.einsum("axj,xj->ax", axes, easel.bind_positions)
+    off[0] = 0.0  # along a limb the next joint goes on where this one ends
+    return np.concatenate([axes, off[..., None]], axis=2).astype(np.float32)
 
 
 def _head(easel: Easel) -> dict[str, Any]:
