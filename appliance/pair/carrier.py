@@ -14,6 +14,7 @@ from appliance.show.box import OutputsConfig
 
 _ROUTES, _CARDS = Path("/proc/net/route"), Path("/sys/class/net")
 _SETTLE_S = 0.08  # a box hears the other one within that time
+_LIVED_S = 1.0  # a box that was heard so shortly before the cable was out may lead by now
 _FORWARDS_S = 32.0  # IEEE 802.1D: a switch may pass nothing on for two times 15 s after a cable came in
 _ON_THE_WAY_S = 0.004  # a datagram from an unknown link, so soon after the cable was out, came by the cable
 _FIND_EACH_S = 0.25
@@ -40,7 +41,7 @@ class Carrier:
         self._beside: list[str] = []  # addresses of the other box that other cards lead to
         self._cards: dict[Path, _Network] = {}
         self.is_out, self.is_up = False, not self._receivers
-        self._find_at = self._changed_at = float("-inf")
+        self._find_at = self._changed_at = self._out_at = float("-inf")
 
     def look(self, now: float) -> None:
         """Once a tick: some 10 microseconds."""
@@ -53,6 +54,7 @@ class Carrier:
         self.is_out = bool(self._cards) and not self.is_up
         if was_out is not self.is_out:
             self._changed_at = now
+            self._out_at = now if self.is_out else self._out_at
 
     def _find(self) -> None:
         """Find the cards once; of an adapter that was unplugged the one that leads to the same network now.
@@ -81,9 +83,13 @@ class Carrier:
     def may_speak(self, now: float, heard: float) -> bool:
         """A leader whose cable came back is silent until it has heard the other box: that may lead by now.
 
-        heard: when that was last heard.
+        heard: when that was last heard. It takes up to a second where the network has forgotten an address
+        (the kernel asks for it once a second) while multicast passes at once, and longer behind a switch.
         """
-        return not self.is_out and (heard > self._changed_at or now - self._changed_at >= _SETTLE_S)
+        if self.is_out or heard > self._changed_at:
+            return not self.is_out
+        lived = heard > self._out_at - _LIVED_S
+        return now - self._changed_at >= (_FORWARDS_S if lived else _SETTLE_S)
 
     def is_heard_nonetheless(self, now: float, came_after: float, heard_from: Mapping[str, float]) -> bool:
         """Whether another link still joins the two boxes while the receivers' cable is out.

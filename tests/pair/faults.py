@@ -73,6 +73,12 @@ def pull_cable(hall: Hall, leader: str) -> Undo:
     return lambda: hall.plug_cable(leader)
 
 
+def pull_cable_for_long(hall: Hall, leader: str) -> Undo:
+    undo = pull_cable(hall, leader)
+    hall.forget(leader)
+    return undo
+
+
 def lose(hall: Hall, leader: str) -> Undo:
     hall.relay.set(loss=0.2, jitter_s=0.004)
     return hall.relay.set
@@ -99,7 +105,7 @@ def nothing(hall: Hall, leader: str) -> Undo:
     return lambda: None
 
 
-TAKEOVERS = (kill_stage, cut_power, hang, hang_all, pull_cable)
+TAKEOVERS = (kill_stage, cut_power, hang, hang_all, pull_cable, pull_cable_for_long)
 FAULTS = (*TAKEOVERS, lose, delay, follower_dies, follower_hangs, follower_cable, nothing)
 
 

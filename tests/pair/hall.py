@@ -424,6 +424,10 @@ class Hall:
         """Of the switch, at this box."""
         _ip("-n", self.hall.name, "link", "set", self.ends[address], "down")
 
+    def forget(self, address: str) -> None:
+        """As after a minute without an answer: the network has to ask for this box's card once more."""
+        _ip("-n", self.hall.name, "neigh", "flush", "to", address, "dev", "br0")
+
     def plug_cable(self, address: str) -> None:
         """Back in."""
         _ip("-n", self.hall.name, "link", "set", self.ends[address], "up")

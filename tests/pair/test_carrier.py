@@ -62,7 +62,18 @@ def test_a_leader_whose_cable_comes_back_listens_first(routes: Path, tmp_path: P
     assert not carrier.is_heard_nonetheless(2.1, 2.0, {}) and carrier.is_heard_nonetheless(2.1, 2.01, {})
     plugged(tmp_path, "eth0", "1")
     carrier.look(3.0)
-    assert not carrier.may_speak(3.05, 2.5) and carrier.may_speak(3.05, 3.01) and carrier.may_speak(3.1, 2.5)
+    assert not carrier.may_speak(34.0, 1.9) and carrier.may_speak(3.05, 3.01) and carrier.may_speak(35.1, 1.9)
+
+
+@pytest.mark.parametrize("heard", [NEVER, 0.5])
+def test_a_leader_that_was_alone_before_its_cable_was_out_speaks_soon_after_it_came_back(
+    routes: Path, tmp_path: Path, heard: float
+) -> None:
+    carrier = Carrier(["10.77.0.9"], routes, tmp_path)
+    for now, text in ((1.0, "1"), (2.0, "0"), (3.0, "1")):
+        plugged(tmp_path, "eth0", text)
+        carrier.look(now)
+    assert not carrier.may_speak(3.05, heard) and carrier.may_speak(3.1, heard)
 
 
 def test_a_leader_whose_cable_is_out_knows_at_once_that_another_link_is_whole(

@@ -15,7 +15,7 @@ from appliance.levers.table import MASTER
 from appliance.sensor.keys import create_keys
 from tests.bundles import write_show
 from tests.pair.faults import lost_in
-from tests.pair.hall import FIRST, SECOND, Hall
+from tests.pair.hall import FIRST, SECOND, Hall, other
 from tests.system.lit import RIG
 from tests.system.namespace import why_not
 from tests.system.processes import wait_until
@@ -94,16 +94,32 @@ def test_the_second_box_takes_over_and_gives_back(hall: Hall) -> None:
 
 def test_a_box_that_was_switched_off_follows_when_it_is_back(hall: Hall) -> None:
     leader = hall.leader
-    other = SECOND if leader == FIRST else FIRST
     hall.boxes[leader].cut_power()
-    wait_until(lambda: hall.boxes[other].part.leads, "no takeover")
+    wait_until(lambda: hall.boxes[other(leader)].part.leads, "no takeover")
     hall.switch_on(leader)
     hall.await_pair()
-    assert hall.leader == other
+    assert hall.leader == other(leader)
+
+
+def test_a_leader_whose_cable_was_out_for_long_sends_nothing_before_it_hears_the_other_one(
+    hall: Hall,
+) -> None:
+    """Multicast passes at once; the other box is heard once the network has asked for the address again."""
+    leader = hall.leader
+    follower = other(leader)
+    hall.pull_cable(leader)
+    hall.forget(leader)
+    wait_until(lambda: hall.boxes[follower].part.leads, "no takeover")
+    since = time.time()
+    hall.plug_cable(leader)
+    hall.await_pair()
+    assert hall.leader == follower
+    came = [(at, box) for seen in (hall.seen.osc, hall.seen.psn, hall.seen.sacn) for at, box, *_ in seen]
+    assert {box for at, box in came if at > since} == {follower}
 
 
 def test_a_box_with_another_show_does_not_follow(hall: Hall, tmp_path: Path) -> None:
-    follower = SECOND if hall.leader == FIRST else FIRST
+    follower = other(hall.leader)
     hall.boxes[follower].cut_power()
     hall.show, before = write_show(tmp_path / "other", [], name="Another"), hall.show
     hall.switch_on(follower)

@@ -117,7 +117,7 @@ def test_a_lead_that_nobody_takes_is_taken_up_again() -> None:
 
 
 def test_a_box_that_reaches_nobody_does_not_take_its_lead_back_from_the_one_that_took_over() -> None:
-    """Its question was lost with the cable; the other box has found out by the silence, in the same moment."""
+    """Its question was lost with the cable; the other box has found out by the silence in the same moment."""
     first, second = leading(), following()
     first.hear(Heard(Role.FOLLOWS, 1, True), 7.0, True)
     assert first.give_back(7.05)
