@@ -51,7 +51,7 @@ def at_rest(reported: str, now: float) -> str:
     value["processes"] = [one | {"late": 0} for one in value["processes"]]
     for sensor in value["sensors"]:
         if sensor["heard"]:
-            sensor |= {"rate_hz": 50.0, "loss": 0.0, "round_trip_s": 0.004}
+            sensor |= {"rate_hz": 50.0, "loss": 0.0, "round_trip_s": 0.004, "age_s": 0.01}
     judged = verdict(
         *(value["frames"], Status(**value["status"]), value["sensors"], [], value["since"], value["trouble"])
     )

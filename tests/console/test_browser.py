@@ -75,6 +75,8 @@ def test_an_evening_by_its_buttons(tab: Tab, venue: tuple[Box, Page]) -> None:
     press(tab, "#resume")
     wait_until(lambda: declared(box).going)
     expect(tab.locator("#go-name")).to_have_text("calm")
+    expect(tab.locator("#go-what")).to_have_text("lines · 0.1 s")
+    expect(tab.locator("#cues li").nth(1)).to_contain_text("ink · 50 % · 0.1 s")
     press(tab, "#go")
     wait_until(lambda: declared(box).cue == "calm")
     expect(tab.locator("#now-name")).to_have_text("calm")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -108,7 +109,13 @@ def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> Non
     press(tab, '[data-page="happened"]')
     expect(tab.locator("#happened-sum")).to_contain_text("late ticks")
     assert tab.evaluate("document.querySelector('#timeline').width") > 200
-    tab.locator("#happened-second").fill("0")
+    expect(tab.locator("#timeline-legend span")).to_have_count(5)
+    entries = tab.locator("#happened-events details").first
+    expect(entries.locator("li").first).to_contain_text(re.compile(r"\d\d:\d\d:\d\d(message|command)."))
+    at = tab.locator("#happened-second")
+    tab.locator("#timeline").click(position={"x": 34, "y": 60})  # where its axis begins
+    expect(at).to_have_value("0")
+    at.fill("0")
     press(tab, "#happened-dance")
     expect(tab.locator("#again")).to_be_visible()
     await_true(tab, "seen.tick > 0")

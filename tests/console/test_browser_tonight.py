@@ -75,6 +75,7 @@ def test_nothing_moves_when_fallbacks_come_and_go(tab: Tab, language: str) -> No
     await_box(tab)
     tab.evaluate(HEARD_WITH)
     say(tab, [])
+    expect(tab.locator("#slot-hands li")).to_contain_text(["lShldr"])  # the place is of use meanwhile
     before = tab.evaluate(PLACES, CONTROLS)
     assert all(width > 0 and height > 0 for _, _, _, width, height in before), before
     longest = max(EVERY, key=lambda name: len(EVERY[name].message))
@@ -89,6 +90,7 @@ def test_nothing_moves_when_fallbacks_come_and_go(tab: Tab, language: str) -> No
         say(tab, said)
         assert tab.evaluate(PLACES, CONTROLS) == before
     say(tab, several)
+    expect(tab.locator("#slot-hands")).to_be_hidden()
     for about in ("left-wrist", "10.0.0.9:9004"):
         expect(tab.locator("#fallbacks-now")).to_contain_text(about)
     say(tab, [{**fell("pair-taken"), "message": "Look; `bunraku pair back` gives the lead."}])
@@ -239,7 +241,7 @@ def _pair(taps: Taps) -> None:
 
 def _replace(taps: Taps) -> None:
     taps.press('[data-page="sensors"]')
-    taps.press("#cards article:first-child .changes button:nth-child(2)")
+    taps.press("#cards article:first-child >> text=Replace")
     assert taps.tab.locator("#change-spare").input_value() == "spare-1"
     taps.press("#change-send")
 

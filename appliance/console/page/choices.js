@@ -6,16 +6,15 @@ export function showChoices(parent, part, entries, act) {
   if (parent.dataset.made !== made) {
     parent.dataset.made = made;
     parent.replaceChildren(...entries.map((one) => {
-      const button = document.createElement("button"), label = document.createElement("span");
+      const button = document.createElement("button");
       button.type = "button";
       button.addEventListener("click", () => act(one.name, button.getAttribute("aria-pressed") === "true"));
-      if (one.picture) button.append(pictureOf(one));
-      button.append(label);
+      if (one.picture) button.append(pictureOf(one), document.createElement("span"));
       return button;
     }));
   }
   entries.forEach((one, place) => {
-    const button = parent.children[place], label = button.lastChild, said = one.label ?? one.name;
+    const button = parent.children[place], label = one.picture ? button.lastChild : button, said = one.label ?? one.name;
     if (label.textContent !== said) label.textContent = said;
     button.setAttribute("aria-pressed", one.now);
   });

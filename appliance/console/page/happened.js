@@ -2,12 +2,12 @@
 import { Dance } from "./dance.js";
 import { withPin } from "./device.js";
 import { byId } from "./elements.js";
-import { clock, locale, number, translated, words } from "./words.js";
+import { drawTimeline, secondAt, showLegend } from "./timeline.js";
+import { clock, day, exact, number, translated, words } from "./words.js";
 
 const HEAD_BYTES = 16, JOINT_BYTES = 32; // a frame's: dance.js
-const SLOWEST_MS = 20, MANY = 5; // what fills the timeline's height
-const INK = { late: "#ff7a66", skipped: "#f0b840", failed: "#d36bff", slowest: "#59636f", mark: "#f3ece0", order: "#58c27d" };
-const exact = (seconds) => new Date(1000 * seconds).toLocaleTimeString(locale, { hourCycle: "h23" });
+const TOGETHER_S = 0.1; // what a cue changes is noted within one tick
+const GROUPS_S = [60, 300, 900, 3600], MOST_GROUPS = 12;
 
 let runs = [], run = null, second = 0, again = null, dance = null;
 
@@ -25,7 +25,7 @@ export function initHappened() {
   slider.addEventListener("input", () => point(Number(slider.value)));
   canvas.addEventListener("click", (event) => {
     const box = canvas.getBoundingClientRect();
-    if (run) point(run.seconds * (event.clientX - box.left) / box.width);
+    if (run) point(secondAt(run, event.clientX - box.left, box.width));
   });
   addEventListener("resize", draw);
 }
@@ -36,10 +36,8 @@ export async function readHappened() {
   byId("happened-all").hidden = answer === null;
   if (answer === null) return;
   byId("happened-run").replaceChildren(...runs.map((one, place) => {
-    const option = document.createElement("option"), date = new Date(1000 * one.begun).toLocaleDateString(locale);
-    option.value = String(place);
-    option.textContent = `${date} ${clock(one.begun)} · ${one.show} · ${number(one.seconds / 60, 1)} min`;
-    return option;
+    const long = one.seconds < 5400 ? `${number(one.seconds / 60, 1)} min` : `${number(one.seconds / 3600, 1)} h`;
+    return new Option(`${day(one.begun)}, ${clock(one.begun)} · ${long} · ${one.show}`, String(place));
   }));
   byId("happened-run").value = runs.length - 1;
   choose(runs.at(-1));
@@ -60,15 +58,49 @@ function choose(chosen) {
   byId("happened-sum").textContent = words("happened_sum", {
     late: sum(run.late), skipped: sum(run.skipped), failed: sum(run.failed), slowest: number(Math.max(...run.slowest_ms), 1),
   });
-  byId("happened-events").replaceChildren(...run.events.toReversed().map(([at, kind, said]) => {
-    const item = document.createElement("li"), button = document.createElement("button");
-    button.type = "button";
-    button.textContent = exact(run.begun + at);
-    button.addEventListener("click", () => point(at));
-    item.append(button, ` ${words(`happened_${kind}`)}: ${said}`);
-    return item;
-  }));
+  byId("timeline").setAttribute("aria-label", `${words("timeline_label")}. ${byId("happened-sum").textContent}`);
+  showLegend(byId("timeline-legend"));
+  byId("happened-events").replaceChildren(...grouped(run.events).map(group));
   point(run.seconds - stretch());
+}
+
+// Entries of the same minutes together, the newest first. One that comes several times in a row is one with a count;
+// a cue is one with all that it changes.
+function grouped(events) {
+  const each = GROUPS_S.find((one) => run.seconds / one <= MOST_GROUPS) ?? GROUPS_S.at(-1), groups = [];
+  for (const [at, kind, said] of events) {
+    const begun = Math.floor((run.begun + at) / each) * each;
+    if (groups[0]?.begun !== begun) groups.unshift({ begun, entries: [] });
+    const [last] = groups[0].entries;
+    if (last?.kind === kind && last.said.at(-1) === said) last.times += 1;
+    else if (last?.kind === kind && at - last.at < TOGETHER_S) last.said.push(said);
+    else groups[0].entries.unshift({ at, kind, said: [said], times: 1 });
+  }
+  return groups;
+}
+
+function group({ begun, entries }, place) {
+  const whole = document.createElement("details"), head = document.createElement("summary"), list = document.createElement("ul");
+  const orders = entries.filter((one) => one.kind === "order").length;
+  whole.open = place === 0;
+  head.textContent = `${clock(begun)} · ${words("happened_entries", { orders, said: entries.length - orders })}`;
+  list.append(...entries.map(entry));
+  whole.append(head, list);
+  return whole;
+}
+
+function entry({ at, kind, said, times }) {
+  const item = document.createElement("li"), button = document.createElement("button"), what = document.createElement("small");
+  const text = document.createElement("span"), rest = document.createElement("span"), [first, ...others] = said.map(translated);
+  button.type = "button";
+  button.textContent = exact(run.begun + at);
+  button.addEventListener("click", () => point(at));
+  what.textContent = words(`happened_${kind}`);
+  item.dataset.kind = kind;
+  rest.textContent = others.join(" · ");
+  text.append(times > 1 ? `${first} ×${times}` : first, rest);
+  item.append(button, what, text);
+  return item;
 }
 
 function point(at) {
@@ -82,27 +114,7 @@ function point(at) {
 const part = () => new URLSearchParams({ run: run.number, from: second.toFixed(2), seconds: String(stretch()) });
 const stretch = () => Number(byId("happened-seconds").value);
 
-function draw() {
-  const canvas = byId("timeline"), ratio = Math.min(devicePixelRatio || 1, 2);
-  if (!run || canvas.offsetParent === null) return;
-  const wide = Math.round(canvas.clientWidth * ratio), high = Math.round(canvas.clientHeight * ratio);
-  [canvas.width, canvas.height] = [wide, high];
-  const ink = canvas.getContext("2d"), across = (at) => (at / run.seconds) * wide;
-  const step = across(run.bin_s), floor = high - 14 * ratio;
-  const bars = (values, most, colour) => {
-    ink.fillStyle = colour;
-    values.forEach((value, place) => {
-      const tall = value ? Math.max(2 * ratio, floor * Math.min(1, value / most)) : 0;
-      ink.fillRect(place * step, floor - tall, Math.max(1, step - 0.5), tall);
-    });
-  };
-  bars(run.slowest_ms, SLOWEST_MS, INK.slowest);
-  for (const what of ["late", "skipped", "failed"]) bars(run[what], MANY, INK[what]);
-  ink.fillStyle = INK.order;
-  for (const [at, kind] of run.events) if (kind === "order") ink.fillRect(across(at), floor + 3 * ratio, 2 * ratio, 9 * ratio);
-  ink.fillStyle = INK.mark;
-  ink.fillRect(across(second) - ratio, 0, 2 * ratio, high);
-}
+const draw = () => drawTimeline(byId("timeline"), run, second, stretch());
 
 async function danceAgain() {
   stopHappened();

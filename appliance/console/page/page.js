@@ -129,7 +129,7 @@ function tonight(value) {
     return pair;
   }));
   showMidi(value.remote ?? {});
-  showCues(value);
+  showCues(value, dance.show);
   const styles = dance.show?.look_styles ?? {};
   showChoices(byId("looks"), byId("looks-part"), value.looks.map((one) => drawn(one, styles[one.name])), (name) => command("/look", name));
   const cards = value.cards.map((one) => one.name === "none" ? { ...one, label: words("card_none") } : one);
@@ -143,8 +143,20 @@ function tonight(value) {
   byId("fallbacks-part").hidden = over.length === 0;
   byId("fallbacks").replaceChildren(...over.map(fallbackItem));
   const active = value.fallbacks.filter((one) => one.active);
-  byId("slot-none").hidden = active.length > 0;
+  for (const id of ["slot-none", "slot-hands"]) byId(id).hidden = active.length > 0;
+  byId("slot-hands").replaceChildren(...value.hands.map((one) => handItem(one, value.sensors)));
   byId("fallbacks-now").replaceChildren(...active.map(fallbackItem));
+}
+
+// While nothing is wrong: what holds which joint, and how full its battery is.
+function handItem({ joint, source, holds }, sensors) {
+  const item = document.createElement("li"), name = document.createElement("b"), held = document.createElement("span");
+  const battery = sensors.find((one) => one.name === source)?.battery ?? null;
+  item.dataset.holds = String(holds);
+  name.textContent = source;
+  held.textContent = joint;
+  item.append(held, name, battery === null ? "" : `${words("battery")} ${battery} %`);
+  return item;
 }
 
 // A look with the picture of its style, and the colours that the show gives it.

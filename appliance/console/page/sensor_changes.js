@@ -5,16 +5,15 @@ import { translated, words } from "./words.js";
 
 let sensors = [], act = null, name = "";
 
-// For a card: buttons that open the dialog.
-export function changeButtons(sensor) {
-  return ["rename", "replace", "revoke"].map((what) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = words(what === "revoke" ? "sensor_revoke" : what);
-    button.setAttribute("aria-label", `${button.textContent}: ${sensor}`);
-    button.addEventListener("click", () => withPin(() => open(what, sensor)));
-    return button;
-  });
+// For a sensor's row: a button that opens the dialog. what: rename, replace, revoke.
+export function changeButton(what, sensor) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.className = "changes";
+  button.textContent = words(what === "revoke" ? "sensor_revoke" : what);
+  button.setAttribute("aria-label", `${button.textContent}: ${sensor}`);
+  button.addEventListener("click", () => withPin(() => open(what, sensor)));
+  return button;
 }
 
 export function initSensorChanges() {

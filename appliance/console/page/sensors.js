@@ -1,8 +1,9 @@
-// One card for each sensor. A card stays the same element, so that a press on it is never lost.
+// One row for each sensor. It stays the same element, so that a press on it is never lost.
 import { command } from "./device.js";
-import { changeButtons } from "./sensor_changes.js";
+import { changeButton } from "./sensor_changes.js";
 import { hasWords, number, translated } from "./words.js";
 
+const FRESH_S = 0.1;
 const cards = new Map();
 
 export function showSensors(parent, value, words) {
@@ -18,17 +19,22 @@ export function showSensors(parent, value, words) {
       cards.set(sensor.name, made(sensor.name, words));
       parent.append(cards.get(sensor.name).root);
     }
-    fill(cards.get(sensor.name), sensor, words);
+    const joints = value.hands.filter((one) => one.source === sensor.name).map((one) => one.joint);
+    fill(cards.get(sensor.name), sensor, joints, words);
   }
   parent.title = names.length ? "" : words("no_sensors");
 }
 
+// A row: name, joint, state, and what goes bad in the night; its buttons. A press on the row opens the rest.
 function made(name, words) {
-  const root = document.createElement("article"), title = document.createElement("h3"), state = document.createElement("p");
-  const facts = document.createElement("dl"), complaint = document.createElement("p"), row = document.createElement("div");
+  const root = document.createElement("article"), more = document.createElement("details"), head = document.createElement("summary");
+  const [title, joint, state, complaint, last] = ["h3", "p", "p", "p", "p"].map((tag) => document.createElement(tag));
+  const [brief, facts, row, rare] = ["dl", "dl", "div", "div"].map((tag) => document.createElement(tag));
   title.textContent = name;
+  joint.className = "joint";
   complaint.className = "complaint";
   row.className = "row";
+  rare.className = "row changes";
   for (const [key, address] of [["find", "/sensors/strobe"], ["neutral", "/sensors/neutral"], ["heading", "/sensors/heading"]]) {
     const button = document.createElement("button");
     button.type = "button";
@@ -37,39 +43,46 @@ function made(name, words) {
     button.addEventListener("click", () => command(address, name));
     row.append(button);
   }
-  const changes = document.createElement("div");
-  changes.className = "row changes";
-  changes.append(...changeButtons(name));
-  const last = document.createElement("p");
+  row.append(changeButton("replace", name));
+  rare.append(changeButton("rename", name), changeButton("revoke", name));
   last.className = "quiet last";
   last.textContent = words("last");
-  root.append(title, state, complaint, last, facts, row, changes);
-  return { root, state, facts, complaint };
+  head.append(title, joint, state, brief);
+  more.append(head, last, facts, rare);
+  root.append(more, complaint, row);
+  return { root, joint, state, brief, facts, complaint };
 }
 
-function fill(card, sensor, words) {
+function fill(card, sensor, joints, words) {
   card.root.dataset.state = sensor.state;
   card.root.dataset.worn = String(sensor.is_worn);
   card.facts.classList.toggle("old", !sensor.heard);
   const ago = !sensor.heard && sensor.age_s >= 0 ? ` ${words("heard_before", { time: duration(sensor.age_s) })}` : "";
+  card.joint.textContent = joints.join(", ") || words("not_worn");
   card.state.textContent = words(`sensor_${sensor.state}`) + ago;
   card.complaint.textContent = translated(sensor.complaint);
   const grades = ["system", "gyro", "accel", "mag"].map((_, place) => (sensor.calibration >> (6 - 2 * place)) & 3);
   const left = sensor.heard && sensor.battery_left_s >= 0 ? words("battery_left", { time: duration(sensor.battery_left_s) }) : "";
-  const battery = sensor.battery === null ? words("unknown_value") : `${sensor.battery} %${left}`;
-  const facts = [
+  const age = sensor.age_s < 0 ? "–" : sensor.age_s < FRESH_S ? `< ${number(FRESH_S, 1)} s` : duration(sensor.age_s);
+  fillList(card.brief, [
+    ["battery", sensor.battery === null ? words("unknown_value") : `${sensor.battery} %${left}`],
+    ["reading_age", age],
+    ["signal", sensor.flags >> 4 ? `${4 * (sensor.flags >> 4) - 90} dBm` : words("unknown_value")], // docs/wire.md
+  ], words);
+  fillList(card.facts, [
     ["rate", sensor.heard ? `${number(sensor.rate_hz, 1)} Hz` : "–"],
     ["loss", sensor.heard ? `${number(100 * sensor.loss, 1)} %` : "–"],
     ["round_trip", sensor.heard && sensor.round_trip_s >= 0 ? `${number(1000 * sensor.round_trip_s, 1)} ms` : "–"],
-    ["battery", battery],
-    ["signal", sensor.flags >> 4 ? `${4 * (sensor.flags >> 4) - 90} dBm` : words("unknown_value")], // docs/wire.md
     ["calibration", words("of_three", { gyro: grades[1], accel: grades[2] })],
     ["neutral_pose", hasWords(`neutral_${sensor.neutral}`) ? words(`neutral_${sensor.neutral}`) : sensor.neutral || words("not_worn")],
     ["heading_corrected", sensor.is_worn ? `${number(sensor.corrected, 0)}°` : "–"],
     ["way", sensor.way || "–"],
     ["firmware", sensor.firmware || "–"],
-  ];
-  card.facts.replaceChildren(...facts.map(([key, said]) => {
+  ], words);
+}
+
+function fillList(list, facts, words) {
+  list.replaceChildren(...facts.map(([key, said]) => {
     const pair = document.createElement("div"), term = document.createElement("dt"), meaning = document.createElement("dd");
     term.textContent = words(key);
     meaning.textContent = said;
@@ -79,6 +92,7 @@ function fill(card, sensor, words) {
 }
 
 function duration(seconds) {
+  if (seconds < 9) return `${number(seconds, 1)} s`;
   if (seconds < 90) return `${Math.round(seconds)} s`;
   return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${number(seconds / 3600, 1)} h`;
 }

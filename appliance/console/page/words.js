@@ -73,6 +73,11 @@ function compiled(sentences) {
 export const clock = (seconds) =>
   new Date(1000 * seconds).toLocaleTimeString(locale, { hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
 
+export const exact = (seconds) => new Date(1000 * seconds).toLocaleTimeString(locale, { hourCycle: "h23" });
+
+export const day = (seconds) =>
+  new Date(1000 * seconds).toLocaleDateString(locale, { weekday: "short", day: "numeric", month: "short" });
+
 export const number = (value, digits = 0) =>
   value.toLocaleString(locale, { minimumFractionDigits: digits, maximumFractionDigits: digits });
 
