@@ -16,6 +16,16 @@ from tests.system.box import Box
 from tools.page_pictures import CHROMIUM
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that need the venue run last, one after the other: its box dances from the first to the last."""
+    places = [place for place, item in enumerate(items) if item.path.parent == Path(__file__).parent]
+    needs = {item.path for item in items if "venue" in getattr(item, "fixturenames", ())}
+    for place, item in zip(
+        places, sorted((items[place] for place in places), key=lambda item: item.path in needs), strict=True
+    ):
+        items[place] = item
+
+
 @pytest.fixture
 def own_page(tmp_path: Path) -> Iterator[Page]:
     """A page whose PIN, devices or files a test spoils."""
