@@ -36,18 +36,20 @@ LARGEST_STEP_DEGREES = 36.0  # of any joint in a tick of the recordings
 
 @dataclass(frozen=True)
 class Dance:
-    """What was danced and the phrase beside it: moving joints (ticks, M, 4), and all joints with the root."""
+    """What was danced and the phrase beside it, once all hands hold: moving joints (ticks, M, 4).
+
+    From the first tick on: the pose of all joints, the phrase's root and its lift.
+    """
 
     danced: np.ndarray
     phrase: np.ndarray
     poses: np.ndarray
     roots: np.ndarray
-    grounded_roots: np.ndarray
     lifts: np.ndarray
 
 
 class Dancer:
-    """The whole dancer without a stage: phrase, hands, puppet, blending and grounding in a tick's order."""
+    """The whole dancer without a stage: phrase, hands, puppet and blending in a tick's order."""
 
     def __init__(self, puppet: Puppet, phrase: Recording) -> None:
         self.puppet, self.recording = puppet, phrase
@@ -61,7 +63,6 @@ class Dancer:
         motion = Playback(self.recording, floor=self.floor)
         hands = Hands([hand] if hand else [], puppet.joints)
         blending = Blending(len(puppet.joints), puppet.network.window)
-        grounding = Grounding(self.recording.skeleton, self.floor)
         rows = []
         for tick in range(ticks):
             window = puppet.select(motion.window())
@@ -71,12 +72,18 @@ class Dancer:
             pose = motion.window()[0].copy()
             moved = blending.take().copy()
             puppet.restore(moved, pose)
-            root, lift = motion.roots()[0].copy(), motion.lift
-            grounding.ground_pose(pose, root, lift)
-            rows.append((moved, window[0].copy(), pose, root, grounding.root.copy(), lift))
+            rows.append((moved, window[0].copy(), pose, motion.roots()[0].copy(), motion.lift))
             motion.advance()
-        columns = (np.array(column[SETTLING:]) for column in zip(*rows, strict=True))
-        return Dance(*columns)
+        danced, phrase, *whole = (np.array(column) for column in zip(*rows, strict=True))
+        return Dance(danced[SETTLING:], phrase[SETTLING:], *whole)
+
+    def grounded_roots(self, dance: Dance) -> np.ndarray:
+        """(ticks, 3): where each tick of a dance stands on the floor."""
+        grounding, roots = Grounding(self.recording.skeleton, self.floor), []
+        for pose, root, lift in zip(dance.poses, dance.roots, dance.lifts, strict=True):
+            grounding.ground_pose(pose, root, float(lift))
+            roots.append(grounding.root.copy())
+        return np.array(roots)
 
     def place(self, joint: str) -> int:
         return self.puppet.joints.index(joint)
@@ -263,8 +270,10 @@ def test_a_turning_joint_changes_the_pace_of_a_dancing_one(dancer: Dancer, joint
 def test_the_puppeteered_figure_stands_on_the_floor_and_hardly_slides(dancer: Dancer, joint: str) -> None:
     dance = dancer.hold(10, 9, joint)
     skeleton, floor = dancer.recording.skeleton, dancer.floor
-    before = measure_standing(skeleton, dance.poses, dance.roots, floor, dance.lifts)
-    after = measure_standing(skeleton, dance.poses, dance.grounded_roots, floor, dance.lifts)
+    before, after = (
+        measure_standing(skeleton, dance.poses[SETTLING:], roots[SETTLING:], floor, dance.lifts[SETTLING:])
+        for roots in (dance.roots, dancer.grounded_roots(dance))
+    )
     assert after.float_cm + after.penetration_cm < 0.3
     assert max(after.worst_float_cm, after.worst_penetration_cm) < 5.0
     assert after.slide_cm_s < 0.7 * before.slide_cm_s

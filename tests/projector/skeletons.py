@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ def built(bones: list[Bone], ends: dict[str, tuple[float, float, float]] | None 
     return Skeleton(names, parents, np.array([offset for _, _, offset in bones], float), tips)
 
 
+@functools.cache
 def dancer() -> Skeleton:
     """The 43 joints of the default show, with fingers."""
     return read_bvh(default_show_path() / "phrase.bvh", metres_per_unit=0.01).skeleton
