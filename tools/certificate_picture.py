@@ -32,6 +32,7 @@ NOTES = {  # for each limit, in the order of the verdict: beginning of its words
     "dance to light": "The same for a hand that dances: the wall predicts it.",
 }
 WIDTH, LINE, TOP, PLOT = 1210, 54, 150, 392  # pixels; the first plot of the report is kept
+SIDE, PADDING = 40, 18  # margins of the sheet, and within the plot's ground
 PAPER, INK, FAINT, GOOD, BAD = "#faf8f4", "#1d1d22", "#6b6b75", "#1f7a3f", "#b3261e"
 
 
@@ -51,18 +52,27 @@ def draw_certificate(folder: Path, out: Path) -> Path:
     )
     pen.text((40, 92), counted, font=small, fill=FAINT)
     plot = Image.open(folder / "measure.png").crop((0, 0, WIDTH, PLOT))
-    image.paste(plot, (0, TOP - 10))
+    image.paste(framed(plot), (SIDE, TOP - 10))
     for number, limit in enumerate(limits):
         y = TOP + PLOT + LINE * number
         mark, colour = ("ok", GOOD) if limit.holds else ("FAIL", BAD)
         value = "nothing came" if limit.value is None else f"{limit.value:.2f} {limit.unit}"
         pen.text((40, y), mark, font=plain, fill=colour)
         pen.text((110, y), limit.label, font=plain, fill=INK)
-        pen.text((760, y), value, font=plain, fill=INK, anchor="ra")
-        pen.text((790, y), f"at most {limit.most:.2f} {limit.unit}", font=plain, fill=FAINT)
+        pen.text((930, y), value, font=plain, fill=INK, anchor="ra")
+        pen.text((960, y), f"at most {limit.most:.2f} {limit.unit}", font=plain, fill=FAINT)
         pen.text((110, y + 25), note_of(limit.label), font=small, fill=FAINT)
     image.quantize(64).save(out, optimize=True)
     return out
+
+
+def framed(plot: Image.Image) -> Image.Image:
+    """The plot within the sheet's margins, on a ground of the same colour."""
+    whole = Image.new("RGB", (WIDTH - 2 * SIDE, PLOT - 20), plot.convert("RGB").getpixel((0, 0)))
+    scale = min((whole.width - 2 * PADDING) / plot.width, (whole.height - 2 * PADDING) / plot.height)
+    small = plot.resize((round(plot.width * scale), round(plot.height * scale)), Image.Resampling.LANCZOS)
+    whole.paste(small, ((whole.width - small.width) // 2, PADDING))
+    return whole
 
 
 def note_of(text: str) -> str:

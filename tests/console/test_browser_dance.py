@@ -60,6 +60,10 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     wait_until(rests, "switched off, it costs nothing")  # what was on its way has come
     count = tab.evaluate("seen.frames")
     assert tab.evaluate("pictures / (performance.now() - picturesFrom)") < 0.01, "it draws what it has drawn"
+    drawn = "document.querySelector('#stage').toDataURL()"
+    before = tab.evaluate(drawn)
+    press(tab, "#views >> text=Above")
+    wait_until(lambda: tab.evaluate(drawn) != before, "it is seen from elsewhere")
     tab.locator("#show-dance").check()
     await_true(tab, f"seen.frames > {count}")
     reader.close()

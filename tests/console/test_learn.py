@@ -77,7 +77,7 @@ def test_recordings_from_the_browser_are_learned_from_another_show(
     unlock(tab, venue[1])
     press(tab, '[data-page="rehearsal"]')
     tab.locator("#learn-files").set_input_files([tmp_path / "solo.bvh"])
-    uploaded = tab.locator("#learn-folders button", has_text="box/uploaded-")
+    uploaded = tab.locator("#learn-folders button", has_text="upload of ")
     expect(uploaded).to_contain_text("1 files, 0.1 min")
     expect(uploaded).to_have_attribute("aria-pressed", "true")
     (folder,) = (kept / RECORDINGS).glob("uploaded-*")

@@ -1,8 +1,8 @@
 // Box: which show dances and which would instead, release, addresses, clock.
-import { byId } from "./elements.js";
+import { breakable, byId } from "./elements.js";
 import { twice } from "./hold.js";
 import { danceAgain } from "./venue.js";
-import { locale, translated, words } from "./words.js";
+import { date, translated, words } from "./words.js";
 
 export async function readAbout() {
   byId("box-said").textContent = words("box_reading");
@@ -32,7 +32,7 @@ function render(box) {
 
 // The box's clock, which a Pi without a network has wrong.
 export function showClock(value) {
-  byId("box-clock").textContent = `${words("box_time")}: ${new Date(1000 * value.time).toLocaleString(locale, { hourCycle: "h23" })}`;
+  byId("box-clock").textContent = words("box_time", { time: date(value.time, "medium") });
 }
 
 // Each but the first can be danced again, where the box has kept it; what comes with the box is the last resort.
@@ -51,7 +51,7 @@ function shown(show, place) {
 
 function item(said, below) {
   const line = document.createElement("li"), small = document.createElement("small");
-  line.textContent = said;
+  line.append(...breakable(said));
   small.textContent = below;
   if (below) line.append(small);
   return line;
@@ -60,7 +60,7 @@ function item(said, below) {
 function pair(term, meaning) {
   const both = document.createElement("div"), dt = document.createElement("dt"), dd = document.createElement("dd");
   dt.textContent = term;
-  dd.textContent = meaning;
+  dd.append(...breakable(meaning));
   both.append(dt, dd);
   return both;
 }

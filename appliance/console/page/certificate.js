@@ -1,11 +1,11 @@
 // A proof as a document: one sheet of paper, to be printed or sent as a picture.
 import { drawPlots, PAPER } from "./plots.js";
-import { hasWords, locale, number, translated, words } from "./words.js";
+import { date, hasWords, number, translated, words } from "./words.js";
 
 const WIDTH = 1240, HEIGHT = 1754, MARGIN = 90; // A4 at 150 dots an inch
 
 export const verdictOf = (proof) => words(`prove_${proof.kind}_${proof.holds ? "holds" : "fails"}`);
-export const madeAt = (proof) => new Date(1000 * proof.made).toLocaleString(locale, { hourCycle: "h23" });
+export const madeAt = (proof) => date(proof.made);
 
 // The name of a limit in the reader's language.
 export function limitWords(limit) {

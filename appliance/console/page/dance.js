@@ -106,6 +106,12 @@ export class Dance {
     this.redraw();
   }
 
+  // From a side, at the size of the start.
+  look(yaw, pitch) {
+    [this.yaw, this.pitch, this.zoom] = [yaw, pitch, 1];
+    this.redraw();
+  }
+
   magnify(by) {
     this.zoom = Math.min(4, Math.max(0.4, this.zoom * by));
     this.redraw();

@@ -2,7 +2,7 @@
 import { request } from "./box.js";
 import { byId } from "./elements.js";
 import { twice } from "./hold.js";
-import { language, locale, translated } from "./words.js";
+import { date, language, translated } from "./words.js";
 
 let known = false, waiting = null, words = (key) => key, silence = 0;
 
@@ -127,7 +127,7 @@ async function render(isKnown) {
 function listed(device) {
   const item = document.createElement("li"), since = document.createElement("small"), row = document.createElement("div");
   item.textContent = device.own ? `${device.name} (${words("this_device")})` : device.name;
-  since.textContent = new Date(1000 * device.since).toLocaleString(locale);
+  since.textContent = date(device.since);
   const button = document.createElement("button");
   button.type = "button";
   button.textContent = words("revoke");

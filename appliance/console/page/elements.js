@@ -9,3 +9,7 @@ export const first = (selector) => document.querySelector(selector);
 
 /** @type {(selector: string) => NodeListOf<HTMLElement>} */
 export const every = (selector) => document.querySelectorAll(selector);
+
+// A path in pieces: a line breaks after a slash, not within a name.
+/** @param {string} text */
+export const breakable = (text) => text.split(/(?<=\/)(?=[^/])/).flatMap((part) => [part, document.createElement("wbr")]);

@@ -5,7 +5,7 @@ import { ask, withPin } from "./device.js";
 import { byId } from "./elements.js";
 import { twice } from "./hold.js";
 import { sent } from "./update.js";
-import { locale, number, translated, words } from "./words.js";
+import { clock, date, day as dayOf, number, translated, words } from "./words.js";
 
 const LOOK_MS = 2000, LISTED_WITHIN_MS = 20_000, ADOPTED_WITHIN_MS = 430_000;
 let timer = 0, chosen = "", isRead = false, reads = 0;
@@ -47,7 +47,7 @@ async function read() {
   chosen = recordings.some((one) => one.name === chosen) ? chosen : "";
   const folders = recordings.map((one) => ({
     name: one.name,
-    label: words("learn_folder", { name: one.name, files: one.files, minutes: number(one.minutes, 1) }),
+    label: words("learn_folder", { name: folderOf(one.name), files: one.files, minutes: number(one.minutes, 1) }),
     now: one.name === chosen,
   }));
   showChoices(byId("learn-folders"), byId("learn-folders"), runs ? [] : folders, (name) => {
@@ -69,9 +69,17 @@ async function read() {
   return undefined;
 }
 
+// The folders that the box makes have their date in the name.
+function folderOf(name) {
+  const [, kind, year, month, day, hour = 0, minute = 0] = /^box\/(rehearsal|uploaded)-(\d{4})-(\d\d)-(\d\d)(?:-(\d\d)(\d\d)\d\d)?$/.exec(name) ?? [];
+  if (!kind) return name;
+  const time = new Date(Number(year), Number(month) - 1, Number(day), Number(hour), Number(minute)).getTime() / 1000;
+  return words(`learn_folder_${kind}`, { time: kind === "rehearsal" ? `${dayOf(time)}, ${clock(time)}` : dayOf(time) });
+}
+
 // A show by its name, and when it came: two of them may have one name.
 function labelOf({ name, since, danced }) {
-  const time = since ? new Date(1000 * since).toLocaleString(locale, { dateStyle: "short", timeStyle: "short" }) : "";
+  const time = since ? date(since) : "";
   return words(danced ? "learn_show_danced" : since ? "learn_show" : "learn_show_bundled", { name, time });
 }
 

@@ -218,6 +218,10 @@ initRehearsal(me, box);
 for (const button of every("nav button")) button.addEventListener("click", () => show(button.dataset.page));
 for (const id of ["show-dance", "show-ghost"]) byId(id).addEventListener("change", () => show("dance"));
 addEventListener("hashchange", () => show(location.hash.slice(1)));
+for (const button of every("#views button")) {
+  const [yaw, pitch] = button.dataset.view.split(" ").map(Number);
+  button.addEventListener("click", () => dance.look(yaw, pitch));
+}
 press(byId("go"), goOn);
 byId("resume").addEventListener("click", () => command("/go"));
 byId("stop").addEventListener("click", () => command("/stop"));

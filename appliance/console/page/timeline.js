@@ -10,7 +10,7 @@ const INK = {
   mark: "#f3ece0", text: "#b3b7bd", line: "#3d434b",
 };
 
-// What each colour of the picture means.
+// The meaning of each colour.
 export function showLegend(parent) {
   const said = { slowest: "legend_slowest", late: "legend_late", skipped: "legend_skipped", failed: "legend_failed", order: "happened_order" };
   parent.replaceChildren(...Object.entries(said).map(([what, key]) => {

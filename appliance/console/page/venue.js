@@ -1,6 +1,6 @@
 // Changes that a venue makes to its box: keys of the box file, the file as a whole, and which show dances.
 import { ask } from "./device.js";
-import { byId } from "./elements.js";
+import { breakable, byId } from "./elements.js";
 import { twice } from "./hold.js";
 import { translated, words } from "./words.js";
 
@@ -29,7 +29,7 @@ async function readFile() {
   if (answer.status !== 200) return showSentence(translated(answer.message) || words("no_page"), []);
   file = answer.value;
   receivers = file.receivers.map((written) => ({ written, removed: false, added: false }));
-  byId("file-name").textContent = file.file;
+  byId("file-name").replaceChildren(...breakable(file.file));
   byId("file-text").value = file.text;
   byId("file-now").hidden = !file.at_once;
   byId("file-check").textContent = words(file.at_once ? "file_later" : "file_write");

@@ -78,6 +78,11 @@ export const exact = (seconds) => new Date(1000 * seconds).toLocaleTimeString(lo
 export const day = (seconds) =>
   new Date(1000 * seconds).toLocaleDateString(locale, { weekday: "short", day: "numeric", month: "short" });
 
+// As people read it in their language: 7 January 2026 at 20:15.
+/** @type {(seconds: number, time?: "short" | "medium") => string} */
+export const date = (seconds, time = "short") =>
+  new Date(1000 * seconds).toLocaleString(locale, { dateStyle: "long", timeStyle: time, hourCycle: "h23" });
+
 export const number = (value, digits = 0) =>
   value.toLocaleString(locale, { minimumFractionDigits: digits, maximumFractionDigits: digits });
 
