@@ -9,7 +9,7 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from appliance.pair.roles import FRESH_S
+from appliance.pair.roles import FRESH_S, Role
 from appliance.show.box import OutputsConfig
 
 _ROUTES, _CARDS = Path("/proc/net/route"), Path("/sys/class/net")
@@ -102,6 +102,12 @@ class Carrier:
         return came_after > self._changed_at + _ON_THE_WAY_S or any(
             now - heard_from.get(one, float("-inf")) < FRESH_S for one in self._beside
         )
+
+    def reaches(self, role: Role, now: float, heard: float) -> bool:
+        """Whether a box in this role reaches the receivers, as Roles.look asks for it. heard: as above."""
+        if role is Role.FOLLOWS:
+            return self.knows_silence(now, heard)
+        return not self.is_out if role is Role.LEADS else self.is_up
 
     def knows_silence(self, now: float, heard: float) -> bool:
         """Whether a follower that hears nothing knows by it that the leader is gone."""

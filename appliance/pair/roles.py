@@ -118,8 +118,8 @@ class Roles:
         """Changes that are due by time; call it at least once a tick.
 
         reaches: this box reaches the receivers. One whose cable is out hears nobody, and nobody hears it: it
-        does not take over, and gives up the lead that it took before it knew. One that is switched on without
-        a cable dances, and follows any box that leads.
+        does not take over, and gives up the lead that it took before it knew: it has heard nobody since. One
+        that is switched on without a cable dances, and follows any box that leads.
         """
         if now - self._deposed_at > PATIENCE_FOR_S:
             self.patience_s = self.silent_s
@@ -135,8 +135,9 @@ class Roles:
         elif self.role is Role.YIELDS and now - self.since > YIELDS_S:
             self._lead(now, "the other one did not take it", int(reaches))
         elif self.leads and not reaches and self.why == SILENCE and now - self.since < CABLE_S:
-            self.epoch -= 1
-            self._become(Role.FOLLOWS, now, CABLE)
+            if self._heard <= self.since:
+                self.epoch -= 1
+                self._become(Role.FOLLOWS, now, CABLE)
 
     def takes_over_at(self, is_ready: bool) -> float:
         """When a follower that hears nothing more of the leader takes over.

@@ -332,10 +332,7 @@ class PairedStage:
         """A leader whose own cable is out gives the lead away, where another link still joins the two."""
         carrier, roles = self._carrier, self.pair.roles
         carrier.look(now)
-        if roles.role is Role.FOLLOWS:
-            self.pair.reaches = carrier.knows_silence(now, roles.heard)
-        else:
-            self.pair.reaches = not carrier.is_out if roles.leads else carrier.is_up
+        self.pair.reaches = carrier.reaches(roles.role, now, roles.heard)
         if (
             roles.leads
             and now >= self._give_at
