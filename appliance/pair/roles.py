@@ -134,10 +134,12 @@ class Roles:
                 self._lead(now, SILENCE)
         elif self.role is Role.YIELDS and now - self.since > YIELDS_S:
             self._lead(now, "the other one did not take it", int(reaches))
-        elif self.leads and not reaches and self.why == SILENCE and now - self.since < CABLE_S:
-            if self._heard <= self.since:
-                self.epoch -= 1
-                self._become(Role.FOLLOWS, now, CABLE)
+        elif self.leads and not reaches and self._took_over_blindly(now):
+            self.epoch -= 1
+            self._become(Role.FOLLOWS, now, CABLE)
+
+    def _took_over_blindly(self, now: float) -> bool:
+        return self.why == SILENCE and self._heard <= self.since and now - self.since < CABLE_S
 
     def takes_over_at(self, is_ready: bool) -> float:
         """When a follower that hears nothing more of the leader takes over.
