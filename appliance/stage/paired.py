@@ -276,6 +276,11 @@ class PairedStage:
             return (
                 f"{name.capitalize()} of the pair has another secret: it cannot follow. Copy the file to it."
             )
+        if roles.leads and not self._carrier.may_speak(now, roles.heard):
+            return (
+                "This box sends nothing: its cable to the receivers is out, or came back before "
+                f"{name} was heard again, which leads if it can. Plug it in, and wait for up to 32 s."
+            )
         if not roles.peer_lives(now):
             return (
                 f"{name.capitalize()} of the pair is not heard: the show goes on, and nobody would take "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import time
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import pytest
 
 from appliance.box.show_state import ShowStateReader
 from appliance.levers.table import MASTER
+from appliance.outputs.frame_reader import FrameReader
 from appliance.sensor.keys import create_keys
 from tests.bundles import write_show
 from tests.pair.faults import lost_in
@@ -101,6 +103,12 @@ def test_a_box_that_was_switched_off_follows_when_it_is_back(hall: Hall) -> None
     assert hall.leader == other(leader)
 
 
+def fallbacks(hall: Hall, address: str) -> str:
+    """What the box's stage says has fallen back."""
+    with contextlib.closing(FrameReader(hall.boxes[address].runtime)) as reader:
+        return str((reader.health() or {}).get("fallbacks"))
+
+
 def test_a_leader_whose_cable_was_out_for_long_sends_nothing_before_it_hears_the_other_one(
     hall: Hall,
 ) -> None:
@@ -110,6 +118,7 @@ def test_a_leader_whose_cable_was_out_for_long_sends_nothing_before_it_hears_the
     hall.pull_cable(leader)
     hall.forget(leader)
     wait_until(lambda: hall.boxes[follower].part.leads, "no takeover")
+    wait_until(lambda: "its cable to the receivers is out" in fallbacks(hall, leader), "it said nothing")
     since = time.time()
     hall.plug_cable(leader)
     hall.await_pair()
