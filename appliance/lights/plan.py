@@ -15,7 +15,7 @@ from appliance.pose.skeleton import Skeleton
 
 DARK, FLOOR, GRID = "#101015", "#1b1c24", "#2a2c37"
 INK, FAINT, BONE = "#efe6d8", "#9a948c", "#e8dcc6"
-LAMP, AUDIENCE = "#f45d48", "#6f7a94"
+AUDIENCE = "#6f7a94"
 MARGIN_M = 1.0
 LONGEST_BEAM_M = 12.0
 DARK_LEVEL = 0.02
@@ -124,6 +124,7 @@ class _View:
                     *self._flat(np.array([beam.place, end])).T, color=FAINT, lw=0.8, ls=(0, (2, 4)), zorder=4
                 )
             return
+        seen = float(np.sqrt(beam.level))  # the eye sees a dimmer at 25 % half as bright
         radius = reach * np.tan(np.radians(beam.degrees / 2))
         around = end + radius * _circle(beam.direction)
         around[:, 1] = np.maximum(around[:, 1], 0.0)
@@ -132,17 +133,16 @@ class _View:
         for share in (1.0, 0.6, 0.3):  # denser towards the middle
             inner = self._flat(end) + share * (rim - self._flat(end))
             outline = _hull(np.vstack([start, inner]))
-            self._axes.fill(
-                *outline.T, color=tuple(beam.colour), alpha=0.02 + 0.1 * beam.level, lw=0, zorder=4
-            )
+            self._axes.fill(*outline.T, color=tuple(beam.colour), alpha=0.02 + 0.15 * seen, lw=0, zorder=4)
         if self._is_plan and end[1] < 0.01:
-            self._axes.fill(*rim.T, color=tuple(beam.colour), alpha=0.05 + 0.2 * beam.level, lw=0, zorder=3)
+            self._axes.fill(*rim.T, color=tuple(beam.colour), alpha=0.05 + 0.25 * seen, lw=0, zorder=3)
 
     def _fixture(self, beam: Beam) -> None:
         fixture = beam.fixture
         x, y = self._flat(np.array(fixture.place))
         marker = ("v" if fixture.pose == "hanging" else "^") if beam.is_head else "s"
-        self._axes.plot(x, y, marker, color=LAMP, ms=11 if beam.is_head else 8, mec=DARK, mew=1, zorder=7)
+        colour = tuple(beam.colour) if beam.level >= DARK_LEVEL else FAINT
+        self._axes.plot(x, y, marker, color=colour, ms=12 if beam.is_head else 9, mec=INK, mew=1.2, zorder=7)
         self._axes.annotate(
             f"{fixture.name}  {100 * beam.level:.0f} %",
             (x, y),

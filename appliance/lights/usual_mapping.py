@@ -13,7 +13,14 @@ from appliance.show.lights import FixtureConfig, LightsConfig
 
 NAME = "usual"
 _MIDDLE_M = 0.3  # lamps nearer to the middle than this follow the body
-_COLOURS = [(0.25, 0.45, 1.0), (1.0, 0.85, 0.7), (1.0, 0.3, 0.05)]  # alone, answering, far from its phrase
+_LOW_M = 1.0  # lamps lower than this stand on the floor
+_BEHIND_M = 0.3  # lamps farther upstage than this shine from behind, those farther downstage from the front
+# Three colours a role: no answer, some, the strongest. Light from the front stays pale enough to show a face.
+_COLOURS = {
+    "front": [(0.7, 0.8, 1.0), (1.0, 0.9, 0.75), (1.0, 0.65, 0.35)],
+    "side": [(0.1, 0.75, 0.85), (0.9, 0.6, 0.8), (1.0, 0.25, 0.3)],
+    "back": [(0.15, 0.25, 1.0), (0.7, 0.35, 0.9), (1.0, 0.3, 0.05)],
+}
 
 
 def with_usual_mapping(config: LightsConfig, patch: Patch, skeleton: Skeleton) -> LightsConfig:
@@ -27,7 +34,8 @@ def usual_mapping(fixtures: Sequence[FixtureConfig], patch: Patch, skeleton: Ske
     """Lamps on the dancer's left follow the left hand and foot in turn, those on the right the right ones.
 
     Brightness: a slow base from the whole body's motion, and an accent where the lamp's limb is fast. Colour:
-    how strongly the body answers the hand. Heads aim at their limb, those in the middle at the chest.
+    how strongly the body answers the hand, from the front, the sides and behind each in its own range. Heads
+    aim at their limb, those in the middle at the chest.
     """
     roles = {role: skeleton.names[joint] for role, joint in roles_of(skeleton.names).items()}
     middle = roles.get("chest", skeleton.names[0])
@@ -57,9 +65,25 @@ def usual_mapping(fixtures: Sequence[FixtureConfig], patch: Patch, skeleton: Ske
                 )
             )
     rules = [rule for rule in rules if len(patch.select([], rule.drives))] + accents
-    if len(patch.select([], COLOUR)):
-        rules.append(_rule(reads="answer", drives=COLOUR, colours=_COLOURS, attack_s=0.6, release_s=1.5))
+    for role, colours in _COLOURS.items():
+        names = [one.name for one in fixtures if _role(one) == role and len(patch.select([one.name], COLOUR))]
+        if names:
+            values: dict[str, object] = {
+                "fixtures": names,
+                "colours": colours,
+                "attack_s": 0.6,
+                "release_s": 1.5,
+            }
+            rules.append(_rule(reads="answer", drives=COLOUR, **values))
     return MappingConfig(name=NAME, rules=rules)
+
+
+def _role(fixture: FixtureConfig) -> str:
+    """From where it lights the dancer. Lamps on the floor count as side light: they are seen as an accent."""
+    _, height, depth = fixture.place
+    if depth < -_BEHIND_M:
+        return "back"
+    return "front" if depth > _BEHIND_M and height > _LOW_M else "side"
 
 
 def _rule(**values: object) -> RuleConfig:

@@ -39,7 +39,24 @@ def test_lamps_follow_the_limbs_of_their_side() -> None:
     assert accents["par 0"] == "rHand" and accents["par 1"] == "rFoot" and accents["par 2"] == "lHand"
     assert accents["par 3"] == "chest"
     assert [rule.joint for rule in mapping.rules if rule.drives == "aim"] == ["lFoot"]
-    assert [rule.reads for rule in mapping.rules if rule.drives == "colour"] == ["answer"]
+    assert {rule.reads for rule in mapping.rules if rule.drives == "colour"} == {"answer"}
+
+
+def test_lamps_from_the_front_from_the_sides_and_from_behind_have_colours_of_their_own() -> None:
+    """From the front it stays light enough to see a face; a lamp on the floor is an accent."""
+    depths = {"front": (4.0, 2.0), "low": (0.3, 2.0), "side": (4.0, 0.0), "back": (4.0, -2.0)}
+    fixtures = [
+        {"name": name, "profile": "led-par", "address": 10 * n + 1, "place": [1.0, *place]}
+        for n, (name, place) in enumerate(depths.items())
+    ]
+    config, skeleton = LightsConfig.model_validate({"fixtures": fixtures}), load_show(EMBEDDED_SHOW).skeleton
+    mapping = usual_mapping(config.fixtures, Patch(config.fixtures, EMBEDDED_SHOW), skeleton)
+    ranges = {
+        name: rule.colours for rule in mapping.rules for name in rule.fixtures if rule.drives == "colour"
+    }
+    assert ranges["low"] == ranges["side"] and len({str(one) for one in ranges.values()}) == 3
+    assert all(min(colour) > 0.3 for colour in ranges["front"])
+    assert all(min(colour) < 0.4 for colour in ranges["back"])
 
 
 def test_a_rig_with_rules_of_its_own_keeps_them() -> None:
