@@ -273,5 +273,10 @@ class OpeningHours:
         return datetime.datetime.combine(day + datetime.timedelta(days=days), clock)
 
     def _local(self, now: float) -> datetime.datetime:
-        """The clock on the wall, without its zone: hours are what people read there."""
-        return datetime.datetime.fromtimestamp(now, self._zone).replace(tzinfo=None)
+        """The clock on the wall, without its zone: hours are what people read there.
+
+        In the night in which an hour comes twice, it stands at the end of that hour the second time: what
+        opened, closed or fell quiet the first time does so once.
+        """
+        moment = datetime.datetime.fromtimestamp(now, self._zone).replace(tzinfo=None)
+        return moment.replace(minute=59, second=59, fold=0) if moment.fold else moment

@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,32 @@ def test_hours_are_those_of_the_clock_on_the_wall_also_in_summer() -> None:
     summer = datetime.timezone(datetime.timedelta(hours=2))
     opens = datetime.datetime(2027, 7, 1, 10, 0, tzinfo=summer).timestamp()
     assert [hours.is_open(opens - 1), hours.is_open(opens)] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("zone", "night", "opens", "closes"),
+    [
+        ("Europe/Berlin", "2027-10-30T18:00+00:00", "20:00", "02:30"),
+        ("Europe/Berlin", "2027-10-30T18:00+00:00", "02:15", "08:00"),
+        ("Europe/Berlin", "2027-03-27T18:00+00:00", "20:00", "02:30"),  # this one does not come at all
+        ("Australia/Lord_Howe", "2027-04-03T06:00+00:00", "20:00", "01:45"),  # half an hour comes twice
+        ("America/St_Johns", "2027-11-06T18:00+00:00", "20:00", "01:30"),
+    ],
+)
+def test_in_a_night_whose_clock_is_turned_it_opens_once_and_closes_once(
+    zone: str, night: str, opens: str, closes: str
+) -> None:
+    hours = OpeningHours(hours_of(zone=zone, open=[{"days": ["sat", "sun"], "from": opens, "to": closes}]))
+    begin = datetime.datetime.fromisoformat(night).timestamp()
+    seen = [hours.is_open(begin + 60.0 * minute) for minute in range(14 * 60)]
+    assert sum(before != after for before, after in pairwise(seen)) == 2 - seen[0]
+
+
+def test_quiet_hours_end_once_in_a_night_whose_clock_is_turned() -> None:
+    hours = OpeningHours(hours_of(quiet=[{"from": "22:00", "to": "02:30", "strings": 0.2}]))
+    begin = datetime.datetime.fromisoformat("2027-10-30T18:00+00:00").timestamp()
+    seen = [hours.strings(begin + 60.0 * minute) for minute in range(14 * 60)]
+    assert sum(before != after for before, after in pairwise(seen)) == 2
 
 
 def test_a_clock_that_was_never_set_is_always_open() -> None:
