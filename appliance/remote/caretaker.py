@@ -275,8 +275,8 @@ class OpeningHours:
     def _local(self, now: float) -> datetime.datetime:
         """The clock on the wall, without its zone: hours are what people read there.
 
-        In the night in which an hour comes twice, it stands at the end of that hour the second time: what
-        opened, closed or fell quiet the first time does so once.
+        Where an hour comes twice, in autumn, all of the second one counts as the end of the first: so nothing
+        opens, closes or falls quiet twice.
         """
         moment = datetime.datetime.fromtimestamp(now, self._zone).replace(tzinfo=None)
         return moment.replace(minute=59, second=59, fold=0) if moment.fold else moment
