@@ -245,6 +245,28 @@ def test_every_control_has_a_name_and_can_be_read(tab: Tab) -> None:
         assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), f"{page} scrolls sideways"
 
 
+# Of each tab: where it is, how high it is, how large its letters are, and whether they fit.
+TABS = """() => [...document.querySelectorAll('nav button:not([hidden])')].map((one) => [one.offsetTop,
+  one.offsetHeight, parseFloat(getComputedStyle(one).fontSize), one.scrollWidth <= one.clientWidth])"""
+LEAST_TOUCH_PX, LEAST_LETTERS_PX = 44, 13
+
+
+@ON_BOTH
+@pytest.mark.parametrize("language", ["en", "de", "fr"])
+def test_the_tabs_are_one_row_that_can_be_read_and_touched(tab: Tab, language: str) -> None:
+    tab.evaluate("(language) => localStorage.setItem('language', language)", language)
+    tab.reload()
+    await_box(tab)
+    found = tab.evaluate(TABS)
+    assert len({top for top, *_ in found}) == 1
+    assert all(
+        high >= LEAST_TOUCH_PX and letters >= LEAST_LETTERS_PX and fits for _, high, letters, fits in found
+    )
+    press(tab, '[data-page="device"]')
+    last, across = tab.locator('[data-page="device"]').bounding_box(), tab.evaluate("innerWidth")
+    assert last is not None and last["x"] >= 0 and last["x"] + last["width"] <= across
+
+
 @ON_A_LAPTOP
 def test_the_keyboard_reaches_panic(tab: Tab, venue: tuple[Box, Page]) -> None:
     box, page = venue

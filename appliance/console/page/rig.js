@@ -127,8 +127,9 @@ function drawBeam(ink, [, place, way, colour, level, degrees], at, scale, view) 
   // To the side of the beam; on the floor, seen from the audience, along the floor.
   const aside = !isPlan && hitsFloor ? [radius, 0] : [-(to[1] - from[1]) / long * radius, (to[0] - from[0]) / long * radius];
   const cone = ink.createLinearGradient(...from, ...to);
-  cone.addColorStop(0, rgb(colour, 0.04 + 0.36 * level));
-  cone.addColorStop(1, rgb(colour, 0.01 + 0.09 * level));
+  const seen = Math.sqrt(level); // the eye sees a dimmer at 25 % half as bright
+  cone.addColorStop(0, rgb(colour, 0.04 + 0.36 * seen));
+  cone.addColorStop(1, rgb(colour, 0.01 + 0.13 * seen));
   ink.fillStyle = cone;
   ink.beginPath();
   ink.moveTo(...from);
@@ -136,7 +137,7 @@ function drawBeam(ink, [, place, way, colour, level, degrees], at, scale, view) 
   ink.lineTo(to[0] - aside[0], to[1] - aside[1]);
   ink.fill();
   if (!isPlan || !hitsFloor) return;
-  ink.fillStyle = rgb(colour, 0.02 + 0.16 * level);
+  ink.fillStyle = rgb(colour, 0.02 + 0.2 * seen);
   ink.beginPath();
   ink.arc(...to, radius, 0, 7);
   ink.fill();
