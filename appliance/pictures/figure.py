@@ -5,6 +5,7 @@ View coordinates are metres to the right, upwards and towards the viewer; there 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -75,10 +76,15 @@ def render(cones: Cones, colours: Array, frame: Frame) -> Array:
     lit = np.zeros((*depth.shape, 4))
     lit[hit, :3] = _shade(normals[hit], colours[cone[hit]]) * _openness(depth, part)[hit, None]
     lit[hit, 3] = 1.0
-    finer = range(SUPERSAMPLE)
-    parts = [lit[row::SUPERSAMPLE, column::SUPERSAMPLE] for row in finer for column in finer]
-    picture[place] = sum(parts) / len(parts)
+    parts = _subpixels(lit)
+    picture[place] = functools.reduce(np.add, parts) / len(parts)
     return picture
+
+
+def _subpixels(fine: Array) -> list[Array]:
+    """The first subpixel of each pixel, the second of each, and so on. Much faster than an axis of them."""
+    finer = range(SUPERSAMPLE)
+    return [fine[row::SUPERSAMPLE, column::SUPERSAMPLE] for row in finer for column in finer]
 
 
 def _around(cones: Cones, frame: Frame) -> tuple[Frame, tuple[slice, slice]]:
@@ -184,7 +190,7 @@ def _shade(normal: Array, paint: Array) -> Array:
 
 def _openness(depth: Array, frame: Frame) -> Array:
     """How much light reaches each subpixel past the parts in front of it, 0..1."""
-    near = depth.reshape(frame.height, SUPERSAMPLE, frame.width, SUPERSAMPLE).max(axis=(1, 3))
+    near = functools.reduce(np.maximum, _subpixels(depth))
     hit = np.isfinite(near)
     surface = np.where(hit, near, near[hit].min() - 0.3)
     openness = np.ones(near.shape)

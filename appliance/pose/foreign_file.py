@@ -39,6 +39,8 @@ def encoding_of(sample: bytes) -> str:
     """
     if sample[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return "utf-16"
+    if sample.isascii():
+        return "utf-8-sig"
     text = sample.rstrip(bytes(range(128, 256))).decode("utf-8", "replace")
     damaged, letters = text.count("\ufffd"), sum(letter > "\x7f" for letter in text)
     if damaged <= letters // 2:
