@@ -158,8 +158,8 @@ def pose_checkpoint(tmp_path_factory: pytest.TempPathFactory, recordings: Path) 
 
 @pytest.fixture(scope="session")
 def trained(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> tuple[Path, Said]:
-    """A show after 60 steps of a tiny network, and what the command said."""
-    options = ["--steps", 60, "--width", 48, "--latent", 16, "--threads", 1, "--device", "cpu"]
+    """A show after 20 steps of a tiny network, and what the command said."""
+    options = ["--steps", 20, "--width", 48, "--latent", 16, "--threads", 1, "--device", "cpu"]
 
     def train(folder: Path) -> None:
         result = bunraku("train", "--recordings", recordings, "--out", folder / "evening", *options)

@@ -60,7 +60,7 @@ def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
         "17 of 20 joints move",
         "The others never turn and stay as they are",
         "Kept apart to measure on, by take: sway_2",
-        "60 steps on the CPU (1 thread)",
+        "20 steps on the CPU (1 thread)",
         "degrees on held-out takes",
         "computes what was trained",
         "The bundle contains a recording",
@@ -84,7 +84,7 @@ def test_training_ends_with_whether_the_dancer_answers(trained: Trained) -> None
 def test_training_leaves_its_history_and_pictures(trained: Trained) -> None:
     show, _ = trained
     reported = json.loads((show / "training.json").read_text())
-    assert reported["settings"]["width"] == 48 and reported["history"][-1]["step"] == 60
+    assert reported["settings"]["width"] == 48 and reported["history"][-1]["step"] == 20
     assert reported["history"][-1]["held_out_degrees"] > 0
     for picture in (show / "pictures" / "losses.png", show / "report.png", show / "answer.png"):
         assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 10_000
@@ -96,7 +96,7 @@ def test_the_report_holds_what_the_stage_and_the_artist_need(trained: Trained) -
     report = json.loads((trained[0] / "report.json").read_text())
     assert report["network"]["ships"] in ("fp32", "int8")
     assert report["evaluated_on"] == ["sway_2"]
-    assert report["training"]["steps"] == 60
+    assert report["training"]["steps"] == 20
     assert report["equality_with_pytorch"]["largest_difference"] <= 1e-4
     assert len(report["joint_range_degrees"]) == 17
     assert all(0 < degrees <= 180 for degrees in report["joint_range_degrees"].values())
