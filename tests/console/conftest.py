@@ -18,11 +18,10 @@ from tools.page_pictures import CHROMIUM
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files that need the venue run last, one after the other: its box dances from the first to the last."""
-    places = [place for place, item in enumerate(items) if item.path.parent == Path(__file__).parent]
-    needs = {item.path for item in items if "venue" in getattr(item, "fixturenames", ())}
-    for place, item in zip(
-        places, sorted((items[place] for place in places), key=lambda item: item.path in needs), strict=True
-    ):
+    places = [place for place, item in enumerate(items) if item.nodeid.startswith("tests/console/")]
+    here = [items[place] for place in places]
+    needs = {item.path for item in here if "venue" in getattr(item, "fixturenames", ())}
+    for place, item in zip(places, sorted(here, key=lambda item: item.path in needs), strict=True):
         items[place] = item
 
 
