@@ -30,7 +30,7 @@ PAGES = ("tonight", "dance", "sensors", "rehearsal", "picture", "prove", "happen
 PHONE = "sensors: {foreign: [{name: right-wrist, from: phone}]}\n"
 _FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 _CAPTIONS = {"dance": "#held", "rehearsal": "#figure-said"}  # they say when a frame is drawn
-_COLOURS = 64  # a third of the bytes, and nothing that is seen
+_COLOURS = 96  # a third of the bytes, and nothing that is seen
 _WELL_WITHIN_MS = 20_000
 _FADED_MS, _PROVEN_WITHIN_MS, _DRAWN_WITHIN_MS = 4_000, 120_000, 120_000
 _EVENING = 1_767_816_900.0  # 20:15 of an evening
@@ -127,7 +127,7 @@ def take_pictures(
         tab.wait_for_timeout(500)
         taken.append(folder / f"page-{page}.png")
         tab.screenshot(path=taken[-1])
-        Image.open(taken[-1]).quantize(_COLOURS).save(taken[-1], optimize=True)
+        _quantized(taken[-1])
     tab.close()
     return taken
 
@@ -141,8 +141,14 @@ def take_phone(browser: Browser, address: str, folder: Path) -> Path:
     taken = folder / "page-phone.png"
     tab.screenshot(path=taken)
     tab.close()
-    Image.open(taken).quantize(_COLOURS).save(taken, optimize=True)
+    _quantized(taken)
     return taken
+
+
+def _quantized(path: Path) -> None:
+    """Small colours, as those of a legend, stay what they are."""
+    method = Image.Quantize.MAXCOVERAGE
+    Image.open(path).convert("RGB").quantize(_COLOURS, method=method, kmeans=1).save(path, optimize=True)
 
 
 def _prove(tab: Page, pin: str) -> None:
