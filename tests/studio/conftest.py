@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import pickle
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.studio import dance_files, standing_dance
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
-from appliance.studio.data.dataset import load_dataset
+from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.evaluation import answer_picture, own_answer, pictures
 from appliance.studio.experiments import strips
 from appliance.studio.export import release
@@ -134,6 +135,18 @@ def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path],
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three takes of four seconds."""
     return made_once(tmp_path_factory, "three-takes", lambda out: write_recordings(out / "dancer")) / "dancer"
+
+
+@pytest.fixture(scope="session")
+def dances(tmp_path_factory: pytest.TempPathFactory, recordings_dir: Path) -> Dataset:
+    """The motion capture recordings to train on. To read them and to find their errors takes ten seconds."""
+
+    def read(out: Path) -> None:
+        (out / "dataset").write_bytes(pickle.dumps(load_dataset(recordings_dir / "train")))
+
+    found = pickle.loads((made_once(tmp_path_factory, "dances", read) / "dataset").read_bytes())
+    assert isinstance(found, Dataset)
+    return found
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from appliance.pictures.filmstrip import VERMILION
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from appliance.studio.data.capture_errors import APART, JUMP, CaptureError, find_capture_errors, sound_frames
-from appliance.studio.data.dataset import load_dataset
+from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.evaluation.findings import findings
 from appliance.studio.evaluation.masked import draw_masked, masked_stretches
 from tests.studio.bodies import body, moved
@@ -111,9 +111,8 @@ def test_nothing_is_found_in_nothing() -> None:
     assert errors_of(still) == [[]]
 
 
-def test_the_cmu_dances_lose_their_errors_and_nothing_else(recordings_dir: Path) -> None:
-    found = load_dataset(recordings_dir / "train")
-    takes = {take.name: take for take in (*found.training, *found.held_out)}
+def test_the_cmu_dances_lose_their_errors_and_nothing_else(dances: Dataset) -> None:
+    takes = {take.name: take for take in (*dances.training, *dances.held_out)}
     share = {name: float(np.mean(~take.sound)) for name, take in takes.items()}
     assert share["salsa_06"] == 1.0  # her head hangs upside down from the first frame to the last
     head = [error for error in takes["salsa_07"].errors if error.joint == "head" and error.reason == APART]

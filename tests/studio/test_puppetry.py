@@ -10,7 +10,7 @@ import pytest
 from appliance.dancer.puppeteers import FixedOrientation
 from appliance.pose import quaternion
 from appliance.pose.roles import held_joints
-from appliance.studio.data.dataset import load_dataset
+from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.evaluation import puppetry
 from appliance.studio.evaluation.dance_figures import BodyFigures
 from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
@@ -220,14 +220,13 @@ def test_the_held_joints_are_found_on_any_skeleton(joints: tuple[str, ...], expe
     assert list(held_joints(joints).values()) == expected
 
 
-def test_the_baselines_of_the_held_out_salsa(recordings_dir: Path) -> None:
+def test_the_baselines_of_the_held_out_salsa(dances: Dataset) -> None:
     """Facts of the recordings, whatever the network: a phrase fits its own hand better than a foreign one."""
-    dataset = load_dataset(recordings_dir / "train")
-    named = {take.name: take for take in dataset.held_out}
+    named = {take.name: take for take in dances.held_out}
     phrase, hand = named["salsa_29"], named["salsa_24"]
-    reference = reference_of(apart_from(dataset, [phrase, hand]), dataset.moving_names)
+    reference = reference_of(apart_from(dances, [phrase, hand]), dances.moving_names)
     pair = Pair(phrase.recording, hand.recording, phrase.name, hand.name)
-    measurement = Measurement(Pasting(dataset.moving_names), pair, reference)
+    measurement = Measurement(Pasting(dances.moving_names), pair, reference)
     found = measurement.with_hand("lShldr", (10, 9), measurement.hand("lShldr"))
     assert found.answer == pytest.approx(0.0, abs=0.01)
     assert found.fit == pytest.approx(found.fit_bare, abs=0.1)
