@@ -10,11 +10,16 @@ import pytest
 
 from appliance.body.bake import sunk
 from appliance.body.body_mesh import body_mesh
+from appliance.body.rest_pose import anatomy_of
 from appliance.pose.recording import Recording
+from appliance.projector.picture.drawing import source
+from appliance.projector.picture.melting import BONES, Melting
+from appliance.projector.picture.poses import poses_of
 from appliance.projector.picture.scene import WHOLE, Scene
 from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import LookConfig
 from tests.projector.golden_looks import AT_S, MEAN_LIMIT, SIZE, difference, renderer
+from tests.projector.skeletons import rope
 
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 WITH_SURFACE = ("plaster", "ink", "cloud", "veil", "strings")
@@ -34,6 +39,20 @@ def test_the_figure_melts_step_by_step(style: str, dance: Recording, gl: moderng
     whole = difference(pictures[0], pictures[-1])[0]
     assert min(steps) > 0.1 and max(steps) < whole < sum(steps)
     assert pictures[-1].max() > 100
+
+
+@pytest.mark.parametrize("joints", [2, 300])
+def test_any_number_of_joints_melts_into_as_many_bones_as_the_shader_has(joints: int) -> None:
+    skeleton = rope(joints)
+    mesh = body_mesh(skeleton)
+    rest = np.tile(np.float32([1.0, 0.0, 0.0, 0.0]), (1, joints, 1))
+    moment = moment_of(Recording(skeleton, rest, np.zeros((1, 3)), 50.0), 0.0)
+    poses = poses_of(moment, moment.puppets[0], mesh.height, 0.0)
+    found = Melting(mesh, anatomy_of(skeleton)).bones(poses, 0, 0.5)
+    assert f"MELT_BONES = {BONES};" in source("melt")
+    assert len(found["melt_from"]) == len(found["melt_way"]) == BONES
+    assert 1 <= found["melt_bones"] <= BONES
+    assert found["melt_bones"] == (BONES if joints > BONES else joints)
 
 
 def test_the_face_sinks_before_the_body_swells(dance: Recording) -> None:

@@ -57,7 +57,7 @@ class Renderer:
         keeps_strokes: bool = False,
     ) -> None:
         self._looks, self._ways = looks, Ways()
-        self._easel = Easel(ctx, skeleton, show)
+        self._easel = Easel(ctx, skeleton, show, melts=any(look.melt > 0.0 for look in looks.values()))
         styles = dict.fromkeys(look.style for look in looks.values())
         self._styles: dict[Style, _Look] = {
             style: Ink(self._easel, keeps_strokes) if style == "ink" else _LOOKS[style](self._easel)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.body.mesh_file import mesh_of_show
+from appliance.body.rest_pose import anatomy_of
 from appliance.body.skinning import BodyMesh
 from appliance.outputs.coupling import coupled, led_by
 from appliance.outputs.joint_frame import Floats
@@ -24,6 +25,7 @@ from appliance.projector.picture.body_buffers import BodyBuffers
 from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import read_image, texture_of
+from appliance.projector.picture.melting import Melting
 from appliance.projector.picture.noise import SIDE, noise_pixels
 from appliance.projector.picture.poses import HoldTexture, Poses, PoseTexture
 from appliance.projector.picture.targets import Target
@@ -41,6 +43,7 @@ KEY_FROM, KEY_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the
 SHUTTER = 0.5  # rows of poses for which the shutter is open: 12 ms
 MOST_MOMENTS, BLUR_STEP = 4, 5.0  # pixels from one moment to the next
 TIME_ROUND_S = 1000.0  # shaders' time begins anew: all that drifts, runs or sways comes round in it
+MELT_STEPS = 2  # towards a molten surface; one where nobody looks closely
 MELT_ROUND_S = 20.0 * math.pi  # the same for the waves of a molten surface
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
 LUMP = 0.2  # and a wholly amorphous one beyond that
@@ -149,10 +152,12 @@ class _FigureTextures:
 class Easel:
     """The body, its poses, the noise and the canvases: once on the GPU, for all looks.
 
-    show: the folder with the body's surface; None: it is modelled here.
+    show: the folder with the body's surface; None: it is modelled here. melts: some look does.
     """
 
-    def __init__(self, ctx: moderngl.Context, skeleton: Skeleton, show: Path | None = None) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, skeleton: Skeleton, show: Path | None = None, melts: bool = False
+    ) -> None:
         self.ctx, self.skeleton = ctx, skeleton
         mesh = mesh_of_show(skeleton, show)
         self.height = mesh.height
@@ -173,7 +178,8 @@ class Easel:
         self._buffers: list[moderngl.Buffer] = []
         self._tables: list[moderngl.Texture] = []
         self._drawings: list[Drawing] = []
-        self._melt: dict[str, Any] = {}
+        self._melting = Melting(mesh, anatomy_of(skeleton)) if melts else None
+        self._melt, self._molten = dict[str, Any](), dict[tuple[int, int], dict[str, Any]]()
         self.melt(0.0, 0.0)
         self._sheets: dict[tuple[str, ...], Drawing] = {}
         self._expose = self.drawing("screen", "expose")
@@ -181,6 +187,7 @@ class Easel:
     def show(self, poses: Sequence[Poses], holds: Sequence[Floats | None]) -> None:
         """The poses of the next picture's figures, at least one."""
         self._shown, self._poses, self._holds = len(poses), poses, holds
+        self._molten.clear()
         while len(self._figures) < self._shown:
             self._figures.append(_FigureTextures(self.ctx, self._mesh, len(self.skeleton)))
         for textures, one, held in zip(self._figures, poses, holds, strict=False):
@@ -217,7 +224,19 @@ class Easel:
 
     def draw_figure(self, figure: int, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
         """Draw what belongs to one of the figures. drawn: as Drawing takes it."""
-        drawing.draw({"back": 0.0} | self._melt | self._figures[figure].inputs | inputs, *drawn)
+        molten = self._melt_of(figure, inputs.get("row", 0), 1 if inputs.get("roughly") else MELT_STEPS)
+        drawing.draw({"back": 0.0} | self._melt | molten | self._figures[figure].inputs | inputs, *drawn)
+
+    def _melt_of(self, figure: int, row: int, steps: int) -> dict[str, Any]:
+        """The inputs of what a figure melts into in the pose of a row, in so many steps."""
+        share = self._melt["melt"]
+        if self._melting is None:
+            return {}
+        if share == 0.0:
+            return self._melting.human
+        if (figure, row) not in self._molten:
+            self._molten[figure, row] = self._melting.bones(self._poses[figure], row, share)
+        return self._molten[figure, row] | {"melt_steps": steps}
 
     def draw_figures(self, drawing: Drawing, inputs: dict[str, Any], *drawn: int) -> None:
         """Draw what belongs to a figure once for each. drawn: as Drawing takes it."""
@@ -338,6 +357,7 @@ class Easel:
         parts: Sequence[str] = (),
     ) -> Drawing:
         """A shader program with what it draws, as Drawing takes them; released with the easel."""
+        parts = (*parts, "MELT") if self._melting else parts
         self._drawings.append(Drawing(self.ctx, vertex, fragment, content, index, parts))
         return self._drawings[-1]
 

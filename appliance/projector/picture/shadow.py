@@ -34,7 +34,9 @@ class Shadow:
         depth = easel.canvas("lamp depth", (side, side), depth=True)
         depth.start((1.0, 1.0, 1.0, 1.0))
         ctx.enable_only(moderngl.DEPTH_TEST)
-        easel.draw_figures(self._depth, {"row": 0, "held": 0.0, "projection": lamp_projection})
+        easel.draw_figures(
+            self._depth, {"row": 0, "held": 0.0, "roughly": True, "projection": lamp_projection}
+        )
         depth.finish()
         lamps = {"lamp_depth": depth.texture, "lamp_projection": lamp_projection}
         below = self.on_floor(scene, OVERHEAD, "contact")
@@ -51,7 +53,7 @@ class Shadow:
         first.start()
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.MAX, moderngl.MAX
-        easel.draw_figures(self._cast, {"row": 0, "held": 0.0, **on_floor})
+        easel.draw_figures(self._cast, {"row": 0, "held": 0.0, "roughly": True, **on_floor})
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.enable_only(moderngl.NOTHING)
         easel.blur(self._blur, first, second, (1 / side, 1 / side))

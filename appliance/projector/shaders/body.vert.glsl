@@ -29,7 +29,8 @@ void main() {
     place = moved(by, in_position + without_face * in_sunk.xyz);
     normal = turned(by, mix(2.0 * in_normal.xyz - 1.0, 2.0 * in_calm.xyz - 1.0, without_face));
     melt_body(place, normal, row);
-    skin = in_position;
+    float molten = smoothstep(0.25, 0.70, melt);  // the folds of a molten surface meet, and must look alike
+    skin = mix(in_position, place - vec3(melt_root.x, 0.0, melt_root.z), molten);
 #ifdef BRUSH
     pressed = 0.0;
     drawn = vec4(0.0);
@@ -39,9 +40,10 @@ void main() {
         mat3x4 way = mat3x4(texelFetch(brush_ways, joint, 0), texelFetch(brush_ways, joint + ivec2(0, 1), 0), texelFetch(brush_ways, joint + ivec2(0, 2), 0));
         drawn += in_weights[i] * vec4(vec4(in_position, 1.0) * way, in_weights[i]);
     }
+    drawn.xyz = mix(drawn.xyz, skin.yxz, molten);
     place += normal * swell * (max(pressed, 0.25) - 0.4);  // fingers and toes stay whole
 #endif
     mark = held_at(in_joints, in_weights);
-    open = 2.0 * in_normal.w - 1.0;
+    open = mix(2.0 * in_normal.w - 1.0, 1.0, molten);
     gl_Position = projection * vec4(place, 1.0);
 }

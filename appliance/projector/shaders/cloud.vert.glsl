@@ -43,6 +43,7 @@ void main() {
     vec3 velocity = (place - before) / (1.5 * row_s);
     float age = back / life, age_s = back * row_s, speed = length(velocity);
     vec3 normal = turned(joint_at(in_joints.x, row), 2.0 * in_normal.xyz - 1.0);
+    place += 0.3 * melt * (in_chance.zwy - 0.5);  // else molten grains gather where the mass draws together
     melt_body(place, normal, row);
     vec3 drift = textureLod(noise, place.xy * 0.9 + in_chance.zw * 0.15 + time * 0.01, 0.0).rgb
                + textureLod(noise, place.zy * 1.7 - time * 0.013, 0.0).gbr - 1.0;

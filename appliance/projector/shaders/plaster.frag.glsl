@@ -13,6 +13,7 @@ uniform vec3 accent_colour;
 uniform vec3 held_colour;
 uniform float shadow;
 uniform float exposure;
+uniform float melt;  // the folds of a molten surface throw no shadows onto each other
 uniform mat4 lamp_projection;
 uniform sampler2D lamp_depth;
 uniform sampler2D noise;
@@ -20,7 +21,7 @@ out vec4 colour;
 #include tone
 
 float lit(vec3 n) {
-    vec3 at = (lamp_projection * vec4(place + 0.010 * n, 1.0)).xyz * 0.5 + 0.5;
+    vec3 at = (lamp_projection * vec4(place + (0.010 + 0.05 * melt) * n, 1.0)).xyz * 0.5 + 0.5;
     float turn = 6.2832 * grain(gl_FragCoord.xy), sum = 0.0;
     for (int i = 0; i < 8; i++) {
         float angle = turn + 2.399963 * float(i);
@@ -34,11 +35,11 @@ float lit(vec3 n) {
 void main() {
     vec3 n = normalize(normal), to_eye = normalize(eye - place);
     vec4 rough = texture(noise, skin.xy * 1.9 + skin.z * 1.3) + texture(noise, skin.zy * 4.3 - skin.x) - 1.0;
-    float shaded = pow(clamp((dot(n, lamp) + 0.06) / 1.06, 0.0, 1.0), 1.3) * mix(1.0, lit(n), shadow);
+    float straight = dot(n, lamp), shaded = pow(clamp((straight + 0.06) / 1.06, 0.0, 1.0), 1.3) * mix(1.0, lit(n), shadow);
     n = normalize(n + 0.17 * rough.rgr);
     float facing = clamp(dot(n, to_eye), 0.0, 1.0);
     vec3 albedo = mix(figure_colour, held_colour, mark) * (0.90 + 0.24 * rough.g);
-    float key = min(shaded, 1.0) * clamp(0.35 + 0.65 * dot(n, lamp) / max(dot(normalize(normal), lamp), 0.2), 0.4, 1.3);
+    float key = min(shaded, 1.0) * clamp(0.35 + 0.65 * dot(n, lamp) / max(straight, 0.2), 0.4, 1.3);
     float cavity = mix(1.0, open * open, 0.9);
     float sky = 0.5 + 0.5 * n.y;
     vec3 bounce = light_colour * 0.16 * (1.0 - sky) * exp(-2.5 * place.y);

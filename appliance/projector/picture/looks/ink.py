@@ -135,6 +135,7 @@ class Ink:
                 "row": round((rows - 1) * echo / ECHOES),
                 "level": 0.85 * (1 - echo / (ECHOES + 1)) ** 1.2,
                 "held": 0.0,
+                "roughly": True,
             }
             easel.draw_figures(self._echo, inputs)
 
