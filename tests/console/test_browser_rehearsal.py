@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from playwright.sync_api import Locator, expect
 from playwright.sync_api import Page as Tab
-from playwright.sync_api import expect
 
 from tests.console.browser import ON_A_LAPTOP, press, sensor_card, unlock
 from tests.console.page import Page
@@ -57,3 +57,21 @@ def test_a_rehearsal_changes_iterations_and_hands(tab: Tab, venue: tuple[Box, Pa
     assert not page.status()["hands"][0]["holds"]
     press(tab, "#hands button")
     expect(hand).to_have_attribute("aria-pressed", "true")
+
+
+def test_each_part_of_a_rehearsal_is_a_tap_away(tab: Tab) -> None:
+    press(tab, '[data-page="rehearsal"]')
+    parts, headings = tab.locator("#rehearsal-parts button:visible"), tab.locator("#rehearsal h2:visible")
+    expect(parts.first).to_be_visible()
+    assert parts.all_inner_texts() == headings.all_inner_texts()
+    last = tab.locator("#rehearsal h2[data-words=learn]")
+    assert not _is_seen(last)
+    parts.last.tap()
+    wait_until(lambda: _is_seen(last), "the page did not go there")
+    assert _is_seen(tab.locator("#rehearsal-parts"))
+
+
+def _is_seen(part: Locator) -> bool:
+    """Between the sentence on top and the buttons at the bottom."""
+    place = part.bounding_box()
+    return place is not None and 80 < place["y"] < 600

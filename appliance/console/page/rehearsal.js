@@ -2,7 +2,7 @@
 import { showChoices } from "./choices.js";
 import { request } from "./box.js";
 import { ask, command, withPin } from "./device.js";
-import { byId, first } from "./elements.js";
+import { byId, every, first } from "./elements.js";
 import { Figure } from "./figure.js";
 import { initFloor, showFloor } from "./floor.js";
 import { initGestures, showGestures } from "./gestures.js";
@@ -32,6 +32,13 @@ export function initRehearsal(me, box) {
     byId("liveliness").blur();
   });
   byId("seed-new").addEventListener("click", () => command("/seed", Math.floor(Math.random() * SEEDS)));
+  byId("rehearsal-parts").append(...[...headings()].map((heading) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = heading.textContent;
+    button.addEventListener("click", () => heading.scrollIntoView());
+    return button;
+  }));
   figure = new Figure(byId("figure"), byId("figure-said"), box, words);
   initFloor(box);
   initGestures();
@@ -70,6 +77,14 @@ export function showRehearsal(value, show) {
   showFloor(value.goal, show);
   showGestures(value);
   showLearn();
+  showParts();
+}
+
+const headings = () => every("#rehearsal h2");
+
+// A way to each part that is shown.
+function showParts() {
+  headings().forEach((heading, place) => { byId("rehearsal-parts").children[place].hidden = heading.parentElement.hidden; });
 }
 
 // The settings of now become a cue in a copy of the show; what dances stays as it is.
