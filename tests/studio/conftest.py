@@ -16,10 +16,8 @@ import torch
 from typer.testing import CliRunner, Result
 
 from appliance.body import mesh_file
-from appliance.body.body_mesh import BodyMesh, body_mesh
 from appliance.pictures import figure
 from appliance.pose.recording import Recording
-from appliance.pose.skeleton import Skeleton
 from appliance.studio import dance_files, standing_dance
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
@@ -32,6 +30,7 @@ from appliance.studio.improviser import own_output
 from appliance.studio.improviser.footing import Progress, plant_feet
 from appliance.studio.pose_space import explore, path
 from appliance.studio.variations import sweep, vary
+from tests.known_surfaces import each_surface_once
 from tests.studio.tiny import write_recordings
 
 
@@ -67,17 +66,7 @@ def _small_answers() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_surface_a_figure() -> Iterator[None]:
-    """Shows of one figure share its surface, which takes half a second to work out. tests/body tests it."""
-    known: dict[str, BodyMesh] = {}
-
-    def surface(skeleton: Skeleton) -> BodyMesh:
-        key = mesh_file.mesh_key(skeleton)
-        if key not in known:
-            known[key] = body_mesh(skeleton)
-        return known[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mesh_file, "body_mesh", surface)
+    with each_surface_once(mesh_file):
         yield
 
 
