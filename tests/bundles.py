@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import json
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ import onnx
 import yaml
 from onnx import TensorProto, helper
 
+from appliance.body.mesh_file import MESH_FILE, write_mesh
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
@@ -56,6 +59,19 @@ def write_show(
     }
     (folder / "show.yaml").write_text(yaml.safe_dump(show))
     return folder
+
+
+def with_surface(show: Path) -> Path:
+    """The figure's surface beside a show, as `bunraku pack` writes it: else each projector models it."""
+    (show / MESH_FILE).write_bytes(_surface())
+    return show
+
+
+@functools.cache
+def _surface() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        write_mesh(Path(folder), FIGURE)
+        return (Path(folder) / MESH_FILE).read_bytes()
 
 
 def swaying_phrase(seconds: float = 3.0) -> Recording:

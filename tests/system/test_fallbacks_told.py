@@ -16,7 +16,7 @@ from appliance.lights.fallback import DMX_AWAY
 from appliance.lights.fallback import STAGE_UNSEEN as LIGHTS_SAFE
 from appliance.projector.fallback import STAGE_UNSEEN as PICTURE_BLACK
 from hw_sim.dmx.usb_pro import UsbProWidget
-from tests.bundles import write_show
+from tests.bundles import with_surface, write_show
 from tests.system.box import Box, playing
 from tests.system.lit import RIG, LightsProcess
 from tests.system.processes import wait_until
@@ -72,7 +72,7 @@ def test_a_stage_that_is_lost_and_back(show: Path, tmp_path: Path) -> None:
 
 
 def test_a_picture_without_a_stage_and_with_one(tmp_path: Path) -> None:
-    show = write_show(tmp_path / "show", hands=[])
+    show = with_surface(write_show(tmp_path / "show", hands=[]))
     with playing(show, tmp_path, "--alone") as box, Projection(box.box_file, tmp_path) as projection:
         projection.await_dance()
         box.end(signal.SIGKILL)

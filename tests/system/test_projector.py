@@ -16,7 +16,7 @@ from PIL import Image
 
 from appliance.projector.projector_error import NO_DISPLAY, NO_PLACE
 from appliance.show.bundle import default_show_path
-from tests.bundles import write_show
+from tests.bundles import with_surface, write_show
 from tests.show_control.doubles import Asker
 from tests.system.box import Box, playing
 from tests.system.processes import BUNRAKU, Process, run, run_bunraku, wait_until
@@ -58,7 +58,7 @@ class Projection(Process):
 
 @pytest.fixture
 def box(tmp_path: Path) -> Iterator[Box]:
-    with playing(write_show(tmp_path / "show", hands=[]), tmp_path) as box:
+    with playing(with_surface(write_show(tmp_path / "show", hands=[])), tmp_path) as box:
         yield box
 
 
@@ -67,7 +67,7 @@ def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Pa
     box_file.write_text("runtime: runtime\n")  # as in the box file that the box gets
     with Projection(box_file, tmp_path) as projection:
         projection.await_black()
-        with playing(write_show(tmp_path / "show", hands=[]), tmp_path) as box:
+        with playing(with_surface(write_show(tmp_path / "show", hands=[])), tmp_path) as box:
             projection.await_dance()
             projection.await_output("No graphics card draws here")
             box.end(signal.SIGKILL)
