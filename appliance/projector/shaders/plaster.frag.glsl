@@ -49,7 +49,8 @@ void main() {
     float warm = shaded * (1.0 - shaded);
     vec3 glance = vec3(0.10, 0.03, 0.0) * warm;
     float sheen = 0.07 * pow(clamp(dot(n, normalize(lamp + to_eye)), 0.0, 1.0), 14.0) * shaded;
-    vec3 light = albedo * (light_colour * (key * 1.75 * mix(1.0, open, 0.35)) + glance + ambient + rim) + light_colour * sheen;
+    float aimed = mix(1.4, 3.1, smoothstep(0.35, 0.95, place.y));  // at the head: a stop more than on the legs
+    vec3 light = albedo * (light_colour * (key * aimed * mix(1.0, open, 0.35)) + glance + ambient + rim) + light_colour * sheen;
     light += held_colour * mark * (0.16 + 0.30 * facing) * cavity;
     colour = vec4(dithered(toned(exposure * light), gl_FragCoord.xy), 1.0);
 }

@@ -29,17 +29,16 @@ vec3 floor_light() {
     if (ray.y > -1e-3) return vec3(0.0);
     vec3 at = eye - ray * (eye.y / ray.y);
     vec2 off = (at.xz - ground) / spread;
-    float far = dot(off, off);
-    float pool = exp(-far * 1.9) * (1.0 + 0.6 * exp(-far * 5.0));
+    float far = length(off), pool = 1.25 * (1.0 - smoothstep(0.22, 0.92, far)) + 0.12 * exp(-2.5 * far * far);
     vec2 on_cast = (at.xz - middle) / reach;
     vec3 bands = texture(floor_shadow, 0.5 + 0.5 * on_cast).rgb;
     float inside = 1.0 - smoothstep(0.75, 1.0, max(abs(on_cast.x), abs(on_cast.y)));
     float dark = min(1.0, 1.2 * bands.r + 1.15 * bands.g + 1.1 * bands.b) * inside * shadow;
     vec2 on_contact = (at.xz - contact_middle) / reach;
-    float touched = texture(contact, 0.5 + 0.5 * on_contact).r * (1.0 - step(1.0, max(abs(on_contact.x), abs(on_contact.y))));
+    vec2 above = texture(contact, 0.5 + 0.5 * on_contact).rg * (1.0 - step(1.0, max(abs(on_contact.x), abs(on_contact.y))));
     float worn = 0.62 + 0.5 * texture(noise, at.xz * 0.21).r + 0.30 * (texture(noise, at.xz * 1.1).g - 0.5);
     vec3 bounced = light_colour * (1.0 - dark) + accent_colour * 0.05;
-    bounced *= 1.0 - shadow * smoothstep(0.25, 0.8, touched);
+    bounced *= 1.0 - shadow * max(smoothstep(0.08, 0.5, above.r), 0.55 * above.g);
     return air_colour * bounced * pool * worn * 1.3;
 }
 

@@ -12,7 +12,7 @@ from appliance.projector.picture.targets import of_lines
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
-KEY_FROM, KEY_ABOVE = -1.2, 50.0  # radians beside the camera, degrees above the floor
+KEY_FROM, KEY_ABOVE = -1.35, 44.0  # radians beside the camera, degrees above the floor
 RIM_FROM, RIM_ABOVE = 2.25, 24.0
 BEAM, BEAM_WIDTH = 2.4, 0.42  # figure heights from the pool of light to the lamp, and across the pool
 AIR_LINES = 180  # lines of the picture of the empty stage, which is soft everywhere
