@@ -10,15 +10,18 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.picture.body_buffers import BodyBuffers, merged
 
+FINEST = 2.6  # how much smaller grains are, and closer, where the surface has details
 Parts = dict[
     str, Any
-]  # (P, ..): places in figure heights, rest pose; normals; four chances 0 to 1; what moves them
+]  # (P, ..): places in figure heights, rest pose; normals, and sizes; four chances 0 to 1; what moves them
 
 
 def particles_of(body: BodyBuffers, count: int) -> Parts:
     """Spread `count` points evenly over a body, always the same ones."""
     corners = body.positions[body.faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    fine = np.clip(np.sqrt(np.quantile(areas, 0.8) / np.maximum(areas, 1e-12)), 1.0, FINEST)  # face and hands
+    areas = areas * fine**2
     random = np.random.RandomState(7)  # its numbers stay the same in every version of numpy
     even = (np.arange(count) + random.random_sample(count)) / count
     face = np.minimum(np.searchsorted(np.cumsum(areas) / areas.sum(), even), len(body.faces) - 1)
@@ -31,7 +34,7 @@ def particles_of(body: BodyBuffers, count: int) -> Parts:
     order = random.permutation(count)
     return {
         "position": places[order].astype(np.float32),
-        "normal": normals[order].astype(np.float32),
+        "normal": np.column_stack([normals, 2.0 / fine[face] - 1.0])[order].astype(np.float32),
         "chance": random.random_sample((count, 4)).astype(np.float32),
         "joints": body.joints[a][order],
         "weights": body.weights[a][order],

@@ -56,7 +56,7 @@ void main() {
     float key = clamp(dot(normal, lamp) * 0.85 + 0.15, 0.0, 1.0);
     float rim = pow(1.0 - clamp(abs(facing), 0.0, 1.0), 2.5);
     float deep = exp(-fog * 1.6 * max(distance - focus, -0.3));
-    float spark = 0.35 + 0.5 * in_chance.w + 1.4 * pow(in_chance.y, 12.0);
+    float spark = 0.45 + 0.5 * in_chance.w + 1.4 * pow(in_chance.y, 12.0);
     vec3 on_body = figure_colour * (0.05 + 0.95 * key * key) + accent_colour * (0.16 + 1.2 * rim);
     vec3 in_air = mix(light_colour, accent_colour, smoothstep(0.1, 0.8, age));
     float mark = held_at(in_joints, in_weights);
@@ -65,7 +65,7 @@ void main() {
     float shown = loose ? smoothstep(0.30, 1.5, speed) * pow(1.0 - age, 1.5) : smoothstep(-0.1, 0.3, facing);
     grain_colour = vec4((loose ? in_air * 1.3 : on_body) * spark * shown * deep, 1.0);
     gl_Position = projection * vec4(place + 0.012 * way / distance, 1.0);
-    float size = pixels * (0.42 + 0.45 * in_chance.w + 1.5 * pow(in_chance.y, 10.0)) / gl_Position.w;
+    float size = pixels * in_normal.w * (0.36 + 0.45 * in_chance.w + 1.6 * pow(in_chance.y, 9.0)) / gl_Position.w;
     gl_PointSize = clamp(size, 1.6, 16.0);
     grain_colour.rgb *= min(1.0, size * size / (1.6 * 1.6));
     if (shown < 0.01) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
