@@ -6,18 +6,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from appliance.body.volumes import Ball, Cut, Slab, Step
+from appliance.body.volumes import Ball, Cut, Slab, Step, loft
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
 
 _UP = np.array([0.0, 1.0, 0.0])
 _LEVEL = np.array([1.0, 0.0, 1.0])
-FINGER = (0.0061, 0.0045)  # radii at knuckle and tip, in heights
-THUMB = (0.0078, 0.0056)
+FINGER = (0.0073, 0.0062)  # radii at knuckle and tip, in heights
+THUMB = (0.0086, 0.0068)
 CURL = 0.30  # how far the tip of a relaxed finger is on the palm's side, in lengths of the finger
-FAN = 0.08  # how far fingers spread, metres aside for each metre from the knuckle: else they stick together
-THUMB_AWAY = 0.22
-TIP = 0.010  # the skin goes on beyond the last bone, in heights
+FAN = 0.42  # how far the outer fingers spread, metres aside for each metre from the knuckle
+THUMB_AWAY = 0.26
+TIP = 0.008  # the skin goes on beyond the last bone, in heights
 WEB = 0.16  # share of the finger that the palm's skin covers
 _HAND = 0.105  # length of a hand whose fingers the skeleton lacks, in heights
 _FOOT = 0.125
@@ -46,23 +46,25 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
     middle = float((knuckles @ aside).mean())
     half = max(0.5 * float(np.ptp(knuckles @ aside)), 1e-6)
     bones = [(joint, wrist, knuckle) for knuckle in knuckles]
+    ways = np.array([_furthest(anatomy, *at) for at in zip(fingers, knuckles, strict=True)]) - knuckles
+    spread = ways @ aside / np.maximum(np.linalg.norm(ways, axis=1), 1e-9)
     chains: list[tuple[list[tuple[int, Array]], Array]] = []
-    for finger, knuckle in zip(fingers, knuckles, strict=True):
-        fan = FAN * (float(knuckle @ aside) - middle) / half
+    for finger, knuckle, own in zip(fingers, knuckles, spread, strict=True):
+        fan = FAN * (float(knuckle @ aside) - middle) / half + float(spread.mean() - own)
         chain = _relaxed(anatomy, finger, knuckle, fan * aside, CURL * palm)
         chains.append((chain, knuckle))
     steps += _palm(joint, wrist, [knuckle for _, knuckle in chains], aside, height)
     for chain, knuckle in chains:
         steps += _finger(chain, FINGER, height, aside)
         web = knuckle + WEB * (chain[-1][1] - knuckle)
-        steps.append(Slab(joint, knuckle, web, 0.0062 * height, 0.0050 * height, 0.006 * height, aside))
+        steps.append(Slab(joint, knuckle, web, 0.0068 * height, 0.0058 * height, 0.005 * height, aside))
     thumb_at = anatomy.positions[thumb]
     base = wrist + 0.30 * (thumb_at - wrist)
     chain = _relaxed(anatomy, thumb, base, THUMB_AWAY * aside, 0.3 * CURL * palm)
     steps.append(Slab(joint, base, chain[0][1], 0.0125 * height, 0.0100 * height, 0.014 * height, aside))
     steps += _finger(chain, THUMB, height, aside)
     thick = FINGER[0] * height
-    bones += [(joint, base, thumb_at), *anatomy.bones(anatomy.below(joint))]
+    bones.append((joint, base, thumb_at))
     return steps, [Slab(*bone, thick, thick, 0.0, aside) for bone in bones]
 
 
@@ -71,7 +73,7 @@ def _palm(joint: int, wrist: Array, knuckles: list[Array], aside: Array, height:
     steps: list[Step] = []
     for knuckle in knuckles:
         start = wrist + 0.35 * float((knuckle - wrist) @ aside) * aside
-        steps.append(Slab(joint, start, knuckle, 0.0115 * height, 0.0072 * height, 0.007 * height, aside))
+        steps.append(Slab(joint, start, knuckle, 0.0096 * height, 0.0076 * height, 0.007 * height, aside))
     return steps
 
 
@@ -111,12 +113,12 @@ def _finger(
 
 # Fingers of a relaxed hand, in lengths of the hand: knuckle (along, aside), tip (along, aside, inwards).
 _RELAXED = (
-    ((0.50, 0.20), (0.92, 0.27, 0.10)),
-    ((0.53, 0.07), (1.00, 0.09, 0.13)),
-    ((0.51, -0.06), (0.94, -0.10, 0.15)),
-    ((0.46, -0.18), (0.80, -0.27, 0.15)),
+    ((0.50, 0.22), (0.92, 0.33, 0.10)),
+    ((0.53, 0.08), (1.00, 0.11, 0.13)),
+    ((0.51, -0.07), (0.94, -0.12, 0.15)),
+    ((0.46, -0.20), (0.80, -0.34, 0.15)),
 )
-_RELAXED_THUMB = ((0.12, 0.10, 0.03), (0.34, 0.30, 0.10), (0.58, 0.42, 0.13))
+_RELAXED_THUMB = ((0.12, 0.10, 0.03), (0.34, 0.34, 0.10), (0.56, 0.51, 0.13))
 
 
 def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
@@ -154,11 +156,33 @@ def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
         bend = 0.5 * (knuckle + at(*tip)) - 0.02 * long * inwards
         steps += _finger([(joint, knuckle), (joint, bend), (joint, at(*tip))], FINGER, height, aside)
         web = knuckle + WEB * (at(*tip) - knuckle)
-        steps.append(Slab(joint, knuckle, web, 0.0062 * height, 0.0050 * height, 0.006 * height, aside))
+        steps.append(Slab(joint, knuckle, web, 0.0068 * height, 0.0058 * height, 0.005 * height, aside))
     root, middle, tip_at = (at(*place) for place in _RELAXED_THUMB)
     steps.append(Slab(joint, root, middle, 0.0120 * height, 0.0085 * height, 0.014 * height, aside))
     steps += _finger([(joint, middle), (joint, tip_at)], THUMB, height, aside)
     return steps, mover
+
+
+# Sections across a foot: share of the way from the ankle to the toes' joint or end; outwards, half the width,
+# above the sole, half the depth, in heights.
+_SOLE = (
+    (-0.24, 0.000, 0.0162, 0.0140, 0.0170),
+    (0.00, 0.000, 0.0165, 0.0160, 0.0190),
+    (0.26, 0.000, 0.0172, 0.0140, 0.0180),
+    (0.50, 0.001, 0.0212, 0.0105, 0.0150),
+    (0.70, 0.001, 0.0250, 0.0080, 0.0125),
+    (0.88, -0.0005, 0.0235, 0.0062, 0.0095),
+    (1.04, -0.005, 0.0160, 0.0056, 0.0075),
+    (1.12, -0.009, 0.0105, 0.0054, 0.0066),
+)
+# Toes: outwards, how far beyond the skeleton's foot, thickness; in heights.
+_TOES = (
+    (-0.0165, 0.0195, 0.0084),
+    (-0.0035, 0.0180, 0.0066),
+    (0.0060, 0.0135, 0.0062),
+    (0.0145, 0.0065, 0.0060),
+    (0.0208, -0.0030, 0.0058),
+)
 
 
 def foot(anatomy: Anatomy, joint: int) -> list[Step]:
@@ -185,31 +209,32 @@ def foot(anatomy: Anatomy, joint: int) -> list[Step]:
         first, last = np.array(radii) * height
         return Slab(owner, a, b, first, last, soft * height, outwards)
 
-    ball = 0.70 * long / height
-    shank = float(ankle[1]) - sole
-    high = shank / height
+    length = long / height
+    ball = 0.70 * length
+    high = (float(ankle[1]) - sole) / height
+    owners = [joint if share <= 0.70 else mover for share, *_ in _SOLE]
+    shares, out, wide, middle, deep = np.array(_SOLE).T
+    line = np.array([at(*place) for place in zip(shares * length, out, middle, strict=True)])
     steps: list[Step] = [
-        part(ankle, at(-0.016, 0.0, 0.017), (0.0175, 0.0180), 0.010),  # heel
-        part(at(-0.014, 0.0, high), at(-0.022, 0.0, 0.022), (0.0090, 0.0140), 0.012),  # tendon
-        part(ankle, at(ball, -0.011, 0.0125), (0.0185, 0.0125), 0.022),  # instep
-        part(
-            at(-0.012, 0.004, 0.014), at(ball - 0.006, 0.015, 0.0105), (0.0150, 0.0105), 0.014
-        ),  # outer edge
-        part(at(ball - 0.004, -0.016, 0.0120), at(ball - 0.008, 0.017, 0.0100), (0.0120, 0.0100), 0.010),
+        loft(owners, line, wide * height, deep * height, outwards, 0.010 * height),
+        part(ankle, at(-0.018, 0.0, 0.018), (0.0150, 0.0170), 0.012),  # heel
+        part(at(-0.014, 0.0, high), at(-0.024, 0.0, 0.022), (0.0085, 0.0130), 0.012),  # tendon
+        part(ankle, at(ball, -0.008, 0.0100), (0.0150, 0.0110), 0.018),  # instep
     ]
-    for sign, above in ((-1.0, 0.006), (1.0, 0.002)):
+    for sign, before, above in ((-1.0, 0.003, 0.005), (1.0, -0.003, 0.000)):  # ankle bones
         steps.append(
-            Ball(joint, at(0.000, sign * 0.0135, high + above), height * np.array([0.011, 0.013, 0.008]),
-                 np.array([ahead, _UP, outwards]), 0.008 * height)
+            Ball(joint, at(before, sign * 0.0140, high + above), height * np.array([0.0095, 0.011, 0.0075]),
+                 np.array([ahead, _UP, outwards]), 0.007 * height)
         )  # fmt: skip
-    reach = (long / height) - ball + 0.016
-    for out, far, thick in (
-        (-0.0175, 1.00, 0.0085), (-0.0040, 0.98, 0.0064), (0.0050, 0.86, 0.0060),
-        (0.0130, 0.72, 0.0056), (0.0200, 0.54, 0.0054),
-    ):  # fmt: skip
-        start = at(ball - 0.004, 0.9 * out, 0.0100)
-        tip = at(ball + far * reach - thick, out, thick)
-        steps.append(part(start, tip, (1.15 * thick, thick), 0.005, mover))
+    for out_at, far, thick in _TOES:
+        start = at(ball + 0.004, 0.9 * out_at, 0.0085)
+        tip = at(length + far - thick, out_at, thick)
+        steps.append(part(start, tip, (thick, thick), 0.007, mover))
+    arch = at(0.30 * length, -0.030, -0.002)
+    steps.append(
+        Ball(joint, arch, height * np.array([0.024, 0.013, 0.012]),
+             np.array([ahead, _UP, outwards]), 0.012 * height, removes=True)
+    )  # fmt: skip
     steps.append(Cut(at(0.0, 0.0, 0.0), -_UP, 0.16 * height, 0.006 * height))
     return steps
 

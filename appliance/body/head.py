@@ -6,38 +6,51 @@ from itertools import pairwise
 
 import numpy as np
 
-from appliance.body.volumes import Ball, Slab, Step
+from appliance.body.volumes import Ball, Slab, Step, loft
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
 
 _UP = np.array([0.0, 1.0, 0.0])
 _REACH = 0.115  # from the head joint to the crown, where the skeleton does not say
-_NECK = 0.0310  # radius
+_NECK = 0.0292  # radius
 
 # Places as (to the front, upwards, to the side) from the middle of the head, radii and softness, in heights.
 Place = tuple[float, float, float]
 _BALLS: tuple[tuple[Place, Place, float], ...] = (
-    ((-0.004, 0.010, 0.0), (0.0565, 0.050, 0.0480), 0.0),  # cranium
-    ((-0.030, -0.004, 0.0), (0.0290, 0.036, 0.037), 0.024),  # back of the head
-    ((0.026, 0.012, 0.0), (0.029, 0.034, 0.039), 0.020),  # forehead
-    ((0.022, -0.026, 0.0), (0.029, 0.036, 0.034), 0.020),  # face
-    ((0.036, -0.059, 0.0), (0.0135, 0.0115, 0.013), 0.016),  # chin
+    ((-0.008, 0.010, 0.0), (0.0520, 0.0490, 0.0445), 0.0),  # cranium
+    ((0.016, 0.008, 0.0), (0.0370, 0.0400, 0.0400), 0.020),  # forehead
+    ((-0.032, -0.004, 0.0), (0.0270, 0.0330, 0.0340), 0.020),  # back of the head
+)
+# The face below the forehead, from temple to chin: upwards, to the front, half the width, half the depth.
+_FACE = np.array(
+    [
+        (0.016, 0.010, 0.0390, 0.0410),
+        (0.000, 0.011, 0.0400, 0.0400),
+        (-0.016, 0.011, 0.0395, 0.0400),
+        (-0.030, 0.012, 0.0375, 0.0385),
+        (-0.044, 0.016, 0.0325, 0.0335),
+        (-0.055, 0.023, 0.0235, 0.0250),
+        (-0.061, 0.029, 0.0150, 0.0150),
+    ]
+)
+_JAWS: tuple[tuple[Place, Place, float], ...] = (
+    ((0.0440, -0.0595, 0.0), (0.0110, 0.0105, 0.0130), 0.010),  # chin
+    ((0.0420, -0.0375, 0.0), (0.0100, 0.0090, 0.0160), 0.014),  # upper jaw
 )
 _BALLS_BY_SIDE: tuple[tuple[Place, Place, float], ...] = (
-    ((0.033, -0.019, 0.026), (0.013, 0.011, 0.012), 0.014),  # cheekbone
-    ((-0.009, -0.010, 0.0465), (0.0100, 0.0115, 0.0050), 0.006),  # ear
-    ((-0.006, -0.023, 0.0445), (0.0065, 0.0090, 0.0045), 0.006),  # ear lobe
-    ((0.020, -0.036, 0.020), (0.018, 0.018, 0.016), 0.024),  # cheek
+    ((0.0300, -0.0180, 0.0270), (0.0150, 0.0100, 0.0110), 0.018),  # cheekbone
+    ((0.0250, -0.0340, 0.0210), (0.0180, 0.0160, 0.0130), 0.018),  # cheek
+    ((-0.0080, -0.0110, 0.0460), (0.0110, 0.0170, 0.0065), 0.005),  # ear
 )
 _SLABS_BY_SIDE: tuple[tuple[Place, Place, tuple[float, float], float], ...] = (
-    ((-0.006, -0.034, 0.036), (0.030, -0.060, 0.010), (0.011, 0.010), 0.014),  # jaw
-    ((0.050, 0.0035, 0.006), (0.040, 0.0035, 0.033), (0.0075, 0.0070), 0.009),  # brow
+    ((0.0020, -0.0385, 0.0320), (0.0370, -0.0620, 0.0095), (0.0090, 0.0080), 0.014),  # jaw
+    ((0.0480, 0.0040, 0.0060), (0.0370, 0.0030, 0.0330), (0.0080, 0.0065), 0.012),  # brow
 )
-_SOCKET: tuple[Place, Place, float] = ((0.0610, -0.0100, 0.0190), (0.0120, 0.0080, 0.0120), 0.014)
-_LID: tuple[Place, Place, float] = ((0.0415, -0.0095, 0.0180), (0.0095, 0.0080, 0.0095), 0.005)
-_RIDGE = ((0.0485, -0.004, 0.0), (0.0625, -0.0275, 0.0), (0.0050, 0.0065), 0.008)
-_WING = ((0.0525, -0.0295, 0.0070), (0.0065, 0.0052, 0.0050), 0.005)
-_LIPS = ((0.0470, -0.0430, -0.0095), (0.0470, -0.0430, 0.0095), (0.0052, 0.0052), 0.010)
+_SOCKET: tuple[Place, Place, float] = ((0.0590, -0.0090, 0.0190), (0.0120, 0.0070, 0.0125), 0.014)
+_LID: tuple[Place, Place, float] = ((0.0392, -0.0100, 0.0185), (0.0095, 0.0080, 0.0100), 0.005)
+_RIDGE = ((0.0500, 0.000, 0.0), (0.0604, -0.0268, 0.0), (0.0050, 0.0066), 0.009)
+_WING = ((0.0515, -0.0290, 0.0066), (0.0062, 0.0052, 0.0050), 0.007)
+_LIPS = ((0.0487, -0.0425, -0.0075), (0.0487, -0.0425, 0.0075), (0.0050, 0.0050), 0.010)
 
 
 def head(anatomy: Anatomy) -> list[Step]:
@@ -70,6 +83,10 @@ def head(anatomy: Anatomy) -> list[Step]:
 
     both = (1.0, -1.0)
     steps: list[Step] = [ball(shape) for shape in _BALLS]
+    levels, ahead, wide, deep = (height * _FACE).T
+    line = middle + levels[:, None] * axes[1] + ahead[:, None] * axes[0]
+    steps.append(loft([joint] * len(line), line, wide, deep, side, 0.020 * height))
+    steps += [ball(shape) for shape in _JAWS]
     steps += [slab(shape, sign) for shape in _SLABS_BY_SIDE for sign in both]
     steps += [ball(shape, sign) for shape in _BALLS_BY_SIDE for sign in both]
     steps += [ball(_SOCKET, sign, removes=True) for sign in both]
@@ -110,16 +127,18 @@ def neck(anatomy: Anatomy) -> list[Step]:
     last, first = joints[-1], joints[0]
     up, _ = _head_axis(anatomy, last)
     into = places[last] + 0.035 * height * up - 0.006 * height * anatomy.forward
-    steps.append(Slab(last, places[last], into, radius, 0.9 * radius, soft, anatomy.across))
+    steps.append(Slab(last, places[last], into, radius, 0.84 * radius, soft, anatomy.across))
     nape = places[last] + height * (0.028 * up - 0.024 * anatomy.forward)
     behind = places[first] - 0.010 * height * anatomy.forward
     steps.append(Slab(first, behind, nape, 0.024 * height, 0.017 * height, 0.024 * height, anatomy.across))
-    pit = places[first] + (0.040 * anatomy.forward - 0.014 * _UP) * height
+    pit = places[first] + (0.032 * anatomy.forward - 0.012 * _UP) * height
+    throat = places[last] + (0.009 * anatomy.forward + 0.010 * up) * height
+    steps.append(Slab(first, pit, throat, 0.0100 * height, 0.0115 * height, 0.020 * height, anatomy.across))
     for sign in (1.0, -1.0):
-        ear = places[last] + (0.022 * up + sign * 0.031 * anatomy.across - 0.010 * anatomy.forward) * height
-        breast = pit + sign * 0.010 * height * anatomy.across
+        ear = places[last] + (0.022 * up + sign * 0.027 * anatomy.across - 0.014 * anatomy.forward) * height
+        breast = pit + sign * 0.012 * height * anatomy.across
         steps.append(
-            Slab(first, breast, ear, 0.0075 * height, 0.0110 * height, 0.010 * height, anatomy.across)
+            Slab(first, breast, ear, 0.0070 * height, 0.0075 * height, 0.014 * height, anatomy.across)
         )
     return steps
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from appliance.body.extremities import foot, hand
 from appliance.body.head import head, neck
-from appliance.body.volumes import Ball, Group, Loft, Slab, Step
+from appliance.body.volumes import Ball, Group, Slab, Step, loft
 from appliance.pose.anatomy import LONG_BONE, Anatomy
 from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
@@ -20,12 +20,15 @@ _UP = np.array([0.0, 1.0, 0.0])
 # Along the spine from below the pelvis to the neck (1): half the width as a share of the hips' and of the
 # shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.
 _SPINE = np.array([-0.112, 0.00, 0.12, 0.24, 0.36, 0.50, 0.66, 0.80, 0.91, 1.00])
-_OF_HIPS = np.array([0.05, 0.74, 0.90, 0.70, 0.40, 0.20, 0.00, 0.00, 0.00, 0.00])
+_OF_HIPS = np.array([0.05, 0.74, 0.82, 0.70, 0.40, 0.20, 0.00, 0.00, 0.00, 0.00])
 _OF_SHOULDERS = np.array([0.00, 0.00, 0.00, 0.10, 0.30, 0.50, 0.72, 0.62, 0.46, 0.25])
 _FLESH = np.array([0.012, 0.034, 0.037, 0.034, 0.031, 0.034, 0.036, 0.030, 0.018, 0.014])
-_DEPTH = np.array([0.012, 0.049, 0.055, 0.051, 0.048, 0.054, 0.061, 0.058, 0.042, 0.030])
-_AHEAD = np.array([0.000, -0.002, 0.001, 0.007, 0.012, 0.012, 0.010, 0.008, 0.000, -0.002])
-_SMALL = 0.07  # heights: larger parts of a head need no small cells
+_DEPTH = np.array([0.012, 0.045, 0.052, 0.049, 0.046, 0.053, 0.061, 0.058, 0.043, 0.030])
+_AHEAD = np.array([0.000, -0.002, 0.001, 0.005, 0.008, 0.011, 0.012, 0.010, 0.002, -0.002])
+# Columns of muscle along the spine and of the belly: share of the spine, aside, before it, in heights.
+_BACK = ((0.06, 0.020, -0.034), (0.36, 0.018, -0.031), (0.62, 0.021, -0.036), (0.88, 0.018, -0.031))
+_BELLY = ((0.12, 0.016, 0.043), (0.36, 0.018, 0.0425), (0.60, 0.022, 0.050))
+_SMALL = 0.06  # heights: larger parts of a head need no small cells
 _HIP = 0.047  # where the hip joints are along the spine
 _BELOW = 0.057  # heights that the pelvis reaches below them
 
@@ -49,7 +52,7 @@ def sculpture(anatomy: Anatomy) -> Sculpture:
         details.append(_box(end))
     face = head(anatomy)
     if face:
-        limbs.append(Group(tuple(face), 0.012 * anatomy.height))
+        limbs.append(Group(tuple(face), 0.008 * anatomy.height))
         small = [step for step in face if float(np.ptp(step.box, axis=0).max()) < _SMALL * anatomy.height]
         details += [_box(small)] if small else []
     body = Group((*_trunk(anatomy), *neck(anatomy), *_back_and_chest(anatomy)), 0.0)
@@ -105,7 +108,7 @@ def _trunk(anatomy: Anatomy) -> list[Step]:
     deep = depth * height
     axis = axis + ahead[:, None] * height * anatomy.forward
     owners = [spine[min(int(np.searchsorted(begins, at, side="right")) - 1, len(spine) - 2)] for at in along]
-    return [_loft(owners, axis, wide, deep, anatomy.across, 0.0)]
+    return [loft(owners, axis, wide, deep, anatomy.across, 0.0)]
 
 
 def _curve(along: Array, places: Array, table: Array) -> Array:
@@ -125,7 +128,7 @@ def _curve(along: Array, places: Array, table: Array) -> Array:
 
 
 def _back_and_chest(anatomy: Anatomy) -> list[Step]:
-    """For an upright figure: two columns of muscle along the spine, chest muscles, belly."""
+    """For an upright figure: columns of muscle along the spine and of the belly, chest muscles."""
     if not anatomy.is_person:
         return []
     spine, height = _spine(anatomy), anatomy.height
@@ -134,8 +137,13 @@ def _back_and_chest(anatomy: Anatomy) -> list[Step]:
     bottom, breast = spine[0], spine[-2] if len(spine) > 1 else spine[0]
     shoulders = max(_half_width(anatomy, breast), 0.05 * height)
 
+    line = np.array([anatomy.positions[joint] for joint in spine])
+    marks = np.maximum.accumulate((line - pelvis) @ (top - pelvis)) / float((top - pelvis) @ (top - pelvis))
+
     def at(along: float, aside: float, before: float) -> Array:
-        there: Array = pelvis + along * (top - pelvis) + height * (aside * across + before * ahead)
+        """A place beside the spine and before it, in heights, at a share of its length."""
+        bone = np.array([np.interp(along, marks, line[:, axis]) for axis in range(3)])
+        there: Array = bone + height * (aside * across + before * ahead)
         return there
 
     def owner(along: float) -> int:
@@ -144,20 +152,19 @@ def _back_and_chest(anatomy: Anatomy) -> list[Step]:
         return max((j for j, y in zip(spine, heights, strict=False) if y <= here), default=bottom)
 
     wide = shoulders / height
-    upwards = (top - pelvis) / np.linalg.norm(top - pelvis)
     steps: list[Step] = []
     for sign in (1.0, -1.0):
-        column = [(0.06, 0.020, -0.034), (0.36, 0.018, -0.024), (0.62, 0.022, -0.036), (0.88, 0.018, -0.030)]
-        for low, high in pairwise(column):
-            start, end = (at(along, sign * aside, before) for along, aside, before in (low, high))
-            steps.append(cone(anatomy, owner(low[0]), start, end, (0.0165 * height, 0.0165 * height), 0.026))
-        steps.append(
-            Slab(
-                breast, at(0.735, sign * 0.018, 0.052), at(0.80, sign * 0.78 * wide, 0.034),
-                0.0200 * height, 0.0160 * height, 0.018 * height, upwards,
-                0.020 * height, 0.010 * height,
-            )
-        )  # fmt: skip
+        for column, thick, soft in ((_BACK, 0.0165, 0.026), (_BELLY, 0.0125, 0.014)):
+            for low, high in pairwise(column):
+                start, end = (at(along, sign * aside, before) for along, aside, before in (low, high))
+                radii = (thick * height, thick * height)
+                steps.append(cone(anatomy, owner(low[0]), start, end, radii, soft))
+        inner, outer = at(0.765, sign * 0.18 * wide, 0.054), at(0.79, sign * 0.70 * wide, 0.043)
+        half = 0.5 * (outer - inner)
+        long = float(np.linalg.norm(half))
+        axes = np.array([half / long, _UP, np.cross(sign * half / long, _UP)])
+        half_axes = np.array([long + 0.014 * height, 0.0255 * height, 0.0205 * height])
+        steps.append(Ball(breast, inner + half, half_axes, axes, 0.011 * height))
     steps.append(
         Ball(owner(0.2), at(0.17, 0.0, 0.030), height * np.array([0.045, 0.060, 0.026]),
              np.array([across, _UP, ahead]), 0.03 * height)
@@ -170,7 +177,6 @@ def _back_and_chest(anatomy: Anatomy) -> list[Step]:
             nape = start - aside + height * (0.046 * _UP - 0.004 * ahead)
             ends, radii = (nape, start - 0.2 * aside), (0.012 * height, 0.016 * height)
             steps.append(Slab(trunk, *ends, *radii, 0.03 * height, across))
-            steps.append(_armpit(anatomy, trunk, start, aside / float(np.linalg.norm(aside))))
     return steps
 
 
@@ -219,7 +225,7 @@ def _hip(anatomy: Anatomy, thigh: int, shank: int) -> Slab:
     """The volume that moves the skin with a thigh, instead of the flesh: behind and above the joint. A bend
     then stretches skin as far from the joint as the skin that it folds, and volume is kept."""
     height = anatomy.height
-    start = anatomy.positions[thigh] + height * (0.030 * _UP - 0.028 * anatomy.forward)
+    start = anatomy.positions[thigh] + height * (0.030 * _UP - 0.031 * anatomy.forward)
     return cone(anatomy, thigh, start, anatomy.positions[shank], (0.05 * height, 0.04 * height), 0.0)
 
 
@@ -250,37 +256,38 @@ class _Flesh:
 
 _THIGH = _Flesh(
     (
-        (0.04, -0.002, -0.006, 0.0390, 0.0440),
-        (0.16, 0.001, -0.005, 0.0460, 0.0510),
-        (0.34, 0.004, -0.003, 0.0465, 0.0510),
-        (0.54, 0.004, -0.001, 0.0425, 0.0460),
-        (0.74, 0.003, 0.001, 0.0370, 0.0400),
-        (0.88, 0.002, 0.001, 0.0325, 0.0350),
-        (1.00, 0.002, 0.000, 0.0314, 0.0330),
+        (0.02, 0.001, -0.0030, 0.0400, 0.0460),
+        (0.16, 0.003, -0.0048, 0.0450, 0.0510),
+        (0.34, 0.004, -0.0040, 0.0440, 0.0510),
+        (0.54, 0.004, -0.0025, 0.0400, 0.0455),
+        (0.74, 0.003, -0.0008, 0.0343, 0.0390),
+        (0.88, 0.002, 0.0005, 0.0308, 0.0340),
+        (1.00, 0.000, 0.0000, 0.0304, 0.0318),
     ),
     (
-        ((0.30, 0.016, 0.010, 0.0330), (0.62, 0.010, 0.012, 0.0260), 0.024),  # the outer front
+        ((0.26, 0.016, 0.006, 0.0310), (0.84, 0.008, 0.004, 0.0120), 0.024),  # the outer front
+        ((-0.08, 0.024, 0.006, 0.0120), (0.48, 0.015, 0.000, 0.0240), 0.030),  # its root
         ((0.62, 0.012, -0.013, 0.0220), (0.88, 0.012, -0.012, 0.0170), 0.020),  # drop above the knee
-        ((0.28, -0.022, -0.004, 0.0280), (0.72, -0.018, -0.004, 0.0200), 0.024),  # the back
-        ((0.94, 0.0200, 0.000, 0.0130), (1.02, 0.0215, 0.000, 0.0125), 0.008),  # kneecap
+        ((0.28, -0.022, -0.004, 0.0280), (0.92, -0.008, -0.003, 0.0100), 0.026),  # the back
+        ((0.93, 0.0195, 0.000, 0.0125), (1.02, 0.0205, 0.000, 0.0120), 0.010),  # kneecap
     ),
 )
 _SHANK = _Flesh(
     (
-        (0.00, 0.002, 0.000, 0.0314, 0.0330),
-        (0.08, 0.000, 0.000, 0.0308, 0.0318),
-        (0.20, -0.003, 0.001, 0.0326, 0.0328),
-        (0.32, -0.006, 0.001, 0.0338, 0.0345),
-        (0.48, -0.004, 0.000, 0.0298, 0.0300),
-        (0.66, -0.002, 0.000, 0.0228, 0.0245),
-        (0.82, -0.003, 0.000, 0.0182, 0.0215),
-        (0.93, -0.003, 0.000, 0.0170, 0.0210),
-        (1.00, -0.002, 0.000, 0.0180, 0.0205),
+        (0.00, 0.000, 0.000, 0.0304, 0.0318),
+        (0.08, -0.001, 0.000, 0.0304, 0.0318),
+        (0.20, -0.005, 0.001, 0.0330, 0.0350),
+        (0.32, -0.008, 0.001, 0.0342, 0.0370),
+        (0.46, -0.007, 0.000, 0.0308, 0.0340),
+        (0.62, -0.004, 0.000, 0.0242, 0.0270),
+        (0.76, -0.003, 0.000, 0.0190, 0.0222),
+        (0.88, -0.003, 0.000, 0.0164, 0.0202),
+        (0.95, -0.003, 0.000, 0.0155, 0.0194),
+        (1.00, -0.002, 0.000, 0.0158, 0.0190),
     ),
     (
-        ((0.22, -0.018, -0.012, 0.0170), (0.42, -0.018, -0.010, 0.0150), 0.020),  # calf
-        ((0.20, -0.017, 0.011, 0.0165), (0.35, -0.018, 0.011, 0.0150), 0.020),
-        ((0.10, 0.017, -0.003, 0.0120), (0.66, 0.011, -0.002, 0.0080), 0.016),  # shin
+        ((0.16, -0.020, -0.011, 0.0150), (0.40, -0.022, -0.011, 0.0160), 0.022),  # calf
+        ((0.05, 0.018, -0.002, 0.0115), (0.66, 0.011, -0.002, 0.0080), 0.016),  # shin
         ((0.70, -0.015, 0.000, 0.0085), (1.00, -0.017, 0.000, 0.0080), 0.016),  # tendon
     ),
 )
@@ -294,25 +301,25 @@ _UPPER_ARM = _Flesh(
         (1.00, 0.000, 0.000, 0.0220, 0.0195),
     ),
     (
-        ((0.07, 0.000, 0.006, 0.0265), (0.40, 0.000, 0.006, 0.0150), 0.016),  # shoulder muscle
-        ((0.36, 0.011, 0.000, 0.0160), (0.60, 0.010, 0.000, 0.0150), 0.020),  # biceps
-        ((0.26, -0.012, 0.002, 0.0170), (0.56, -0.011, 0.001, 0.0150), 0.020),  # triceps
-        ((0.97, -0.010, 0.000, 0.0120), (1.01, -0.010, 0.000, 0.0115), 0.012),  # elbow
+        ((0.07, 0.000, 0.006, 0.0265), (0.48, 0.000, 0.004, 0.0100), 0.016),  # shoulder muscle
+        ((0.38, 0.011, 0.000, 0.0165), (0.76, 0.004, 0.000, 0.0100), 0.020),  # biceps
+        ((0.28, -0.012, 0.002, 0.0170), (0.76, -0.005, 0.001, 0.0100), 0.020),  # triceps
+        ((0.96, -0.010, 0.000, 0.0110), (1.01, -0.0105, 0.000, 0.0105), 0.010),  # elbow
     ),
 )
 _FOREARM = _Flesh(
     (
         (0.00, 0.000, 0.000, 0.0220, 0.0195),
-        (0.12, -0.001, 0.000, 0.0235, 0.0205),
-        (0.26, 0.003, 0.000, 0.0240, 0.0240),
+        (0.12, 0.000, 0.000, 0.0226, 0.0215),
+        (0.26, 0.002, 0.000, 0.0230, 0.0232),
         (0.48, 0.002, 0.000, 0.0205, 0.0215),
         (0.70, 0.001, 0.000, 0.0160, 0.0180),
         (0.88, 0.000, 0.000, 0.0132, 0.0172),
         (1.00, 0.000, 0.000, 0.0130, 0.0178),
     ),
     (
-        ((0.10, 0.006, 0.009, 0.0130), (0.38, 0.008, 0.004, 0.0120), 0.018),
-        ((0.10, 0.003, -0.010, 0.0130), (0.40, 0.003, -0.007, 0.0120), 0.018),
+        ((0.00, 0.001, 0.002, 0.0080), (0.36, 0.009, 0.004, 0.0120), 0.020),
+        ((0.00, 0.001, -0.002, 0.0080), (0.38, 0.003, -0.007, 0.0120), 0.020),
     ),
 )
 
@@ -341,24 +348,11 @@ def _shaped(
         height * _curve(shares, table[:, 0], table[:, column]) for column in (1, 2, 3, 4)
     )
     axis = start + shares[:, None] * bone + ahead[:, None] * front + out[:, None] * side
-    steps: list[Step] = [_loft([owner] * len(axis), axis, wide, deep, side, softness * height)]
+    steps: list[Step] = [loft([owner] * len(axis), axis, wide, deep, side, softness * height)]
     for low, high, soft in flesh.muscles:
         a, b = (start + p[0] * bone + height * (p[1] * front + p[2] * side) for p in (low, high))
         steps.append(cone(anatomy, owner, a, b, (low[3] * height, high[3] * height), soft))
     return steps
-
-
-def _loft(
-    owners: Sequence[int], axis: Array, wide: Array, deep: Array, across: Array, softness: float
-) -> Loft:
-    """Sections with a volume for each piece that says what moves it; owners: the joint of each section."""
-    movers = tuple(
-        Slab(owner, low, high, thin, thin, 0.0, across, half, half)
-        for owner, low, high, thin, half in zip(
-            owners, axis, axis[1:], np.minimum(wide, deep), np.maximum(wide - deep, 0.0), strict=False
-        )
-    )
-    return Loft(axis, wide, deep, across, softness, movers)
 
 
 def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Step]:
@@ -387,18 +381,20 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
         axes, soft = np.array([out, _UP, ahead]), 0.030 * height
         seat = start + height * (-0.030 * ahead - 0.010 * out - 0.024 * _UP)
         hip = start + height * (-0.012 * out - 0.010 * _UP - 0.006 * ahead)
+        trochanter = start + height * (0.006 * out - 0.014 * _UP - 0.004 * ahead)
         groin = start - 0.50 * abs(away) * out - height * (0.022 * _UP - 0.010 * ahead)
         inside = start - height * (0.130 * _UP + 0.008 * out)
         return [
             Ball(trunk, seat, height * np.array([0.042, 0.048, 0.040]), axes, soft),
             Ball(owner, hip, height * np.array([0.042, 0.052, 0.036]), axes, soft),
+            Ball(chain[-1], trochanter, height * np.array([0.026, 0.054, 0.034]), axes, soft),
             cone(anatomy, chain[-1], groin, inside, (0.016 * height, 0.026 * height), 0.03),
         ]
     thick = 0.0290 * height
     inner = start - 0.85 * abs(away) * out
     notch = inner + height * (0.040 * ahead + 0.002 * _UP)
     top = start + height * (0.020 * _UP + 0.012 * ahead - 0.012 * out)
-    flank = start - height * (0.150 * _UP - 0.004 * ahead) - 0.24 * abs(away) * out
+    flank = start - height * (0.165 * _UP - 0.010 * ahead) - 0.40 * abs(away) * out
     breast = start - 0.55 * abs(away) * out + height * (0.034 * ahead - 0.036 * _UP)
     blade = start - 0.45 * abs(away) * out - height * (0.022 * ahead + 0.012 * _UP)
     tip = blade + height * (0.004 * out - 0.060 * _UP - 0.004 * ahead)
@@ -411,25 +407,16 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
             trunk,
             flank,
             start - height * (0.018 * ahead + 0.004 * _UP),
-            0.004 * height,
-            0.019 * height,
-            0.034 * height,
+            0.010 * height,
+            0.018 * height,
+            0.040 * height,
             across,
         ),  # broad back muscle
-        Slab(owner, blade, tip, 0.015 * height, 0.009 * height, 0.034 * height, across, 0.020 * height, 0.0),
+        Slab(owner, blade, tip, 0.015 * height, 0.006 * height, 0.034 * height, across, 0.020 * height, 0.0),
         Slab(
             owner, blade + 0.012 * height * _UP, start, 0.013 * height, 0.014 * height, 0.018 * height, across
         ),
-        _armpit(anatomy, owner, start, out),
     ]
-
-
-def _armpit(anatomy: Anatomy, owner: int, shoulder: Array, out: Array) -> Ball:
-    """The hollow between chest muscle and broad back muscle; out: along an arm that is held to the side."""
-    height, ahead = anatomy.height, anatomy.forward
-    middle = shoulder - height * (0.049 * _UP + 0.002 * ahead - 0.006 * out)
-    radii, axes = height * np.array([0.030, 0.022, 0.017]), np.array([out, _UP, ahead])
-    return Ball(owner, middle, radii, axes, 0.024 * height, removes=True)
 
 
 def _plain_root(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bool) -> list[Step]:

@@ -112,9 +112,14 @@ def _agreeing(
     refined: NDArray[np.bool_],
     finer: Sequence[Finer],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Both fields without ambiguity, equal at the corners of halved cells."""
+    """Both fields without ambiguity, equal at the corners of halved cells.
+
+    The surface crosses an edge between whole and halved cells once at most: crossed twice, it would give an
+    edge four triangles.
+    """
     if not refined.any():
         return _without_ambiguity(field), small
+    low, middle, high = _edges_between(refined)
     shared = np.zeros(field.shape, dtype=np.bool_)
     for x, y, z in _CORNERS:
         shared[x : x + refined.shape[0], y : y + refined.shape[1], z : z + refined.shape[2]] |= refined
@@ -122,12 +127,31 @@ def _agreeing(
         for box in finer:
             part = _samples_of(box)
             small[part] = _without_ambiguity(small[part])
+        values = [small[tuple(places.T)] for places in (low, middle, high)]
+        inside = [value < 0 for value in values]
+        twice = (inside[0] == inside[2]) & (inside[1] != inside[0])
+        nearer = np.where((values[0] <= values[2])[:, None], low, high)
+        small[tuple(np.where(inside[1][:, None], nearer, middle)[twice].T)] = _FILLED
         field = np.where(shared, small[::2, ::2, ::2], field)
         field = _without_ambiguity(field)
         differs = shared & ((field < 0) != (small[::2, ::2, ::2] < 0))
-        if not differs.any():
+        if not (differs.any() or twice.any()):
             return field, small
         small[::2, ::2, ::2][differs] = field[differs]
+
+
+def _edges_between(refined: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
+    """One end, the middle and the other end, (E, 3) each in small samples, of the edges that whole and halved
+    cells share."""
+    found = []
+    for axis in range(3):
+        cells = np.moveaxis(refined, axis, 2)
+        one, other = cells[:-1] | cells[1:], cells[:-1] & cells[1:]
+        edges = 2 * np.argwhere((one[:, :-1] | one[:, 1:]) & ~(other[:, :-1] & other[:, 1:]))
+        low = np.insert(edges[:, :2] + 2, axis, edges[:, 2], axis=1)
+        ahead = np.eye(3, dtype=np.int64)[axis]
+        found.append(np.stack([low, low + ahead, low + 2 * ahead]))
+    return tuple(np.concatenate(found, axis=1))
 
 
 def _halved(refined: NDArray[np.bool_]) -> NDArray[np.bool_]:

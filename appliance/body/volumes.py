@@ -164,6 +164,19 @@ class Loft:
         return away
 
 
+def loft(
+    owners: Sequence[int], axis: Array, wide: Array, deep: Array, across: Array, softness: float
+) -> Loft:
+    """Sections with a volume for each piece that says what moves it; owners: the joint of each section."""
+    movers = tuple(
+        Slab(owner, low, high, thin, thin, 0.0, across, half, half)
+        for owner, low, high, thin, half in zip(
+            owners, axis, axis[1:], np.minimum(wide, deep), np.maximum(wide - deep, 0.0), strict=False
+        )
+    )
+    return Loft(axis, wide, deep, across, softness, movers)
+
+
 Step = Slab | Ball | Loft | Cut
 
 

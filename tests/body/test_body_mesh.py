@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from appliance.body.bake import openness
 from appliance.body.body_mesh import body_mesh
 from appliance.body.skinning import BodyMesh
 from appliance.body.surface import Finer, Grid, finer_grid, surface_of
@@ -201,15 +202,60 @@ def test_legs_begin_where_a_dancer_s_do() -> None:
     assert 0.44 < (middle.min() - low) / (high - low) < 0.49
 
 
-def test_an_armpit_is_a_hollow_between_chest_and_back() -> None:
+@pytest.mark.parametrize(("name", "arm"), [("dancer", "lShldr"), ("mixamo", "mixamorig:LeftArm")])
+def test_an_armpit_is_no_crater(name: str, arm: str) -> None:
+    """A pit between chest and back muscles let 0.14 of the light in."""
+    mesh, skeleton = mesh_of(name), skeleton_of(name)
+    places = (mesh.vertices - mesh.bind_positions[skeleton.index(arm)]) / mesh.height
+    near = np.linalg.norm(places - [0.01, -0.055, 0.0], axis=1) < 0.05
+    light = openness((mesh.vertices / mesh.height).astype(np.float32), mesh.normals, mesh.faces)
+    assert near.sum() > 100 and light[near].min() > 0.4
+
+
+def test_a_throat_is_no_slot_between_two_muscles() -> None:
     mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
-    places = (mesh.vertices - mesh.bind_positions[skeleton.index("lShldr")]) / mesh.height
-    under = places[(np.abs(places[:, 0] - 0.012) < 0.006) & (places[:, 1] < 0) & (places[:, 1] > -0.12)]
+    places = (mesh.vertices - mesh.bind_positions[skeleton.index("neck")]) / mesh.height
+    for above in np.arange(-0.01, 0.015, 0.005):
+        level = places[np.abs(places[:, 1] - above) < 0.006]
+        middle, beside = (
+            float(level[np.abs(np.abs(level[:, 0]) - aside) < 0.005, 2].max()) for aside in (0.0, 0.009)
+        )
+        assert beside - middle < 0.0005, above
 
-    def lowest(ahead: float) -> float:
-        return float(under[np.abs(under[:, 2] - ahead) < 0.005, 1].min())
 
-    assert lowest(-0.01) > max(lowest(-0.03), lowest(0.01)) + 0.004
+def test_a_hip_is_widest_at_the_joint_and_its_outline_has_no_dent() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    places = mesh.vertices / mesh.height
+    side = places[(places[:, 0] > 0) & (places[:, 0] < 0.15)]
+    levels = np.arange(0.10, -0.18, -0.01)
+    wide = np.array([side[np.abs(side[:, 1] - level) < 0.006, 0].max() for level in levels])
+    widest = int(wide.argmax())
+    hip = mesh.bind_positions[skeleton.index("lThigh"), 1] / mesh.height
+    assert abs(levels[widest] - hip) < 0.045
+    assert np.diff(wide[: widest + 1]).min() > -5e-4 and np.diff(wide[widest:]).max() < 5e-4
+
+
+def test_a_foot_is_a_wedge_on_a_slim_ankle() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    places = (mesh.vertices - mesh.bind_positions[skeleton.index("lFoot")]) / mesh.height
+    near = places[(np.abs(places[:, 0]) < 0.06) & (places[:, 1] < 0.07)]
+    ankle = np.ptp(near[np.abs(near[:, 1] - 0.02) < 0.005, 0])
+    foot = near[near[:, 1] < 0.0]
+    heel, ball, toes = (foot[np.abs(foot[:, 2] - ahead) < 0.005] for ahead in (-0.03, 0.065, 0.10))
+    assert np.ptp(ball[:, 0]) > 1.35 * ankle and np.ptp(ball[:, 0]) > 1.4 * np.ptp(heel[:, 0])
+    assert np.ptp(toes[:, 0]) > 0.35 * np.ptp(ball[:, 0]), "a hoof"
+    assert toes[:, 1].max() < ball[:, 1].max() - 0.003
+
+
+def test_fingers_are_thick_enough_for_the_last_row() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    for finger in ("lIndex2", "lMid2", "lRing2", "lPinky2"):
+        skin_of = (mesh.joints[:, 0] == skeleton.index(finger)) & (mesh.weights[:, 0] > 0.6)
+        places = mesh.vertices[skin_of] / mesh.height
+        places = places - places.mean(axis=0)
+        along = np.linalg.svd(places, full_matrices=False)[2][0]
+        radius = np.linalg.norm(places - np.outer(places @ along, along), axis=1).mean()
+        assert 0.0055 < radius < 0.0075
 
 
 def test_no_fold_beside_the_neck_when_arms_are_above_the_head() -> None:
@@ -306,6 +352,18 @@ def test_a_surface_of_cells_of_two_sizes_is_closed(low: tuple[int, int, int]) ->
     assert len(vertices) > len(surface_of(ball_field(grid), grid)[0])
     np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 0.7, atol=0.005)
     np.testing.assert_allclose(normals, vertices / 0.7, atol=0.04)
+
+
+def test_a_surface_that_grazes_an_edge_between_cells_of_two_sizes_is_closed() -> None:
+    """The middle of a whole cell's edge is inside and both its ends are not."""
+    grid = Grid(np.zeros(3), 1.0, (9, 9, 9))
+    fine = np.ones(finer_grid(grid, np.full(3, 2), np.full(3, 6)).shape, np.float32)
+    fine[3, 2, 2] = -0.5
+    field = np.ones(grid.shape, np.float32)
+    field[3, 2, 3] = -0.5  # the surface also crosses the face between the two whole cells at that edge
+    _, _, faces = surface_of(field, grid, [Finer(np.full(3, 2), fine)])
+    once, counts = np.unique(edges_of(faces), axis=0, return_counts=True)
+    assert (counts == 1).all() and np.array_equal(once, np.unique(edges_of(faces)[:, ::-1], axis=0))
 
 
 def pieces(mesh: BodyMesh, chosen: NDArray[np.bool_]) -> int:
