@@ -14,7 +14,7 @@ from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
 from appliance.projector.picture.poses import Poses
 
-BONES = 12  # melt.glsl's MELT_BONES
+BONES = 15  # melt.glsl's MELT_BONES
 GATHERS, SINKS = 0.55, 0.60  # how far a molten body draws together, and how much lower it gets
 SWELLS, BELOW, UP_TO = (
     0.03,

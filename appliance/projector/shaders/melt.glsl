@@ -3,7 +3,7 @@
 // logarithm of a sum of exponentials, the further the more molten), and places go to where that distance is nothing.
 // Without MELT no look of the show melts, and it costs nothing.
 #ifdef MELT
-const int MELT_BONES = 12;
+const int MELT_BONES = 15;
 uniform float melt;
 uniform float melt_time;
 uniform int melt_steps;  // towards the surface; 0: as it is
