@@ -118,18 +118,21 @@ async function change(address, given, corners) {
     ownUntil = performance.now() + OWN_MS;
     pulls = []; // the mesh goes with the corners
     put(corners);
-  } else before.pop();
+  } // else a projector that answers late may have done it all the same: it can be undone
   tellUndo();
 }
 
 async function undo() {
   const { corners, warp = [], place, pull } = before.at(-1) ?? {};
   if (corners && await command("/projector/corners", ...corners.flat())) {
+    put(corners);
     for (const at of INNER.filter((one) => warp[one])) {
       const left = away(warp[at], pulls[at]);
-      if ((left[0] || left[1]) && await command(POINT.address, at + 1, ...left)) pulls[at] = warp[at];
+      if (!left[0] && !left[1]) continue;
+      if (!await command(POINT.address, at + 1, ...left)) return; // a projector that is busy: the next press goes on
+      pulls[at] = warp[at];
     }
-    put(corners);
+    lay(pulls);
   } else if (pull && await command(POINT.address, place + 1, ...away(pull, pulls[place]))) {
     pulls[place] = pull;
     lay(pulls);
