@@ -69,7 +69,7 @@ def test_a_foot_on_the_floor_darkens_it_and_a_jump_does_not(gl: moderngl.Context
     easel = Easel(gl, dance.skeleton)
     shadow, camera = Shadow(easel), LookConfig(name="plain").camera
     moment, darkest = moment_of(dance, AT_S), []
-    for above_m in (0.0, 0.15):
+    for above_m in (0.0, 0.2):
         lifted = standing_at(moment, above_m)
         poses = poses_of(lifted, lifted.puppets[0], easel.height, easel.sole)
         easel.show([poses], [None])
