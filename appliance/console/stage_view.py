@@ -28,16 +28,7 @@ from appliance.show_control.status_messages import SeenFacts
 
 STALE_S = 0.5
 _LOOK_S = 0.1
-_OF_A_CUE = (
-    "name",
-    "look",
-    "lights",
-    "phrase",
-    "hands",
-    "master",
-    "fade_s",
-    "at",
-)  # for the cue list
+_OF_A_CUE = ("name", "look", "lights", "phrase", "master", "fade_s", "at")  # for the cue list
 
 
 class StageView:

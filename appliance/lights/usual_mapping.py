@@ -68,13 +68,8 @@ def usual_mapping(fixtures: Sequence[FixtureConfig], patch: Patch, skeleton: Ske
     for role, colours in _COLOURS.items():
         names = [one.name for one in fixtures if _role(one) == role and len(patch.select([one.name], COLOUR))]
         if names:
-            values: dict[str, object] = {
-                "fixtures": names,
-                "colours": colours,
-                "attack_s": 0.6,
-                "release_s": 1.5,
-            }
-            rules.append(_rule(reads="answer", drives=COLOUR, **values))
+            fades = {"attack_s": 0.6, "release_s": 1.5}
+            rules.append(_rule(reads="answer", drives=COLOUR, fixtures=names, colours=colours, **fades))
     return MappingConfig(name=NAME, rules=rules)
 
 

@@ -54,7 +54,8 @@ class Carrier:
         self.is_out = bool(self._cards) and not self.is_up
         if was_out is not self.is_out:
             self._changed_at = now
-            self._out_at = now if self.is_out else self._out_at
+            if self.is_out:
+                self._out_at = now
 
     def _find(self) -> None:
         """Find the cards once; of an adapter that was unplugged the one that leads to the same network now.

@@ -36,7 +36,7 @@ LARGEST_STEP_DEGREES = 36.0  # of any joint in a tick of the recordings
 
 @dataclass(frozen=True)
 class Dance:
-    """What was danced and the phrase beside it, once all hands hold: moving joints (ticks, M, 4).
+    """The dance and its phrase, once all hands hold: moving joints (ticks, M, 4).
 
     From the first tick on: the pose of all joints, the phrase's root and its lift.
     """

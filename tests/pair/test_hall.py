@@ -104,7 +104,7 @@ def test_a_box_that_was_switched_off_follows_when_it_is_back(hall: Hall) -> None
 
 
 def fallbacks(hall: Hall, address: str) -> str:
-    """What the box's stage says has fallen back."""
+    """The fallbacks that the box's stage reports."""
     with contextlib.closing(FrameReader(hall.boxes[address].runtime)) as reader:
         return str((reader.health() or {}).get("fallbacks"))
 

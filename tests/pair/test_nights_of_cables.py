@@ -1,7 +1,7 @@
 """Two boxes on a switch whose cables go out and come back, thousands of times; times are invented.
 
-A card tells late that its cable is out, datagrams wait in the network until an address answers, a box is held
-up: even so, no two boxes speak at once, the lead changes once at most, and somebody speaks in the end.
+A card reports late that its cable is out, datagrams wait in the network until an address answers, a box is
+held up. Even so two boxes never speak at once, the lead changes once at most, and in the end one box speaks.
 """
 
 from __future__ import annotations

@@ -16,11 +16,8 @@ from appliance.projector.picture.poses import Poses
 
 BONES = 15  # melt.glsl's MELT_BONES
 GATHERS, SINKS = 0.55, 0.60  # how far a molten body draws together, and how much lower it gets
-SWELLS, BELOW, UP_TO = (
-    0.03,
-    0.08,
-    0.15,
-)  # figure heights that bones get thicker: all, and those near the floor
+# Figure heights: how much thicker all bones get, and those near the floor, up to where.
+SWELLS, BELOW, UP_TO = 0.03, 0.08, 0.15
 END = 0.3  # share of the length of a hand, foot or head: fingers would leave a hole around a longer bone
 _NONE = (0.0, 0.0, 0.0, -9.0)  # a bone so thin that nothing is near it
 
@@ -38,13 +35,14 @@ class Melting:
         self._joints = np.array([joint for joint, *_ in bones])
         self._ends = np.array([ends for _, ends, _ in bones])
         self._radii = np.array([radius for *_, radius in bones])
-        nothing = {
+        self.human: dict[str, Any] = {
+            "melt_bones": 0,
             "melt_from": BONES * [_NONE],
             "melt_way": BONES * [_NONE],
-            "melt_bones": 0,
             "melt_steps": 0,
+            "melt_root": (0.0, 0.0, 0.0),
+            "melt_gather": (1.0, 1.0, 1.0),
         }
-        self.human = nothing | {"melt_root": (0.0, 0.0, 0.0), "melt_gather": (1.0, 1.0, 1.0)}
         self._bind = (mesh.bind_positions / mesh.height)[self._joints], mesh.bind_world[self._joints]
 
     def bones(self, poses: Poses, row: int, melt: float) -> dict[str, Any]:

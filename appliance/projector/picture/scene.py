@@ -228,7 +228,7 @@ class Easel:
         drawing.draw({"back": 0.0} | self._melt | molten | self._figures[figure].inputs | inputs, *drawn)
 
     def _melt_of(self, figure: int, row: int, steps: int) -> dict[str, Any]:
-        """The inputs of what a figure melts into in the pose of a row, in so many steps."""
+        """The shader's inputs for a molten figure in the pose of a row. steps: towards its surface."""
         share = self._melt["melt"]
         if self._melting is None:
             return {}
