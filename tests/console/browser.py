@@ -43,6 +43,13 @@ def press(tab: Tab, where: str) -> None:
     (tab.tap if is_phone else tab.click)(where)
 
 
+def speak(tab: Tab, language: str) -> None:
+    """From now on the page is in this language."""
+    tab.evaluate("(language) => localStorage.setItem('language', language)", language)
+    tab.reload()
+    await_box(tab)
+
+
 def await_box(tab: Tab) -> None:
     """Wait until the page shows a word of the box."""
     tab.wait_for_selector("#figures dt", state="attached")

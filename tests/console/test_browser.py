@@ -22,6 +22,7 @@ from tests.console.browser import (
     observe,
     opened_context,
     press,
+    speak,
     unlock,
 )
 from tests.console.page import Page
@@ -254,9 +255,7 @@ LEAST_TOUCH_PX, LEAST_LETTERS_PX = 44, 13
 @ON_BOTH
 @pytest.mark.parametrize("language", ["en", "de", "fr"])
 def test_the_tabs_are_one_row_that_can_be_read_and_touched(tab: Tab, language: str) -> None:
-    tab.evaluate("(language) => localStorage.setItem('language', language)", language)
-    tab.reload()
-    await_box(tab)
+    speak(tab, language)
     found = tab.evaluate(TABS)
     assert len({top for top, *_ in found}) == 1
     assert all(

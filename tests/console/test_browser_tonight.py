@@ -21,6 +21,7 @@ from tests.console.browser import (
     declared,
     opened_context,
     press,
+    speak,
     unlock,
 )
 from tests.console.page import Page
@@ -70,9 +71,7 @@ def fell(name: str, about: str = "") -> dict[str, Any]:
 @pytest.mark.parametrize("language", ["en", "de", "fr"])
 def test_nothing_moves_when_fallbacks_come_and_go(tab: Tab, language: str) -> None:
     """Whatever the sentence is, and however many are in force, each control stays in its place."""
-    tab.evaluate("(language) => localStorage.setItem('language', language)", language)
-    tab.reload()
-    await_box(tab)
+    speak(tab, language)
     tab.evaluate(HEARD_WITH)
     say(tab, [])
     expect(tab.locator("#slot-hands li")).to_contain_text(["lShldr"])  # the place is of use meanwhile

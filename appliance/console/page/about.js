@@ -1,5 +1,5 @@
 // Box: which show dances and which would instead, release, addresses, clock.
-import { breakable, byId } from "./elements.js";
+import { breakable, byId, fact } from "./elements.js";
 import { twice } from "./hold.js";
 import { danceAgain } from "./venue.js";
 import { date, translated, words } from "./words.js";
@@ -57,10 +57,4 @@ function item(said, below) {
   return line;
 }
 
-function pair(term, meaning) {
-  const both = document.createElement("div"), dt = document.createElement("dt"), dd = document.createElement("dd");
-  dt.textContent = term;
-  dd.append(...breakable(meaning));
-  both.append(dt, dd);
-  return both;
-}
+const pair = (term, meaning) => fact(term, ...breakable(meaning));

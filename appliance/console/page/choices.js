@@ -32,3 +32,6 @@ function pictureOf({ picture, colours = [] }) {
   }));
   return whole;
 }
+
+// How looks of a style are drawn, as a small picture.
+export const pictureOfStyle = (style) => `/looks/${style}.webp`;

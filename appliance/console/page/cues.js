@@ -1,4 +1,5 @@
 // The cue stack: the cue in force, the next one on the GO button, and the list, in which a tap chooses the next one.
+import { pictureOfStyle } from "./choices.js";
 import { command } from "./device.js";
 import { byId } from "./elements.js";
 import { number, words } from "./words.js";
@@ -87,7 +88,7 @@ function changes(name) {
   return [look, phrase, lights, level, time, at].filter(Boolean).join(" · ");
 }
 
-const pictureOf = (name) => styles[facts[name]?.look] && `/looks/${styles[facts[name].look].style}.webp`;
+const pictureOf = (name) => styles[facts[name]?.look] && pictureOfStyle(styles[facts[name].look].style);
 
 function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;

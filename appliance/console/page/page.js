@@ -1,11 +1,11 @@
 // The page: which part is shown, what the box says, and the buttons of the night.
 import { readAbout, showClock } from "./about.js";
 import { Box } from "./box.js";
-import { showChoices } from "./choices.js";
+import { pictureOfStyle, showChoices } from "./choices.js";
 import { goOn, showCues } from "./cues.js";
 import { Dance } from "./dance.js";
 import { command, initDevice, panic } from "./device.js";
-import { byId, every, first } from "./elements.js";
+import { byId, every, fact, first } from "./elements.js";
 import { initFleet } from "./fleet.js";
 import { initHelp, readNight } from "./help.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
@@ -120,14 +120,7 @@ function tonight(value) {
   if (value.remote?.state) figures.push(["timecode", `${value.remote.timecode || "–"} · ${words(`code_${value.remote.state}`)}`]);
   if (value.remote?.hours) figures.push(...house(value.remote.hours));
   const list = byId("figures");
-  list.replaceChildren(...figures.map(([key, said]) => {
-    const pair = document.createElement("div");
-    const term = document.createElement("dt"), meaning = document.createElement("dd");
-    term.textContent = words(key);
-    meaning.textContent = said;
-    pair.append(term, meaning);
-    return pair;
-  }));
+  list.replaceChildren(...figures.map(([key, said]) => fact(words(key), said)));
   showMidi(value.remote ?? {});
   showCues(value, dance.show);
   const styles = dance.show?.look_styles ?? {};
@@ -163,7 +156,7 @@ function handItem({ joint, source, holds }, sensors) {
 function drawn(look, style) {
   if (!style) return look;
   const { style: name, ...colours } = style;
-  return { ...look, picture: `/looks/${name}.webp`, colours: Object.values(colours) };
+  return { ...look, picture: pictureOfStyle(name), colours: Object.values(colours) };
 }
 
 function fallbackItem(fallback) {

@@ -1,5 +1,6 @@
 // One row for each sensor. It stays the same element, so that a press on it is never lost.
 import { command } from "./device.js";
+import { fact } from "./elements.js";
 import { changeButton } from "./sensor_changes.js";
 import { hasWords, number, translated } from "./words.js";
 
@@ -81,15 +82,7 @@ function fill(card, sensor, joints, words) {
   ], words);
 }
 
-function fillList(list, facts, words) {
-  list.replaceChildren(...facts.map(([key, said]) => {
-    const pair = document.createElement("div"), term = document.createElement("dt"), meaning = document.createElement("dd");
-    term.textContent = words(key);
-    meaning.textContent = said;
-    pair.append(term, meaning);
-    return pair;
-  }));
-}
+const fillList = (list, facts, words) => list.replaceChildren(...facts.map(([key, said]) => fact(words(key), said)));
 
 function duration(seconds) {
   if (seconds < 9) return `${number(seconds, 1)} s`;
