@@ -13,6 +13,21 @@ from typing import BinaryIO
 _LOCK_RETRY_S = 0.02
 
 
+def private_folder(folder: Path) -> None:
+    """Make a folder, and the folders above it that are missing, each for this user only (mode 0700).
+
+    `Path.mkdir(mode, parents=True)` gives its mode to the last folder only. Raises OSError.
+    """
+    try:
+        folder.mkdir(mode=0o700)
+    except FileNotFoundError:
+        private_folder(folder.parent)
+        private_folder(folder)
+    except FileExistsError:
+        if not folder.is_dir():
+            raise
+
+
 def write_whole(path: Path, content: bytes, private: bool = False) -> None:
     """Replace what `path` holds; raises OSError, and then `path` is as it was. private: mode 0600."""
     with replacing(path, private) as stream:

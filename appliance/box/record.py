@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from appliance.box.block import BlockReader, BlockWriter
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 from appliance.pose.foreign_file import TooLargeError, content
 
 # A page: never shares a sector, nor the cell of a card that is being written, with the other slot.
@@ -129,7 +129,7 @@ class SlotFile:
                 self._newest = max((number for number, _ in _slots(self._descriptor)), default=0)
                 return
             self.close()
-        self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(self._path.parent)
         write_whole(self._path, bytes(SLOTS * SLOT_BYTES), private=True)
         self._descriptor, self._newest = os.open(self._path, flags), 0
 

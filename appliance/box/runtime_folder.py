@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 from weakref import WeakSet
 
+from appliance.box.durable import private_folder
 from appliance.pose.correctable_error import CorrectableError
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def runtime_folder(box: BoxConfig, environment: Mapping[str, str] = os.environ) 
     """
     folder = box.runtime or _usual(environment)
     try:
-        folder.mkdir(mode=0o700, parents=True)
+        private_folder(folder)
     except FileExistsError:
         pass
     except OSError as error:
@@ -120,7 +121,7 @@ def is_lost(path: Path) -> bool:
     try:
         path.lstat()
     except FileNotFoundError:
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(path.parent)
         return True
     return False
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from appliance.box.durable import alone_in, write_beside, write_whole
+from appliance.box.durable import alone_in, private_folder, write_beside, write_whole
 from appliance.box.served import is_loopback
 from appliance.cli.preflight import LATE_TURN_S, late_candidate_problems, publish
 from appliance.release.adoption import Outcome, Places, adopt, read_choice
@@ -170,7 +170,7 @@ def _place(box: Path | None, chosen: Path | None) -> Path | None:
 
 def _checked(place: Path, text: str) -> BoxConfig:
     """Read beside the file, for what it names is relative to its folder. Raises ConfigError."""
-    place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    private_folder(place.parent)
     beside = write_beside(place.with_name("checked.yaml"), text.encode(), private=True)
     try:
         return load_box(beside)

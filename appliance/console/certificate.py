@@ -13,7 +13,7 @@ from pathlib import Path
 
 from aiohttp import web
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 
 FILE = "console.pem"  # the server's key and certificate, then the authority's certificate
 AUTHORITY_FILE = "console-authority.pem"  # what a phone may install signs no other server's name
@@ -42,7 +42,7 @@ def certificate_in(folder: Path, names: Sequence[str], now: float | None = None)
     path, authority = folder / FILE, folder / AUTHORITY_FILE
     if _covers(path, own, now + _RENEWED_DAYS * _DAY_S):
         return path
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    private_folder(folder)
     more = [name for name in own if not _is_private(name)]
     if not _covers(authority, more, now + _DAYS * _DAY_S):
         allowed = [*_PRIVATE, "local", *more]

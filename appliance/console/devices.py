@@ -9,6 +9,7 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from appliance.box.durable import private_folder
 from appliance.box.record import WholeFile
 from appliance.pose.foreign_file import plain_json
 
@@ -114,7 +115,7 @@ class Devices:
         self._pin, self._devices, self._changed = pin, devices, changed
 
     def _write(self, pin: str, devices: tuple[Device, ...]) -> None:
-        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(self.path.parent)
         values = {"pin": pin, "devices": [asdict(device) for device in devices]}
         self._file.write(json.dumps(values, indent=1).encode())
         self._pin, self._devices, self._changed = pin, devices, self.path.stat().st_mtime_ns

@@ -15,6 +15,7 @@ from typing import Any
 from aiohttp import web
 
 from appliance.box.child import environment
+from appliance.box.durable import private_folder
 from appliance.console.body import received, said
 from appliance.console.child import answer_of, own_child
 from appliance.console.learning import FOLDER, RECORDINGS, STUDIO_MISSING, USUAL_MIN, Learning, Wanted
@@ -132,7 +133,7 @@ class Learn:
         async with self._uploading:
             part = folder / f".{name}.part"  # no recording until it is whole and was read
             try:
-                folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+                private_folder(folder)
                 for left in folder.glob(".*.part"):  # by a power cut
                     left.unlink()
                 if shutil.disk_usage(folder).free < LEFT_FREE + LARGEST_RECORDING:

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 from appliance.pose.foreign_file import stored_json
 
 FOLDER, RECORDINGS = "learning", "recordings"
@@ -94,7 +94,7 @@ class Learning:
 
     def report(self, **values: object) -> None:
         """The progress from now on. Raises OSError."""
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(self.folder)
         write_whole(self._progress, json.dumps(values).encode())
 
     def reported(self) -> dict[str, Any]:

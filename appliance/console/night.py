@@ -14,7 +14,7 @@ from typing import Any
 
 from aiohttp import web
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 from appliance.box.wall_file import wall_picture
 from appliance.console.box_view import BoxView
 from appliance.console.stage_view import StageView
@@ -51,7 +51,7 @@ class Night:
 
     def keep(self, now: float) -> None:
         """One picture, and none older than a night. now: Unix seconds. Raises OSError."""
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(self._folder)
         write_whole(self._folder / f"{now:.0f}.svg", self.picture(now).encode())
         room = MOST_BYTES
         for at in reversed(self.times()):

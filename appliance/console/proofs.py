@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 from appliance.pose.foreign_file import stored_json
 
 FOLDER = "proofs"
@@ -25,7 +25,7 @@ class Proofs:
 
     def add(self, document: dict[str, Any]) -> str:
         """Keep it, and let the oldest go; its number. Raises OSError."""
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(self._folder)
         names = self._names()
         number = f"{int(names[-1]) + 1 if names else 1:06}"
         write_whole(self._folder / f"{number}.json", json.dumps({"id": number, **document}).encode())

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+from appliance.box.durable import private_folder
 from appliance.box.show_state import ShowStateReader
 from appliance.console.stage_view import StageView
 from appliance.pose.foreign_file import stored_json
@@ -39,7 +40,7 @@ class Proving:
 
     def want(self, wanted: Wanted) -> None:
         """Begin: an empty progress, then the request. Raises OSError."""
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(self.folder)
         self.progress.write_bytes(b"")
         self._sign.touch(mode=0o600)
         self.report()

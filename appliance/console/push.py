@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import aiohttp
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 from appliance.console.guard import COOKIE
 from appliance.pose.foreign_file import stored_json
 
@@ -70,7 +70,7 @@ class Passes:
             before = dict(stored_json(self._path))
         except (OSError, ValueError, TypeError):
             before = {}
-        self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(self._path.parent)
         write_whole(self._path, json.dumps(before | {key: one}).encode(), private=True)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from aiohttp import web
 
+from appliance.box.durable import private_folder
 from appliance.console.body import received, said
 from appliance.console.child import answer_of
 from appliance.console.learning import FOLDER as LEARNING
@@ -92,7 +93,7 @@ class Venue:
         self._require_shelf()
         async with self._alone():
             file = self._state / _ARRIVED / "show.zip"
-            file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            private_folder(file.parent)
             await received(request, file, _LARGEST_SHOW)
             return await self._answered("take_show", file=str(file), now=not self._show_goes())
 

@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 from appliance.dancer.material.material_file import (
     LARGEST,
     SUFFIX,
@@ -98,7 +98,7 @@ class SavedMotions:
         while True:
             path, written = self._waiting.get()
             try:
-                path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                private_folder(path.parent)
                 write_whole(path, written, private=True)
                 self.complaint = ""
             except OSError as error:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from appliance.box.block import BlockReader
 from appliance.box.checkpoint import PLACE, unpacked
+from appliance.box.durable import private_folder
 from appliance.box.fallback import Fallback
 from appliance.box.record import SlotFile, WholeFile
 from appliance.keeper.fallback import GESTURES_NOT_SAVED, PLACE_NOT_SAVED, SENSORS_NOT_SAVED
@@ -46,7 +47,7 @@ class MirroredRecord:
         meaning = None if payload is None else self._meaning(payload)
         if payload is None or meaning is None:
             return
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(self.folder)
         found = self.folder.stat()
         if (found.st_dev, found.st_ino) != self._folder:
             self._on_disk = self._read_disk()

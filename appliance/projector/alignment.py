@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 from appliance.pose.foreign_file import TooLargeError, content
 from appliance.pose.foreign_yaml import plain_values
 from appliance.projector.corners import WHOLE, Corners, complaint
@@ -141,7 +141,7 @@ class AlignmentFile:
 
     def _write(self, alignment: Alignment) -> bool:
         try:
-            self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            private_folder(self.path.parent)
             write_whole(self.path, _text(alignment, self._from_box).encode(), private=True)
         except OSError as error:
             self._say(

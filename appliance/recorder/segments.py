@@ -8,7 +8,7 @@ import os
 from collections import deque
 from pathlib import Path
 
-from appliance.box.durable import sync_folder
+from appliance.box.durable import private_folder, sync_folder
 from appliance.recorder.chunks import count_ticks
 
 SUFFIX = ".segment"
@@ -90,7 +90,7 @@ class Segments:
 
     def _read_folder(self) -> deque[tuple[Path, int]]:
         if self._older is None:
-            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            private_folder(self._folder)
             paths = segment_paths(self._folder)
             self._older = deque((path, count_ticks(path)) for path in paths)
         return self._older

@@ -10,7 +10,7 @@ import zipfile
 import zlib
 from pathlib import Path, PurePosixPath
 
-from appliance.box.durable import replacing
+from appliance.box.durable import private_folder, replacing
 from appliance.release.arrivals import SHOW
 from appliance.show.bundle import CHECKSUMS, LARGEST_FILE, MOST_FILES, SIGNATURE, bundle_files, unlisted_files
 from appliance.stage.stage_error import StageError
@@ -25,7 +25,7 @@ _DAMAGED = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, E
 
 def pack_show(show: Path, path: Path) -> None:
     """Write the zip file; it is complete or not there at all. Raises OSError."""
-    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    private_folder(path.parent)
     with (
         replacing(path) as stream,
         zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed,
@@ -49,7 +49,7 @@ def unpack_show(path: Path, folder: Path) -> None:
                 if name.parts[:2] != (_STICK, SHOW) or len(name.parts) < 3 or ".." in name.parts:
                     raise StageError(f"'{one.filename[:60]}' is no file of a show. Send the show again.")
                 target = folder / SHOW / Path(*name.parts[2:])
-                target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                private_folder(target.parent)
                 with packed.open(one) as reading, target.open("xb") as writing:
                     while chunk := reading.read(_CHUNK):
                         room -= len(chunk)

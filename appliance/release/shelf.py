@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from appliance.box.durable import new_file, sync_folder, write_whole
+from appliance.box.durable import new_file, private_folder, sync_folder, write_whole
 from appliance.release.arrivals import SHOW, Arrival
 from appliance.release.choice import Choice, appliance_box
 from appliance.show.bundle import WORKSHOP
@@ -107,7 +107,7 @@ class Shelf:
                         _remove(found)
 
     def _require_room(self, folder: Path, needed: int) -> None:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(folder)
         free = os.statvfs(folder)
         if free.f_bavail * free.f_frsize < needed + _LEFT_FREE_BYTES:
             raise NoRoomError(f"{folder}: {needed / 1e6:.1f} MB do not fit there")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.durable import new_file, put_in_place, replacing, write_beside, write_whole
+from appliance.box.durable import new_file, private_folder, put_in_place, replacing, write_beside, write_whole
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path: Path) -> None:
@@ -27,6 +27,22 @@ def test_a_private_file_is_its_owners_alone(tmp_path: Path, private: bool) -> No
     finally:
         os.umask(before)
     assert (tmp_path / "file").stat().st_mode & 0o777 == (0o600 if private else 0o666)
+
+
+def test_the_folders_above_a_private_one_are_private_too(tmp_path: Path) -> None:
+    """Else a process that outlives its box makes a runtime folder that no box accepts after it."""
+    before = os.umask(0)
+    try:
+        private_folder(tmp_path / "runtime/made/one")
+        private_folder(tmp_path / "runtime/made")  # one that is there stays as it is
+    finally:
+        os.umask(before)
+    for name in ("runtime", "runtime/made", "runtime/made/one"):
+        assert (tmp_path / name).stat().st_mode & 0o777 == 0o700, name
+    (tmp_path / "file").touch()
+    for inside in ("file", "file/one"):
+        with pytest.raises(OSError):
+            private_folder(tmp_path / inside)
 
 
 def test_an_error_on_the_way_leaves_what_was_there(tmp_path: Path) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import signal
 import subprocess
 import sys
@@ -17,6 +15,7 @@ from appliance.cli.pictures import RecordedDance, load_dance
 from appliance.cli.rehearsal import PICTURED_S, pictured_from
 from hw_sim.peers import free_ports
 from tests.bundles import swaying_phrase, write_show
+from tests.system.processes import is_running
 
 DEADLINE_S = 60.0
 pytestmark = pytest.mark.realtime
@@ -71,13 +70,6 @@ def test_the_first_seconds_show_a_hand_that_leads(tmp_path: Path) -> None:
     assert dance.holds is not None
     led = np.flatnonzero(dance.holds.max(axis=(1, 2)) > 0.5) / dance.recordings[0].fps
     assert len(led) and led[0] < 1.7  # standing still for the 1.5 s of a new sensor takes longer
-
-
-def is_running(pid: int) -> bool:
-    with contextlib.suppress(OSError):
-        os.kill(pid, 0)
-        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    return False
 
 
 @pytest.mark.parametrize(

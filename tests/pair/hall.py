@@ -24,7 +24,7 @@ from appliance.pair.part import BoxPart, PartReader
 from appliance.sensor import wire
 from hw_sim import osc_receiver
 from tests.system.namespace import Cable, Namespace
-from tests.system.processes import BUNRAKU, Process, children, has_argument, run, wait_until
+from tests.system.processes import BUNRAKU, Process, descendants, has_argument, run, wait_until
 
 _PSN_FRAME = 18  # after two heads of chunks, the time and the version (PosiStageNet 2.03, section 3.2)
 HALL, FIRST, SECOND = "10.77.0.9", "10.77.0.1", "10.77.0.2"
@@ -229,7 +229,7 @@ class PairedBox(Process):
 
     def prefer_lights(self) -> None:
         """As on a machine where nothing but the box runs: the lights need not wait for other programs."""
-        for pid in _descendants(self.process.pid):
+        for pid in descendants(self.process.pid):
             if has_argument(pid, "lights"):
                 with contextlib.suppress(PermissionError):
                     os.sched_setscheduler(pid, os.SCHED_RR, os.sched_param(1))
@@ -237,7 +237,7 @@ class PairedBox(Process):
     def waited_ms(self) -> dict[str, float]:
         """For how long the kernel has let its stage and its lights wait for a processor."""
         stage = self.process.pid
-        lights = [one for one in _descendants(stage) if has_argument(one, "lights")]
+        lights = [one for one in descendants(stage) if has_argument(one, "lights")]
         found = {}
         for name, pid in (("stage", stage), *(("lights", one) for one in lights)):
             with contextlib.suppress(OSError):
@@ -247,7 +247,7 @@ class PairedBox(Process):
 
     def signal(self, number: int) -> None:
         """To all its processes: power, or a machine that hangs."""
-        everyone = [self.process.pid, *_descendants(self.process.pid)]
+        everyone = [self.process.pid, *descendants(self.process.pid)]
         with before_others():
             for pid in everyone:
                 with contextlib.suppress(ProcessLookupError):
@@ -268,10 +268,6 @@ def before_others() -> Iterator[None]:
         yield
     finally:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-
-
-def _descendants(pid: int) -> list[int]:
-    return [one for child in children(pid) for one in (child, *_descendants(child))]
 
 
 class HallRadio:

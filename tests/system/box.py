@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import signal
@@ -21,7 +20,16 @@ from appliance.box.record import SlotFile
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports, remove_folder
-from tests.system.processes import BUNRAKU, Process, children_running, has_argument, run_bunraku, wait_until
+from tests.system.processes import (
+    BUNRAKU,
+    Process,
+    children_running,
+    descendants,
+    has_argument,
+    is_running,
+    run_bunraku,
+    wait_until,
+)
 from tests.system.wearables import Wearables
 
 PLAY = (*BUNRAKU, "play")
@@ -156,27 +164,15 @@ def ending_emulators(box: int) -> Iterator[None]:
 
 def cut_power(box: Box, file: Path) -> Checkpoint:
     """What a power cut takes is gone: processes, the runtime folder, this boot. The place on the disk."""
+    everything = descendants(box.process.pid)
     box.end(signal.SIGKILL)
-    await_end_of_keeper(box.runtime)
+    wait_until(lambda: not any(map(is_running, everything)), "a process outlives its box")
     remove_folder(box.runtime)
     place = read_checkpoint(file)
     assert place is not None
     with closing(SlotFile(file)) as slots:
         slots.write(packed(replace(place, boot="of another boot")))
     return place
-
-
-def await_end_of_keeper(runtime: Path) -> None:
-    """Wait until the keeper has released its lock: it ends after its box, where a power cut takes both."""
-
-    def is_gone() -> bool:
-        with contextlib.suppress(BlockingIOError):
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return True
-        return False
-
-    with (runtime / "keeper.lock").open() as lock:
-        wait_until(is_gone, "the keeper outlives its box")
 
 
 def is_free(port: int) -> bool:

@@ -136,6 +136,19 @@ def children(pid: int) -> list[int]:
     return found
 
 
+def descendants(pid: int) -> list[int]:
+    """The living processes that this one has started, those that they have started, and so on."""
+    return [one for child in children(pid) for one in (child, *descendants(child))]
+
+
+def is_running(pid: int) -> bool:
+    """False once it has ended, even while nobody has asked for its exit status."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def has_argument(pid: int, word: str) -> bool:
     """Whether this word stands on the command line of a process; False once it has ended."""
     try:

@@ -28,7 +28,7 @@ from appliance.stage.recorder import FORMAT, KIND
 from tests.box import disks
 from tests.bundles import write_show
 from tests.recorder.night import Night
-from tests.system.processes import BUNRAKU, Process, children, wait_until
+from tests.system.processes import BUNRAKU, Process, children, is_running, wait_until
 
 MEMORY = b'{"neutral": [], "profiles": {}}'
 
@@ -175,11 +175,4 @@ def test_mirrors_end_with_a_keeper_that_is_killed(keeper: Keeper) -> None:
     wait_until(lambda: len(children(keeper.process.pid)) == 4, "not all have started")
     processes = children(keeper.process.pid)
     keeper.kill()
-    wait_until(lambda: not any(map(is_alive, processes)), "they outlive their keeper")
-
-
-def is_alive(process: int) -> bool:
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    wait_until(lambda: not any(map(is_running, processes)), "they outlive their keeper")

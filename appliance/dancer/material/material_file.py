@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import private_folder, write_whole
 from appliance.dancer.loop import Loop, Placement
 from appliance.dancer.slerp import FloatArray
 from appliance.pose.foreign_file import opened, plain_json
@@ -59,7 +59,7 @@ def write_material(path: Path, material: Material, joints: tuple[str, ...]) -> N
     }
     encoded = json.dumps(facts).encode()
     encoded = encoded.ljust(-(-(_HEAD.size + len(encoded)) // _ALIGNED) * _ALIGNED - _HEAD.size)
-    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    private_folder(path.parent)
     write_whole(path, b"".join((_HEAD.pack(_MAGIC, len(encoded)), encoded, poses.tobytes(), track.tobytes())))
 
 
