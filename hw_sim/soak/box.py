@@ -27,6 +27,7 @@ class Ears(NamedTuple):
     frames: int
     heartbeat: int
     lamps: int
+    timecode: int
     guests: tuple[int, ...]
 
 
@@ -38,7 +39,7 @@ class SoakedBox:
         self.output = folder / "output"
         self.output.mkdir(parents=True)
         self.show = _with_lamps(show, folder / "show")
-        self.sensor_port, self.control_port = free_ports(2)
+        self.sensor_port, self.control_port, self.page_port = free_ports(3)
         self._keys = folder / "sensors.keys"
         create_keys(self._keys, sensors_of(show))
         self.box_file = folder / "box.yaml"
@@ -78,6 +79,9 @@ class SoakedBox:
         yield STAGE, ("play", "--show", str(self.show), *box, "--alone")
         yield "control", ("control", *box)
         yield "keeper", ("keep", *box)
+        yield "console", ("console", *box)
+        yield "generator", ("generate", "--show", str(self.show), *box)
+        yield "remote", ("remote", *box)
         yield "lights", ("lights", *box)
         yield "projector", ("project", *box, "--offscreen", _PICTURE)
 
@@ -94,6 +98,8 @@ class SoakedBox:
                 "port": self.control_port,
                 "heartbeat": [{"host": HOST, "port": ears.heartbeat}],
             },
+            "console": {"host": HOST, "port": self.page_port},
+            "timecode": {"send": [{"host": HOST, "port": ears.timecode}]},
             "runtime": str(self.runtime),
             "projector": {"rate": 30},
             "limits": {"late_ms": LATE_MS},

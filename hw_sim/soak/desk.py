@@ -19,6 +19,7 @@ _WELL = (  # each of these restores what another one changed
     *(("/blackout", (0,)), ("/master", (0.3, 1.0)), ("/master", (1.0, 0.5)), ("/panic", ()), ("/go", ())),
     *(("/player/jump", (5.0,)), ("/player/rate", (1.5,)), ("/player/rate", (1.0,)), ("/status", ())),
     *(("/cues", ()), ("/hands", ()), ("/sensors/list", ()), ("/ping", ())),
+    *(("/phrase", ("vary", 1.0)), ("/motion/again", ()), ("/phrase", ("improvise", 1.0)), ("/go", ())),
 )
 _ILL = (("/cue", ("no such cue",)), ("/nonsense", (1, "two")), ("/player/rate", (float("nan"),)))
 _NONSENSE_EACH = 8

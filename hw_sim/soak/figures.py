@@ -9,6 +9,7 @@ from hw_sim.soak.box import LATE_MS, LOAD
 from hw_sim.soak.growth import growth
 from hw_sim.soak.run import Soak
 from hw_sim.soak.unit import Unit
+from hw_sim.soak.viewers import Viewers
 
 METHOD = (
     "A tick of the box is late when its frame left more than late_ms after the deadline that it names, "
@@ -83,6 +84,8 @@ def figures_of(soak: Soak) -> dict[str, Any]:
         "guests_came_or_went": soak.guest_changes,
         "commands": dict(soak.desk.counts),
         "universes_of_light": soak.universes,
+        "timecodes": soak.timecodes,
+        "page": {"visits": soak.viewers.visits, "texts": soak.viewers.texts, "frames": soak.viewers.frames},
     }
 
 
@@ -134,6 +137,8 @@ def limits_of(soak: Soak) -> list[Limit]:
         ),
         Limit("commands", f"{soak.desk.counts['done']} done", "more than none", soak.desk.counts["done"] > 0),
         Limit("light", f"{soak.universes} universes came", "more than none", soak.universes > 0),
+        Limit("timecode", f"{soak.timecodes} labels came", "more than none", soak.timecodes > 0),
+        Limit("page", _watched(soak.viewers), "a status once a second at least", _page_holds(soak)),
     ]
     if soak.load_is_missing:
         missing = "stress-ng is not there. Install it: sudo apt-get install -y stress-ng"
@@ -227,6 +232,15 @@ def _process(unit: Unit, run_s: float) -> dict[str, Any]:
         "at_the_end": None if grown is None else vars(grown.last),
         "lived_s": 0.0 if grown is None else round(grown.lived_s, 1),
     }
+
+
+def _watched(viewers: Viewers) -> str:
+    return f"{viewers.visits} visits, {viewers.texts} statuses and {viewers.frames} frames came"
+
+
+def _page_holds(soak: Soak) -> bool:
+    """A browser stays for most of the time, but for the seconds in which the console was killed."""
+    return soak.viewers.frames > 0 and soak.viewers.texts >= soak.seconds
 
 
 def _share(part: int, whole: int) -> float:

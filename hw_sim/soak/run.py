@@ -19,6 +19,7 @@ from hw_sim.soak.desk import Desk, Said
 from hw_sim.soak.frames import FrameWatch
 from hw_sim.soak.script import LOADS, Act, script
 from hw_sim.soak.unit import Unit
+from hw_sim.soak.viewers import Viewers
 from hw_sim.soak.vitals import Vitals, warmest_c
 from hw_sim.soak.wakeups import Wakeups
 
@@ -46,6 +47,8 @@ class Soak:
     wakeups: Wakeups
     desk: Desk
     lamps: ArtNetReceiver
+    viewers: Viewers
+    timecode: socket.socket
     planned_s: float
     begun: float = 0.0
     seconds: float = 0.0
@@ -54,6 +57,7 @@ class Soak:
     load_deaths: int = 0
     network: str = "venue"
     universes: int = 0
+    timecodes: int = 0
     guest_changes: int = 0
     outages: int = 0
     said_before: Said | None = None
@@ -63,8 +67,11 @@ class Soak:
     def close(self) -> None:
         """End every process and free every port."""
         self.wakeups.close()
-        for guest in self.guests.values():
+        self.viewers.close()
+        for guest in (*self.guests.values(), self.timecode):
             guest.close()
+        for unit in self.box.everything:
+            unit.ask_to_end()
         for unit in self.box.everything:
             unit.end(_ENDS_WITHIN_S)
         for one in (self.frames, self.desk, self.lamps):
@@ -86,8 +93,10 @@ def soak(
     ports = tuple(free_ports(GUESTS))
     with ExitStack() as opened:
         frames, desk, lamps = FrameWatch(LATE_MS), Desk(seed), ArtNetReceiver(HOST)
-        box = SoakedBox(show, folder, Ears(frames.port, desk.port, lamps.port, ports))
-        soak = Soak(box, frames, Wakeups(), desk, lamps, seconds)
+        timecode = _bound_to(0)
+        ears = Ears(frames.port, desk.port, lamps.port, timecode.getsockname()[1], ports)
+        box = SoakedBox(show, folder, ears)
+        soak = Soak(box, frames, Wakeups(), desk, lamps, Viewers(box.page_port), timecode, seconds)
         opened.callback(soak.close)
         _await_first_frame(soak, stopped)
         companions = [unit.name for unit in box.units[1:]]
@@ -121,6 +130,7 @@ def _dance(
     soak.begun = now = time.monotonic()
     soak.frames.start(now)
     soak.wakeups.start(now)
+    soak.viewers.start()
     look_at, happened = now + 1.0, 0
     while soak.seconds < soak.planned_s and not stopped():
         soak.frames.poll(_LOOK_S)
@@ -129,6 +139,7 @@ def _dance(
         soak.wakeups.poll(now)
         soak.desk.poll()
         soak.universes += len(soak.lamps.poll())
+        soak.timecodes += _drain(soak.timecode)
         soak.said_before = soak.said_before or soak.desk.said
         for guest in soak.guests.values():
             _drain(guest)
@@ -175,20 +186,30 @@ def _come_or_go(soak: Soak, which: int, ports: tuple[int, ...]) -> None:
     if (gone := soak.guests.pop(which, None)) is not None:
         gone.close()
         return
-    guest = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    guest.setblocking(False)
+    with contextlib.suppress(OSError):
+        soak.guests[which] = _bound_to(ports[which])
+
+
+def _bound_to(port: int) -> socket.socket:
+    """A receiver on this port; 0: any free one."""
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.setblocking(False)
     try:
-        guest.bind((HOST, ports[which]))
+        receiver.bind((HOST, port))
     except OSError:
-        guest.close()
-        return
-    soak.guests[which] = guest
+        receiver.close()
+        raise
+    return receiver
 
 
-def _drain(guest: socket.socket) -> None:
+def _drain(receiver: socket.socket) -> int:
+    """How many datagrams were waiting."""
+    count = 0
     with contextlib.suppress(BlockingIOError):
         while True:
-            guest.recv(65536)
+            receiver.recv(65536)
+            count += 1
+    return count
 
 
 def _change_load(soak: Soak, name: str) -> None:

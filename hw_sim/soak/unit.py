@@ -74,13 +74,18 @@ class Unit:
             self.kills += self._was_killed
             self._process.send_signal(number)
 
+    def ask_to_end(self) -> None:
+        """As systemd does, even while it is stopped."""
+        if self._process is not None:
+            self._process.send_signal(signal.SIGCONT)
+            self._process.terminate()
+
     def end(self, within_s: float) -> None:
         """Ask it to end, and make it."""
+        self.ask_to_end()
         process, self._process = self._process, None
         if process is None:
             return
-        process.send_signal(signal.SIGCONT)
-        process.terminate()
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(within_s)
         with contextlib.suppress(ProcessLookupError):

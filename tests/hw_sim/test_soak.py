@@ -29,6 +29,7 @@ from hw_sim.soak.growth import growth
 from hw_sim.soak.run import Soak
 from hw_sim.soak.script import KILLS_UNTIL, script
 from hw_sim.soak.unit import PAUSE_S, Unit
+from hw_sim.soak.viewers import Viewers
 from hw_sim.soak.vitals import Vitals
 from hw_sim.soak.wakeups import Wakeups
 from tests.bundles import write_show
@@ -152,13 +153,17 @@ def test_a_box_that_loses_its_sensors_is_noticed(watch: FrameWatch, stage: Stage
 def soaked(tmp_path: Path) -> Iterator[Soak]:
     """A soak of 40 s in which all went well, and no process of the box was looked at."""
     box: Any = SimpleNamespace(units=[], sensors=Unit("sensors", ("true",), tmp_path / "output"))
-    lamps: Any = None
+    nothing: Any = None
+    viewers = Viewers(0)
+    viewers.visits, viewers.texts, viewers.frames = 3, 41, 1900
     with contextlib.closing(FrameWatch(LATE_MS)) as frames, contextlib.closing(Desk(1)) as desk:
         frames.start(1000.0)
         frames.heard, frames.readings, frames._reading_at = 2000, 1900, 1039.9
         frames.delays.add(4.0)
         desk.counts["done"] = 5
-        yield Soak(box, frames, Wakeups(), desk, lamps, 40.0, begun=1000.0, seconds=40.0, universes=9)
+        soak = Soak(box, frames, Wakeups(), desk, nothing, viewers, nothing, 40.0, begun=1000.0, seconds=40.0)
+        soak.universes = soak.timecodes = 9
+        yield soak
 
 
 def fails(soak: Soak) -> list[str]:
@@ -166,14 +171,14 @@ def fails(soak: Soak) -> list[str]:
 
 
 def test_a_soak_of_nothing_does_not_hold(tmp_path: Path) -> None:
-    """Sensors, commands, lamps and load that never came are no evidence that the box bears them."""
+    """Sensors, commands, lamps, browsers and load that never came are no evidence that the box bears them."""
     with soaked(tmp_path) as soak:
         assert fails(soak) == []
         soak.universes, soak.load_is_missing, soak.load_deaths = 0, True, 2
-        soak.desk.counts["done"] = 0
+        soak.desk.counts["done"] = soak.timecodes = soak.viewers.texts = 0
         soak.box.sensors.deaths = 3
         soak.frames._reading_at = 1010.0
-        assert fails(soak) == ["readings", "commands", "light", "load", "processes"]
+        assert fails(soak) == ["readings", "commands", "light", "timecode", "page", "load", "processes"]
         (died,) = [limit.found for limit in limits_of(soak) if limit.name == "processes"]
         assert died == "sensors ended 3 times, load ended 2 times"
         assert any("stress-ng is not there" in line for line in table(soak))
@@ -294,7 +299,8 @@ def test_ended_early_it_gives_figures_verdict_picture_and_leaves_nobody_behind(t
     assert figures["frames"] > 100
     assert figures["slots"] == figures["frames"] + figures["missing"]
     assert figures["commands"]["done"] > 0
-    assert figures["universes_of_light"] > 0
+    assert figures["universes_of_light"] > 0 and figures["timecodes"] > 0
+    assert figures["page"]["frames"] > 0
     assert figures["processes"]["stage"]["starts"] == 1
     assert all(limit["holds"] for limit in figures["limits"]) == (status == 0)
     machine = figures["cyclictest"]
