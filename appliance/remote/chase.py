@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from appliance.remote.timecode import Rate, time_of
+from appliance.remote.timecode import DAY_S, Rate, time_of
 from appliance.show_control.packet import Message
 
 _FADE_IN_S = 3.0  # after a jump the phrase is left alone for so long: its crossfade runs
@@ -33,15 +33,21 @@ class CueChase:
         self._before: tuple[float, str] | None = None
 
     def due(self, time_s: float | None, cues: Sequence[tuple[float, str]]) -> str | None:
-        """The cue to call now; None: none. time_s: of the code, None where there is none."""
+        """The cue to call now; None: none. time_s: of the code, which counts on at midnight while every
+        cue has its time again; None where there is none.
+        """
         if time_s is None:
             return None
-        reached = [cue for cue in cues if cue[0] <= time_s]
-        newest = reached[-1] if reached else None
-        if newest == self._before or self._is_in_force(time_s):
+        today = int(time_s // DAY_S)
+        days = [day * DAY_S for day in (today - 1, today) if day >= 0]
+        reached = [(begin + at, name) for begin in days for at, name in cues if begin + at <= time_s]
+        newest, before = (reached[-1] if reached else None), self._before
+        if newest == before or self._is_in_force(time_s):
             return None
         self._before = newest
-        return None if newest is None else newest[1]
+        if newest is None or (before is not None and _is_of_later_day(before, newest)):
+            return None
+        return newest[1]
 
     def start(self, time_s: float) -> float:
         """When the cue that is in force began, in seconds of the code; 0 before the first."""
@@ -50,6 +56,12 @@ class CueChase:
     def _is_in_force(self, time_s: float) -> bool:
         """Whether the newest cue has only just begun, and the code is hardly before it."""
         return self._before is not None and time_s < self._before[0] <= time_s + _BACK_S
+
+
+def _is_of_later_day(cue: tuple[float, str], other: tuple[float, str]) -> bool:
+    """The same cue: the code has jumped, and counts its days from there."""
+    days = (cue[0] - other[0]) / DAY_S
+    return cue[1] == other[1] and days > 0 and days == int(days)
 
 
 class DanceChase:

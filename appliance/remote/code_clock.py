@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from appliance.remote.timecode import RATES, Rate, Timecode, at
+from appliance.remote.timecode import DAY_S, RATES, Rate, Timecode, at
 
 CodeState = Literal["absent", "locking", "running", "standing", "freewheeling"]
 _GAIN, _RATE_GAIN = 0.05, 0.0013  # alpha-beta filter, critically damped: beta = alpha^2 / (2 - alpha)
@@ -15,10 +15,11 @@ _AGREE_S = 0.1  # how far a second label may be from where the first one leads
 
 
 class CodeClock:
-    """Where the timecode is now. freewheel_s: how long it goes on when labels stay away.
+    """Where the timecode is now; it counts on where its labels begin anew after 24 hours.
 
-    tolerance_s: a label that is further off is a jump, as soon as the next one agrees with it. jumps: how
-    many there were; the first label counts as none. Times are monotonic seconds.
+    freewheel_s: how long it goes on when labels stay away. tolerance_s: a label that is further off is a
+    jump, as soon as the next one agrees with it. jumps: how many there were; the first label counts as none.
+    Times are monotonic seconds.
     """
 
     def __init__(self, freewheel_s: float = 1.0, tolerance_s: float = 0.2) -> None:
@@ -34,11 +35,14 @@ class CodeClock:
     def hear(self, label: Timecode, now: float, ahead_frames: float = 0.0) -> None:
         """A label has come; ahead_frames: how much later than the label the code is at this moment."""
         self.rate = label.rate
-        code_s = label.time_s + ahead_frames / label.rate.per_second
+        code_s, expected_s = label.time_s + ahead_frames / label.rate.per_second, self.time_s(now)
         if code_s == self._newest_s:
             self._same += 1
         else:
             self._same, self._same_since, self._newest_s = 1, now, code_s
+        if expected_s is not None:
+            day_s = DAY_S * round((expected_s - code_s) / DAY_S)
+            code_s += day_s if abs(code_s + day_s - expected_s) <= self._tolerance_s else 0.0
         was_away = self.state(now) in ("absent", "locking")
         self._heard_at = now
         if was_away:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from appliance.remote.chase import CueChase, DanceChase, timed_cues
-from appliance.remote.timecode import BY_NAME
+from appliance.remote.timecode import BY_NAME, DAY_S
 from appliance.show_control.packet import Message
 
 TV = BY_NAME["25"]
@@ -37,6 +37,15 @@ def test_a_code_that_hardly_goes_back_calls_no_cue_again() -> None:
         assert chase.start(10.48 - late_s) == 10.48
     assert chase.due(10.3, cues) == "a"
     assert chase.start(10.3) == 5.0
+
+
+def test_at_midnight_the_cue_in_force_stays_and_each_comes_again() -> None:
+    cues, chase = [(10.0, "a"), (20.0, "b")], CueChase()
+    times = [DAY_S - 1.0, DAY_S + 5.0, DAY_S + 11.0, DAY_S + 21.0, 2 * DAY_S + 21.0]
+    assert [chase.due(one, cues) for one in times] == ["b", None, "a", "b", "b"]
+    assert chase.start(2 * DAY_S + 21.0) == 2 * DAY_S + 20.0
+    assert chase.due(21.0, cues) is None, "the code has jumped, and counts anew: the same cue is in force"
+    assert chase.due(11.0, cues) == "a"
 
 
 class Player:

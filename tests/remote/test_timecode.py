@@ -15,7 +15,7 @@ from appliance.remote.code_clock import CodeClock
 from appliance.remote.linear_timecode import SAMPLE_RATE, LtcDecoder, _Label
 from appliance.remote.midi_messages import MidiParser
 from appliance.remote.midi_timecode import CodeHeard, MidiTimecode
-from appliance.remote.timecode import BY_NAME, RATES, Rate, Timecode, at, time_of
+from appliance.remote.timecode import BY_NAME, DAY_S, RATES, Rate, Timecode, at, time_of
 from tests.fake_clock import FakeTime
 
 TV = BY_NAME["25"]
@@ -105,6 +105,22 @@ def test_one_wrong_label_is_nothing_and_two_are_a_jump() -> None:
     end_s = fed(clock, time, 1.0, 500.0)
     assert (clock.jumps, clock.state(time.now)) == (1, "running")
     assert clock.time_s(time.now) == pytest.approx(end_s, abs=0.02)
+
+
+def test_a_code_of_the_day_counts_on_at_midnight() -> None:
+    clock, time = CodeClock(), FakeTime()
+    end_s = fed(clock, time, 4.0, DAY_S - 2.0)
+    assert (clock.jumps, clock.state(time.now)) == (0, "running")
+    assert clock.time_s(time.now) == pytest.approx(end_s, abs=0.02)
+    assert str(clock.label(time.now))[:8] == "00:00:02"
+    for _ in range(10):
+        clock.hear(at(2.0, TV), time.now)
+        time.now += 0.04
+    assert clock.state(time.now) == "standing"
+    assert clock.time_s(time.now) == DAY_S + 2.0
+    fed(clock, time, 1.0, 500.0)
+    assert clock.jumps == 1
+    assert clock.time_s(time.now) == pytest.approx(501.0, abs=0.02)
 
 
 def test_it_goes_on_for_a_while_and_is_absent_then() -> None:
