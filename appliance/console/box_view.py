@@ -17,6 +17,7 @@ from appliance.levers.lever import Lever
 from appliance.levers.show_state import ShowState
 from appliance.levers.status import Status
 from appliance.levers.table import (
+    CUE,
     FEEDBACK,
     GOAL,
     MADE_NUMBERS,
@@ -67,7 +68,9 @@ class BoxView:
         sensors = [self._sensor(RosterLine(*line)) for line in lines if len(line) == _FIELDS]
         fallbacks = [{"process": process, **one._asdict()} for process, one in seen.fallbacks(now)]
         self._note_late(known, now)
-        since = time.time() - (now - self._since)
+        since = _unix(self._since, now)
+        held = self._stage.held() if frames == "fresh" else ()
+        hands = [one._asdict() | {"is_held": one.joint in held} for one in hands_of(seen)] if known else []
         judged: Verdict = verdict(frames, known, sensors, fallbacks, since, trouble)
         return {
             "time": time.time(),
@@ -83,9 +86,9 @@ class BoxView:
             "wall": dict(seen.reported("projector", now)),
             "remote": dict(seen.reported("remote", now)),
             "gestures": reported.get("gestures", {}),
-            "hands": [one._asdict() for one in hands_of(seen)] if known else [],
+            "hands": hands,
             "generation": self._stage.generation,
-            **self._declared(),
+            **self._declared(now),
             **{
                 question.removeprefix("/"): [
                     {"name": name, "now": is_now}
@@ -95,9 +98,10 @@ class BoxView:
             },
         }
 
-    def _declared(self) -> dict[str, Any]:
+    def _declared(self, now: float) -> dict[str, Any]:
         """The levers as they are declared for the present show. motion: value and fade by `SOURCE NAME`.
-        springs: setting, strings, and the knobs that were turned.
+        springs: setting, strings, and the knobs that were turned. cue_since: Unix seconds at which the cue in
+        force was called. fade: of those that run, the one that ends last: when it began, and its seconds.
         """
         state: ShowState = self._show_state.read()
         if state.show != self._stage.facts.get("show"):
@@ -108,10 +112,14 @@ class BoxView:
         }
         if PATH_POINTS in state:
             motion[_short(PATH_POINTS)] = list(state[PATH_POINTS].value)
+        fades = [fade for fade in state.settings.values() if fade.since <= now < fade.since + fade.seconds]
+        last = max(fades, key=lambda fade: fade.since + fade.seconds, default=None)
         turned = {lever.name: state[lever].value for lever in _KNOBS if lever in state}
         return {
             "motion": motion,
             "goal": list(state[GOAL].value) if GOAL in state else [],
+            "cue_since": _unix(state[CUE].since, now) if state.cue and state[CUE].since <= now else None,
+            "fade": [_unix(last.since, now), last.seconds] if last else None,
             "springs": turned | {"setting": state[SPRINGS].value, "strings": state[STRINGS].value},
         }
 
@@ -133,6 +141,10 @@ class BoxView:
         elif late != self._late:
             self._since = now
         self._late = late
+
+
+def _unix(monotonic: float, now: float) -> float:
+    return time.time() - (now - monotonic)
 
 
 def _short(lever: Lever[Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal, cast
@@ -24,10 +25,12 @@ from appliance.outputs.frame_layout import (
 )
 from appliance.outputs.puppet_facts import layout_of, led_by, unpacked
 from appliance.pose.foreign_file import plain_json
+from appliance.pose.spoken_joints import spoken_joints
 from appliance.show_control.status_messages import SeenFacts
 
 STALE_S = 0.5
 _LOOK_S = 0.1
+_LEAST_HOLD = 0.01  # less is not seen
 _OF_A_CUE = ("name", "look", "lights", "phrase", "master", "fade_s", "at")  # for the cue list
 
 
@@ -45,7 +48,7 @@ class StageView:
         self._looked_at = -math.inf
         self._sequence = 0
         self._layout, self._led = FrameLayout(0), 0
-        self.with_ghost = b""
+        self.with_ghost = self._holds = b""
         self._frame_time = -math.inf
         self.facts: dict[str, Any] = {}
         self.seen_facts: SeenFacts | None = None
@@ -70,6 +73,7 @@ class StageView:
         seen = b"".join(payload[end - layout.stride + left_out : end] for end in ends)
         begin = layout.source_at + self._led * layout.stride
         source = payload[begin : begin + layout.world_at - layout.source_at]
+        self._holds = payload[begin + layout.holds_at - layout.source_at :][: 4 * joints]
         self.with_ghost = BROWSER_HEAD.pack(tick, flags & LATE | GHOST, joints) + seen + source
         return BROWSER_HEAD.pack(tick, flags & LATE, joints) + seen
 
@@ -80,6 +84,12 @@ class StageView:
             return "absent"
         is_fresh = self._file.writer_lives() and now - self._frame_time <= STALE_S
         return "fresh" if is_fresh else "stale"
+
+    def held(self) -> list[str]:
+        """The joints that are held in the frame that `newest` gave last, of the puppet that cues lead."""
+        holds = struct.unpack(f"<{len(self._holds) // 4}f", self._holds)
+        joints = self.facts.get("joints", ())
+        return [joint for joint, firmly in zip(joints, holds, strict=False) if firmly > _LEAST_HOLD]
 
     @property
     def lives(self) -> bool:
@@ -104,7 +114,7 @@ class StageView:
         self._looked_at = now
         if not self._file.look():
             return
-        self._sequence, self._frame_time = 0, -math.inf
+        self._sequence, self._frame_time, self._holds = 0, -math.inf, b""
         rings = self._file.rings
         found = rings[FACTS].newest() if len(rings) > FRAMES else None
         try:
@@ -135,6 +145,7 @@ def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:
     return {
         "show": facts["show_name"],
         "joints": skeleton["joints"],
+        "parts": spoken_joints(skeleton["joints"]),
         "parents": skeleton["parents"],
         "offsets": skeleton["offsets"],
         "ends": skeleton["ends"],

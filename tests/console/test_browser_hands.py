@@ -107,7 +107,7 @@ def test_a_ring_that_is_dragged_is_a_hand(context: BrowserContext, studio: Studi
     finger.move(x + 20, y - 20)
     finger.move(x + 45, y - 45)
     wait_until(lambda: held(studio) == 1.0, "the joint is not held")
-    expect(tab.locator("#figure-said")).to_contain_text(HELD)
+    expect(tab.locator("#figure-said")).to_contain_text("right thigh")
 
     def apart() -> float:
         at = ring(tab)

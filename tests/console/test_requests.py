@@ -302,9 +302,11 @@ def view(tmp_path: Path) -> Iterator[BoxView]:
 def test_the_page_tells_what_a_desk_is_answered(tmp_path: Path, view: BoxView) -> None:
     control = ControlInThread(tmp_path)
     with StageDouble(tmp_path) as stage, closing(Asker(control.port)) as asker:
+        stage.hold("lShldr")
         stage.tell(phrase="quiet", let_go=["lShldr"], coding=8, seed=7, liveliness=0.25, sensors=[LINE])
         until(lambda: asker.ask("/cue", "storm")[2] == 1)
         asker.ask("/look", "plastr")  # refused
+        asker.ask("/master", 0.5, 30.0)
         refused = control.process.handler.refused
 
         def is_told() -> bool:
@@ -324,11 +326,14 @@ def test_the_page_tells_what_a_desk_is_answered(tmp_path: Path, view: BoxView) -
                 one[1:] for one in answers
             ]
         assert reported["hands"] == [
-            {"joint": "lShldr", "source": "left-wrist", "holds": False, "by": "orientation"}
+            {"joint": "lShldr", "source": "left-wrist", "holds": False, "by": "orientation", "is_held": True}
         ]
         (sensor,) = reported["sensors"]
         assert (sensor["name"], sensor["battery"], sensor["heard"]) == ("left-wrist", 80, True)
         assert (reported["frames"], reported["trouble"]) == ("fresh", "")
+        began, seconds = reported["fade"]
+        assert (reported["time"] - reported["cue_since"], seconds) == pytest.approx((0.0, 30.0), abs=5.0)
+        assert reported["cue_since"] <= began <= reported["time"]
     control.close()
 
 

@@ -102,7 +102,7 @@ class StageDouble:
         show = show or facts()
         self._writer = FrameWriter(folder, show)
         self._inbox = OrderInbox(folder, "stage")
-        self._frame = one_puppet(len(show.skeleton))
+        self._frame, self._skeleton = one_puppet(len(show.skeleton)), show.skeleton
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._live, daemon=True)
 
@@ -128,6 +128,10 @@ class StageDouble:
             self.reported["puppets"] = [self.reported["puppets"][0] | of_puppet]
             self.reported |= health
             self._writer.write_health(self.reported)
+
+    def hold(self, joint: str) -> None:
+        """This joint is held from the next frame on."""
+        self._frame.puppets[0].holds[self._skeleton.index(joint)] = 1.0
 
     def _live(self) -> None:
         while not self._is_over.wait(0.005):
@@ -155,6 +159,10 @@ class InboxDouble:
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._live, daemon=True)
         self._thread.start()
+
+    def hold(self, joint: str) -> None:
+        """This joint is held from the next frame on."""
+        self._frame.puppets[0].holds[self._skeleton.index(joint)] = 1.0
 
     def _live(self) -> None:
         while not self._is_over.wait(0.005):

@@ -16,6 +16,7 @@ export function showChoices(parent, part, entries, act) {
   entries.forEach((one, place) => {
     const button = parent.children[place], label = one.picture ? button.lastChild : button, said = one.label ?? one.name;
     if (label.textContent !== said) label.textContent = said;
+    button.title = one.title ?? "";
     button.setAttribute("aria-pressed", one.now);
   });
 }

@@ -1,4 +1,5 @@
 // The dance in 3D, drawn on a plain canvas: a body of capsules, its shadow, a floor. No library, no graphics card.
+import { jointName, nameJoints } from "./joints.js";
 import { multiplied } from "./rotation.js";
 
 const HEAD_BYTES = 16; // tick (float64), flags, joints (uint32): stage_view.py
@@ -47,6 +48,7 @@ export class Dance {
       const show = await (await fetch("/api/show")).json();
       this.generation = show.generation;
       this.show = show.joints ? show : null;
+      if (this.show) nameJoints(show);
     } catch { /* asked again with the next word of the box */ }
   }
 
@@ -155,7 +157,7 @@ export class Dance {
     }
     const isOld = performance.now() - this.takenAt > 1500;
     const names = this.heldJoints().map((joint) => show.joints[joint]);
-    this.showSentence(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.join(", ") }) : this.words("free"));
+    this.showSentence(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.map(jointName).join(", ") }) : this.words("free"));
   }
 
   // The phrase that the puppet starts from, as a figure next to it, to its right as the eye sees it.

@@ -9,6 +9,7 @@ import { byId, every, fact, first } from "./elements.js";
 import { initFleet } from "./fleet.js";
 import { initHelp, readNight } from "./help.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
+import { jointName } from "./joints.js";
 import { initLogs } from "./logs.js";
 import { initMidi, read as readMidi, showMidi } from "./midi.js";
 import { initPhones } from "./phones.js";
@@ -147,7 +148,8 @@ function handItem({ joint, source, holds }, sensors) {
   const battery = sensors.find((one) => one.name === source)?.battery ?? null;
   item.dataset.holds = String(holds);
   name.textContent = source;
-  held.textContent = joint;
+  held.textContent = jointName(joint);
+  held.title = joint;
   item.append(held, name, battery === null ? "" : `${words("battery")} ${battery} %`);
   return item;
 }

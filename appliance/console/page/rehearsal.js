@@ -6,6 +6,7 @@ import { byId, every, first } from "./elements.js";
 import { Figure } from "./figure.js";
 import { initFloor, showFloor } from "./floor.js";
 import { initGestures, showGestures } from "./gestures.js";
+import { jointName } from "./joints.js";
 import { initLearn, leaveLearn, showLearn } from "./learn.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
@@ -63,7 +64,7 @@ export function showRehearsal(value, show) {
   byId("figure-place").hidden = !figure.joints.some((joint) => figure.isPlaced(joint));
   const phrases = value.phrases.map((one) => ({ ...one, label: hasWords(`source_${one.name}`) ? words(`source_${one.name}`) : one.name }));
   showChoices(byId("phrases"), byId("phrases-part"), phrases, (name) => command("/phrase", name, PHRASE_FADE_S));
-  const hands = value.hands.map((one) => ({ name: one.joint, label: `${one.joint} · ${one.source === "osc" ? words("hand_here") : one.source}`, now: one.holds }));
+  const hands = value.hands.map((one) => ({ name: one.joint, title: one.joint, label: `${jointName(one.joint)} · ${one.source === "osc" ? words("hand_here") : one.source}`, now: one.holds }));
   showChoices(byId("hands"), byId("hands-part"), hands, (joint, holds) => command("/hold", joint, holds ? 0 : 1));
   for (const id of ["coding", "interaction"]) {
     if (show) byId(id).max = show.most_iterations;

@@ -1,6 +1,7 @@
 // One row for each sensor. It stays the same element, so that a press on it is never lost.
 import { command } from "./device.js";
 import { fact } from "./elements.js";
+import { jointName } from "./joints.js";
 import { changeButton } from "./sensor_changes.js";
 import { hasWords, number, translated } from "./words.js";
 
@@ -59,7 +60,8 @@ function fill(card, sensor, joints, words) {
   card.root.dataset.worn = String(sensor.is_worn);
   card.facts.classList.toggle("old", !sensor.heard);
   const ago = !sensor.heard && sensor.age_s >= 0 ? ` ${words("heard_before", { time: duration(sensor.age_s) })}` : "";
-  card.joint.textContent = joints.join(", ") || words("not_worn");
+  card.joint.textContent = joints.map(jointName).join(", ") || words("not_worn");
+  card.joint.title = joints.join(", ");
   card.state.textContent = words(`sensor_${sensor.state}`) + ago;
   card.complaint.textContent = translated(sensor.complaint);
   const grades = ["system", "gyro", "accel", "mag"].map((_, place) => (sensor.calibration >> (6 - 2 * place)) & 3);
