@@ -25,12 +25,14 @@ _TINTS = {
     "warm white": (1, 0.8, 0.6),
     "cold white": (0.85, 0.92, 1),
 }
+_SPOT_ONLY = {"gobo", "iris", "focus", "prism"}  # attributes of lamps with a hard edge
+SPOT, WASH, LAMP = "moving spot", "moving wash", "lamp"
 _FILTERS = ("cyan", "magenta", "yellow")  # each takes red, green or blue away
 
 
 class Beam(NamedTuple):
     """place: metres; direction: a unit vector; colour: red, green, blue, the brightest of them 1; level:
-    0 dark to 1 full; degrees: from edge to edge. is_head: it moves."""
+    0 dark to 1 full; degrees: from edge to edge; kind: SPOT, WASH (both move) or LAMP."""
 
     fixture: FixtureConfig
     place: Array
@@ -38,7 +40,7 @@ class Beam(NamedTuple):
     colour: Array
     level: float
     degrees: float
-    is_head: bool
+    kind: str
 
 
 def beams_of(patch: Patch, values: Values) -> list[Beam]:
@@ -51,8 +53,13 @@ def beams_of(patch: Patch, values: Values) -> list[Beam]:
         ways = [directions[place] for place in own] or [own_axes(fixture)[1]]
         width = degrees or (HEAD_DEGREES if own else LAMP_DEGREES)
         place = np.array(fixture.place, float)
-        found += [Beam(fixture, place, way, colour, level, width, bool(own)) for way in ways]
+        kind = _head_kind(patch, fixture) if own else LAMP
+        found += [Beam(fixture, place, way, colour, level, width, kind) for way in ways]
     return found
+
+
+def _head_kind(patch: Patch, fixture: FixtureConfig) -> str:
+    return SPOT if _SPOT_ONLY & {patch.slots[place].base for place in patch.own(fixture)} else WASH
 
 
 def _light(patch: Patch, values: Values, fixture: FixtureConfig) -> tuple[Array, float, float]:

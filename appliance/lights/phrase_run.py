@@ -20,10 +20,14 @@ _SETTLING_S = 5.0  # every head has arrived
 
 
 class Pass(NamedTuple):
-    """One pass: its second of the phrase, the dancer's joints (J, 3) in metres, the rig's values (S,)."""
+    """One pass: its second of the phrase, the dancer's joints, the rig's values (S,).
+
+    places: (J, 3) metres; turns: (J, 4) their orientations in the world.
+    """
 
     second: float
-    dancer: NDArray[np.float64]
+    places: NDArray[np.float64]
+    turns: NDArray[np.float64]
     values: Values
 
 
@@ -45,7 +49,9 @@ def passes(
         frame = _frame(phrase, int(place), tick, step_s)
         rig.render(frame, 1, in_force, frame.frame_time)
         if tick >= settling:
-            yield Pass(float(place / phrase.fps), frame.puppets[0].positions.astype(float), rig.values)
+            dancer = frame.puppets[0]
+            places, turns = dancer.positions.astype(float), dancer.world.astype(float)
+            yield Pass(float(place / phrase.fps), places, turns, rig.values)
 
 
 def _frame(phrase: Recording, place: int, tick: int, step_s: float) -> JointFrame:

@@ -19,6 +19,7 @@ from appliance.lights.run import rig_problems, say
 from appliance.lights.unknown_name import UnknownNameError
 from appliance.lights.usual_mapping import with_usual_mapping
 from appliance.pictures.filmstrip import MissingPicturesError
+from appliance.pose.body import Body
 from appliance.pose.bvh import read_bvh
 from appliance.pose.counted import counted
 from appliance.pose.recording import Recording
@@ -108,7 +109,8 @@ def _draw(
     named = mapping or next((one.name for one in config.mappings), "none")
     scene = f"{moment.second:.1f} s into the phrase, mapping {named}"
     beams = beams_of(patch, moment.values)
-    return draw_plan(out, beams, show.skeleton, moment.dancer, phrase.roots, show.config.name, scene)
+    dancer = Body(show.skeleton).cones(moment.places, moment.turns)
+    return draw_plan(out, beams, dancer, phrase.roots, show.config.name, scene)
 
 
 def dazzling(config: LightsConfig, patch: Patch, phrase: Recording) -> list[str]:

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.lights.beams import HEAD_DEGREES, LAMP_DEGREES, ZOOM_DEGREES, Beam, beams_of
+from appliance.lights import beams as kinds_of
+from appliance.lights.beams import HEAD_DEGREES, LAMP, LAMP_DEGREES, ZOOM_DEGREES, Beam, beams_of
 from appliance.lights.patch import Patch
 from appliance.lights.phrase_run import passes
 from appliance.lights.plan import draw_plan
 from appliance.lights.rig_sheet import dazzling, meets_eyes
 from appliance.pose import quaternion
+from appliance.pose.body import Body
 from appliance.pose.recording import Recording
 from tests.lights.rigs import SKELETON, lights
 
@@ -59,7 +61,8 @@ def test_heads_point_where_they_aim_and_others_along_their_axis() -> None:
     np.testing.assert_allclose(beams["wash"].direction, [0, -1, 0], atol=1e-2)
     np.testing.assert_allclose(beams["par"].direction, [0, -1, 0], atol=1e-6)
     np.testing.assert_allclose(beams["bare"].direction, [0, 0, -1], atol=1e-6)
-    assert beams["wash"].is_head and not beams["par"].is_head
+    kinds = {name: beam.kind for name, beam in {**beams, **lit([SPOT])}.items()}
+    assert kinds == {"wash": kinds_of.WASH, "par": LAMP, "bare": LAMP, "spot": kinds_of.SPOT}
 
 
 @pytest.mark.parametrize(
@@ -96,6 +99,7 @@ def test_the_picture_changes_with_colour_level_and_width(tmp_path: Path) -> None
     for rules in ([LEVEL], [LEVEL, ORANGE], [ORANGE], [LEVEL, ORANGE, WIDE]):
         beams = list(lit([WASH, PAR], AIM, *rules).values())
         phrase = dance()
-        path = draw_plan(tmp_path / "rig.png", beams, SKELETON, np.zeros((2, 3)), phrase.roots, "t", "s")
+        dancer = Body(SKELETON).cones(np.zeros((2, 3)), np.tile(quaternion.IDENTITY, (2, 1)))
+        path = draw_plan(tmp_path / "rig.png", beams, dancer, phrase.roots, "t", "s")
         pictures.add(path.read_bytes())
     assert len(pictures) == 4
