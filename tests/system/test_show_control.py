@@ -294,8 +294,10 @@ def test_a_flood_does_not_touch_the_dance(show: Path, tmp_path: Path) -> None:
 def test_a_full_pipe_at_the_output_blocks_no_panic(show: Path, tmp_path: Path) -> None:
     """The reader of the box's output may stop reading."""
     reading, writing = os.pipe()
-    [port] = free_ports(1)
-    (tmp_path / "box.yaml").write_text(yaml.safe_dump({"runtime": "runtime", "control": {"port": port}}))
+    sensors, port = free_ports(2)
+    box = {"runtime": "runtime", "control": {"port": port}, "console": None}
+    box["sensors"] = {"udp": {"port": sensors}}  # another box may have the usual port
+    (tmp_path / "box.yaml").write_text(yaml.safe_dump(box))
     command = [*PLAY, "--show", str(show), "--box", str(tmp_path / "box.yaml")]
     unread = b"x" * 4096
     os.set_blocking(writing, False)
