@@ -3,7 +3,7 @@ import { Dance } from "./dance.js";
 import { withPin } from "./device.js";
 import { byId } from "./elements.js";
 import { drawTimeline, secondAt, showLegend } from "./timeline.js";
-import { clock, day, exact, number, translated, words } from "./words.js";
+import { clock, day, duration, exact, number, translated, words } from "./words.js";
 
 const HEAD_BYTES = 16, JOINT_BYTES = 32; // a frame's: dance.js
 const TOGETHER_S = 0.1; // what a cue changes is noted within one tick
@@ -36,8 +36,7 @@ export async function readHappened() {
   byId("happened-all").hidden = answer === null;
   if (answer === null) return;
   byId("happened-run").replaceChildren(...runs.map((one, place) => {
-    const long = one.seconds < 5400 ? `${number(one.seconds / 60, 1)} min` : `${number(one.seconds / 3600, 1)} h`;
-    return new Option(`${day(one.begun)}, ${clock(one.begun)} · ${long} · ${one.show}`, String(place));
+    return new Option(`${day(one.begun)}, ${clock(one.begun)} · ${duration(one.seconds)} · ${one.show}`, String(place));
   }));
   byId("happened-run").value = runs.length - 1;
   choose(runs.at(-1));

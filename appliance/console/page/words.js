@@ -86,6 +86,13 @@ export const date = (seconds, time = "short") =>
 export const number = (value, digits = 0) =>
   value.toLocaleString(locale, { minimumFractionDigits: digits, maximumFractionDigits: digits });
 
+// How long something took or lasts, everywhere on the page.
+export function duration(seconds) {
+  if (seconds < 9) return `${number(seconds, 1)} s`;
+  if (seconds < 90) return `${number(seconds)} s`;
+  return seconds < 5400 ? `${number(seconds / 60)} min` : `${number(seconds / 3600, 1)} h`;
+}
+
 // No line begins with a sign that its language sets apart from the word before: French colons, percent.
 const unbroken = (_, value) => typeof value === "string" ? value.replace(/ (?=[:;?!%»])/g, "\u00a0") : value;
 
