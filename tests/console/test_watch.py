@@ -56,6 +56,11 @@ async def next_status(browser: ClientWebSocketResponse) -> dict[str, Any]:
     return text
 
 
+async def _listen(browser: ClientWebSocketResponse, heard: set[str]) -> None:
+    async for message in browser:
+        heard.add(message.type.name)
+
+
 def test_a_browser_gets_the_poses_that_leave_the_box(venue: tuple[Box, Page]) -> None:
     box, page = venue
     reader = FrameReader(box.runtime)
@@ -157,13 +162,18 @@ def test_there_is_room_for_a_number_of_browsers(venue: tuple[Box, Page]) -> None
 
     async def crowd() -> None:
         async with ClientSession() as session:
-            browsers = [await watching(session, page, frames=False) for _ in range(MOST)]
+            heard: list[set[str]] = [set() for _ in range(MOST)]
+            listening = []
+            for one in heard:  # each answers the page's heartbeat while the others still come
+                browser = await watching(session, page, frames=False)
+                listening.append(asyncio.create_task(_listen(browser, one)))
             with pytest.raises(Exception, match="503"):
                 await watching(session, page)
-            for browser in browsers:
-                await next_status(browser)
-            for browser in browsers:
-                await browser.close()
+            async with asyncio.timeout(PATIENCE_S):
+                while not all(heard):
+                    await asyncio.sleep(0.05)
+            for task in listening:
+                task.cancel()
 
     asyncio.run(crowd())
     wait_until(lambda: page.get("/status").status == 200)
