@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from appliance.pose.whole_file import beside, sync, written_whole
+
 _LOCK_RETRY_S = 0.02
 
 
@@ -37,30 +39,27 @@ def write_whole(path: Path, content: bytes, private: bool = False) -> None:
 @contextlib.contextmanager
 def replacing(path: Path, private: bool = False) -> Iterator[BinaryIO]:
     """The same for content that is written piece by piece; after any error `path` is as it was."""
-    beside = _beside(path)
-    beside.unlink(missing_ok=True)  # an earlier try left it
-    with new_file(beside, path if private else None) as stream:
+    with written_whole(path) as part, new_file(part, path if private else None) as stream:
         yield stream
-    put_in_place(beside, path)
 
 
 def write_beside(path: Path, content: bytes, private: bool = False) -> Path:
     """Write `content` to the disk beside `path`, ready for `put_in_place`. Raises OSError."""
-    beside = _beside(path)
-    beside.unlink(missing_ok=True)
-    with new_file(beside, path if private else None) as stream:
+    part = beside(path)
+    part.unlink(missing_ok=True)
+    with new_file(part, path if private else None) as stream:
         stream.write(content)
-    return beside
+    return part
 
 
-def put_in_place(beside: Path, path: Path) -> None:
+def put_in_place(part: Path, path: Path) -> None:
     """Rename the file beside `path` to `path`; raises OSError, and then the file beside it is gone."""
     try:
-        beside.replace(path)
+        part.replace(path)
     except OSError:
-        beside.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
         raise
-    sync_folder(path.parent)
+    sync(path.parent)
 
 
 @contextlib.contextmanager
@@ -85,15 +84,6 @@ def new_file(path: Path, owner_of: Path | None = None) -> Iterator[BinaryIO]:
         raise
 
 
-def sync_folder(folder: Path) -> None:
-    """A rename is on the disk only once its folder is."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 @contextlib.contextmanager
 def alone_in(folder: Path, patience_s: float = 0.0) -> Iterator[None]:
     """One process at a time in a folder, even a read-only one; without the folder there is nothing to guard.
@@ -111,11 +101,6 @@ def alone_in(folder: Path, patience_s: float = 0.0) -> Iterator[None]:
     finally:
         fcntl.flock(descriptor, fcntl.LOCK_UN)  # a fork of ours that hangs has it open too
         os.close(descriptor)
-
-
-def _beside(path: Path) -> Path:
-    """Where the new content of `path` is written before it takes its place."""
-    return path.with_name(f".{path.name}.new")
 
 
 def _give_to_owner(descriptor: int, path: Path) -> None:

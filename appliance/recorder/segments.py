@@ -8,7 +8,8 @@ import os
 from collections import deque
 from pathlib import Path
 
-from appliance.box.durable import private_folder, sync_folder
+from appliance.box.durable import private_folder
+from appliance.pose.whole_file import sync
 from appliance.recorder.chunks import count_ticks
 
 SUFFIX = ".segment"
@@ -63,7 +64,7 @@ class Segments:
             self._older = None  # another keeper writes here: read the folder again
             raise
         self._path = path
-        sync_folder(self._folder)
+        sync(self._folder)
 
     def append(self, data: bytes, ticks: int) -> None:
         """Write it behind the rest, and wait until it is on the disk."""

@@ -10,7 +10,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from appliance.box.durable import new_file, private_folder, sync_folder, write_whole
+from appliance.box.durable import new_file, private_folder, write_whole
+from appliance.pose.whole_file import sync
 from appliance.release.arrivals import SHOW, Arrival
 from appliance.release.choice import Choice, appliance_box
 from appliance.show.bundle import WORKSHOP
@@ -134,7 +135,7 @@ def _copy_files(source: Path, target: Path, names: list[tuple[str, int]]) -> str
         whole.update(os.fsencode(f"{name}\0{digest.hexdigest()}\n"))
     with _writing():
         for folder in folders:
-            sync_folder(folder)
+            sync(folder)
     return whole.hexdigest()[:16]
 
 
@@ -172,7 +173,7 @@ def _put(part: Path, place: Path) -> Path:
         shutil.rmtree(before, ignore_errors=True)
     else:
         part.rename(place)
-    sync_folder(place.parent)
+    sync(place.parent)
     return place
 
 

@@ -8,12 +8,13 @@ from pathlib import Path
 import pytest
 
 from appliance.box.durable import new_file, private_folder, put_in_place, replacing, write_beside, write_whole
+from appliance.pose.whole_file import beside
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path: Path) -> None:
     path = tmp_path / "file"
     for content in (b"one", b"two" * 100_000, b""):
-        (tmp_path / ".file.new").write_bytes(b"left by a process that was killed")
+        beside(tmp_path / "file").write_bytes(b"left by a process that was killed")
         write_whole(path, content)
         assert path.read_bytes() == content
     assert [one.name for one in tmp_path.iterdir()] == ["file"]

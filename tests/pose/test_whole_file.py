@@ -7,16 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from appliance.pose.whole_file import write_text_whole, written_whole
+from appliance.pose.whole_file import beside, write_text_whole, written_whole
 
 
 @pytest.mark.parametrize("error", [OSError("disk full"), ValueError("no"), KeyboardInterrupt()])
 def test_what_was_there_stays_until_all_is_written(tmp_path: Path, error: BaseException) -> None:
     path = tmp_path / "partner.onnx"
     path.write_bytes(b"before")
-    with pytest.raises(type(error)), written_whole(path) as beside:
-        assert beside.name.startswith(".") and beside.suffix == ".onnx"
-        beside.write_bytes(b"half of")
+    beside(path).write_bytes(b"left by a process that was killed")
+    with pytest.raises(type(error)), written_whole(path) as part:
+        assert part == beside(path) and part.suffix == ".onnx"
+        part.write_bytes(b"half of")
         raise error
     assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"before"]
 
@@ -29,6 +30,6 @@ def test_a_new_content_is_on_the_disk_before_it_has_the_name(
     replace = Path.replace
     monkeypatch.setattr(Path, "replace", lambda file, to: steps.append("renamed") or replace(file, to))
     write_text_whole(tmp_path / "report.json", "左\n")
-    assert steps == ["synced", "renamed"]
+    assert steps == ["synced", "renamed", "synced"], "the content, and then the name"
     assert (tmp_path / "report.json").read_bytes() == "左\n".encode()
     assert len(list(tmp_path.iterdir())) == 1

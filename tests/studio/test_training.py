@@ -198,7 +198,7 @@ def test_a_checkpoint_is_on_the_disk_before_it_takes_the_place_of_the_one_before
     monkeypatch.setattr(os, "fsync", lambda number: synced.append((opened / str(number)).readlink()))
     training = Training(dancer, replace(TINY, network="mlp"))
     training.save_checkpoint(tmp_path / "checkpoint.pt")
-    assert synced == [tmp_path / ".checkpoint.part.pt"]
+    assert synced == [tmp_path / ".checkpoint.part.pt", tmp_path]
 
 
 def test_a_checkpoint_gives_the_averaged_network(dancer: Dataset, tmp_path: Path) -> None:

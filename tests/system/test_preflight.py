@@ -23,6 +23,7 @@ from appliance.dancer.phrase_cache import FOLDER, SUFFIX
 from appliance.keeper.mirror import Mirror
 from appliance.keeper.mirror_process import MirrorProcess
 from appliance.outputs.shared_frame import FrameWriter
+from appliance.pose.whole_file import beside
 from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, Pair
 from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
 from appliance.show.box import load_box
@@ -472,7 +473,7 @@ def test_a_show_that_is_gone_with_its_disk_is_not_even_tried(evening: Evening) -
 def test_a_proof_that_cannot_be_kept_is_reported_and_tried_again(evening: Evening) -> None:
     proof = proof_of(evening)
     evening.dance(seconds=10.5)
-    temporary = evening.data / f".{CHOSEN}.new"
+    temporary = beside(evening.data / CHOSEN)
     temporary.mkdir()
     now = time.monotonic()
     proof.turn(now)
