@@ -2,25 +2,103 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from appliance.body.volumes import Ball, Cut, Slab, Step, loft
 from appliance.pose.anatomy import Anatomy
+from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
 
 _UP = np.array([0.0, 1.0, 0.0])
 _LEVEL = np.array([1.0, 0.0, 1.0])
-FINGER = (0.0073, 0.0062)  # radii at knuckle and tip, in heights
-THUMB = (0.0086, 0.0068)
-CURL = 0.30  # how far the tip of a relaxed finger is on the palm's side, in lengths of the finger
-FAN = 0.42  # how far the outer fingers spread, metres aside for each metre from the knuckle
-THUMB_AWAY = 0.26
-TIP = 0.008  # the skin goes on beyond the last bone, in heights
-WEB = 0.16  # share of the finger that the palm's skin covers
+FINGER = (0.0072, 0.0057)  # radii at knuckle and tip, in heights
+THUMB = (0.0084, 0.0062)
+TIP = 0.012  # the skin goes on beyond the last bone, in heights
+# From the index to the little finger of a relaxed hand: how far the tip bends to the palm, and how far it is
+# to the thumb's side of the middle, in heights. The two in the middle lie against each other.
+CURL = np.radians([28.0, 42.0, 46.0, 58.0])
+TIPS = np.array([0.0250, 0.0054, -0.0054, -0.0222])
+KNUCKLE = 0.35  # share of the bend that is at the knuckle
+WEB = 0.45  # share of the finger that the palm's skin covers
+MELT = 0.0026  # over how many heights fingers melt into each other
+_FINGER_LONG = 0.042  # length of a finger that has no bones, in heights
 _HAND = 0.105  # length of a hand whose fingers the skeleton lacks, in heights
 _FOOT = 0.125
+
+Lengths = list[tuple[int, float]]  # the bones of a finger: the joint that moves it, metres
+# Towards which the thumb's first and last half bone points: along the hand, to the thumb's side, to the palm.
+_THUMB_WAY = np.array([(0.80, 0.34, 0.42), (0.95, -0.12, 0.20)])
+
+
+@dataclass(frozen=True)
+class _Hand:
+    """A hand's joint, its wrist (3,) and unit vectors (3,): along it, to the thumb's side, to the palm's."""
+
+    joint: int
+    wrist: Array
+    ahead: Array
+    aside: Array
+    inwards: Array
+    height: float
+
+    def relaxed(self, fingers: list[tuple[Array, Lengths]], thumb: tuple[Array, Lengths]) -> list[Step]:
+        """A palm, fingers that lie together and bend the more the nearer they are to the little one, and a
+        thumb beside them; a finger: where its knuckle is, its bones."""
+        fingers = sorted(fingers, key=lambda finger: -float(finger[0] @ self.aside))
+        beside = [float((knuckle - self.wrist) @ self.aside) for knuckle, _ in fingers]
+        steps: list[Step] = [
+            self._board(self.wrist + 0.30 * off * self.aside, knuckle, (0.0090, 0.0073), 0.007)
+            for off, (knuckle, _) in zip(beside, fingers, strict=True)
+        ]
+        for place, (knuckle, lengths) in enumerate(fingers):
+            share = (len(CURL) - 1) * place / (len(fingers) - 1)
+            bend, tip = (float(np.interp(share, range(len(CURL)), table)) for table in (CURL, TIPS))
+            long = sum(length for _, length in lengths)
+            fan = (float(np.mean(beside)) + tip * self.height - beside[place]) / long
+            fan = float(np.clip(fan, -0.3, 0.3))
+            angles = bend * (KNUCKLE + (1.0 - KNUCKLE) * ease(_middles(lengths)))
+            ways = np.cos(angles) * self.ahead + np.sin(angles) * self.inwards + fan * self.aside
+            steps += self._finger(_chain(knuckle, lengths, ways), FINGER)
+            web = knuckle + WEB * long * ways[0]
+            steps.append(self._board(knuckle, web, (0.0068, 0.0058), 0.006))
+        at, lengths = thumb
+        root = self.wrist + 0.30 * (at - self.wrist)
+        turned = _THUMB_WAY[0] + _middles(lengths) * (_THUMB_WAY[1] - _THUMB_WAY[0])
+        chain = _chain(at, lengths, turned @ [self.ahead, self.aside, self.inwards])
+        steps.append(self._board(root, chain[1][1], (0.0112, 0.0088), 0.014))
+        return steps + self._finger(chain, THUMB)
+
+    def _board(self, start: Array, end: Array, radii: tuple[float, float], soft: float) -> Slab:
+        first, last = np.array(radii) * self.height
+        return Slab(self.joint, start, end, first, last, soft * self.height, self.aside)
+
+    def _finger(self, chain: list[tuple[int, Array]], radii: tuple[float, float]) -> list[Step]:
+        """Its bones, each a little thinner."""
+        widths = self.height * np.linspace(*radii, len(chain))
+        return [
+            Slab(owner, start, end, float(first), float(last), MELT * self.height, self.aside)
+            for ((_, start), (owner, end)), (first, last) in zip(
+                pairwise(chain), pairwise(widths), strict=True
+            )
+        ]
+
+
+def _middles(lengths: Lengths) -> Array:
+    """How far along a finger the middle of each half of its bones is, 0 to 1, (halves, 1)."""
+    halves = np.repeat([0.5 * length for _, length in lengths], 2)
+    shares: Array = (np.cumsum(halves) - 0.5 * halves) / halves.sum()
+    return shares[:, None]
+
+
+def _chain(start: Array, lengths: Lengths, ways: Array) -> list[tuple[int, Array]]:
+    """(joint, where it is) along a finger, each bone in two halves; ways (halves, 3): where they point."""
+    chain = [(lengths[0][0], start)]
+    for (owner, length), way in zip((bone for bone in lengths for _ in range(2)), ways, strict=True):
+        chain.append((owner, chain[-1][1] + 0.5 * length * way / float(np.linalg.norm(way))))
+    return chain
 
 
 def hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
@@ -33,92 +111,36 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
     if len(fingers) < 2:
         return _plain_hand(anatomy, joint)
     knuckles = anatomy.positions[fingers]
-    aside = np.linalg.svd(knuckles - knuckles.mean(axis=0))[2][0]
+    ahead, aside = knuckles.mean(axis=0) - wrist, np.linalg.svd(knuckles - knuckles.mean(axis=0))[2][0]
     if float((_furthest(anatomy, thumb, wrist) - knuckles.mean(axis=0)) @ aside) < 0.0:
         aside = -aside
-    palm = np.cross(knuckles.mean(axis=0) - wrist, aside)
+    palm = np.cross(ahead, aside)
     if float(np.linalg.norm(palm)) < 1e-6 * height:  # all in the wrist, or along one line
         return _plain_hand(anatomy, joint)
-    palm = palm / np.linalg.norm(palm)
+    palm, ahead = palm / np.linalg.norm(palm), ahead / np.linalg.norm(ahead)
+    aside = np.cross(palm, ahead)
     if float((wrist - anatomy.positions[anatomy.trunk[0]]) @ anatomy.across) < 0.0:
         palm = -palm
-    steps: list[Step] = []
-    middle = float((knuckles @ aside).mean())
-    half = max(0.5 * float(np.ptp(knuckles @ aside)), 1e-6)
-    bones = [(joint, wrist, knuckle) for knuckle in knuckles]
-    ways = np.array([_furthest(anatomy, *at) for at in zip(fingers, knuckles, strict=True)]) - knuckles
-    spread = ways @ aside / np.maximum(np.linalg.norm(ways, axis=1), 1e-9)
-    chains: list[tuple[list[tuple[int, Array]], Array]] = []
-    for finger, knuckle, own in zip(fingers, knuckles, spread, strict=True):
-        fan = FAN * (float(knuckle @ aside) - middle) / half + float(spread.mean() - own)
-        chain = _relaxed(anatomy, finger, knuckle, fan * aside, CURL * palm)
-        chains.append((chain, knuckle))
-    steps += _palm(joint, wrist, [knuckle for _, knuckle in chains], aside, height)
-    for chain, knuckle in chains:
-        steps += _finger(chain, FINGER, height, aside)
-        web = knuckle + WEB * (chain[-1][1] - knuckle)
-        steps.append(Slab(joint, knuckle, web, 0.0068 * height, 0.0058 * height, 0.005 * height, aside))
-    thumb_at = anatomy.positions[thumb]
-    base = wrist + 0.30 * (thumb_at - wrist)
-    chain = _relaxed(anatomy, thumb, base, THUMB_AWAY * aside, 0.3 * CURL * palm)
-    steps.append(Slab(joint, base, chain[0][1], 0.0125 * height, 0.0100 * height, 0.014 * height, aside))
-    steps += _finger(chain, THUMB, height, aside)
+    modelled = _Hand(joint, wrist, ahead, aside, palm, height)
+    parts = [(anatomy.positions[finger], _lengths(anatomy, finger)) for finger in (thumb, *fingers)]
     thick = FINGER[0] * height
-    bones.append((joint, base, thumb_at))
-    return steps, [Slab(*bone, thick, thick, 0.0, aside) for bone in bones]
+    root = wrist + 0.30 * (parts[0][0] - wrist)
+    bones = [*((wrist, knuckle) for knuckle in knuckles), (root, parts[0][0])]
+    movers = [Slab(joint, *bone, thick, thick, 0.0, aside) for bone in bones]
+    return modelled.relaxed(parts[1:], parts[0]), movers
 
 
-def _palm(joint: int, wrist: Array, knuckles: list[Array], aside: Array, height: float) -> list[Step]:
-    """Wrist and one bone of the hand for each finger, melted into a palm."""
-    steps: list[Step] = []
-    for knuckle in knuckles:
-        start = wrist + 0.35 * float((knuckle - wrist) @ aside) * aside
-        steps.append(Slab(joint, start, knuckle, 0.0096 * height, 0.0076 * height, 0.007 * height, aside))
-    return steps
-
-
-def _relaxed(anatomy: Anatomy, finger: int, base: Array, fan: Array, curl: Array) -> list[tuple[int, Array]]:
-    """(joint, where it is) along a finger with its tip, each bone in two halves.
-
-    fan (3,): metres aside for each metre from `base`; curl (3,): the tip's way to the palm in lengths."""
+def _lengths(anatomy: Anatomy, finger: int) -> Lengths:
+    """The bones of a finger to the tip of its skin."""
     bones = anatomy.bones([finger, *anatomy.below(finger)])
-    if not bones:
-        return [(finger, anatomy.positions[finger])] * 2
-    owner, last, tip = bones[-1]
-    way = (tip - last) / max(float(np.linalg.norm(tip - last)), 1e-9)
-    bones[-1] = owner, last, tip + TIP * anatomy.height * way
-    points = [(bones[0][0], bones[0][1])]
-    for owner, start, end in bones:
-        points += [(owner, 0.5 * (start + end)), (owner, end)]
-    first, whole = points[0][1], max(float(np.linalg.norm(points[-1][1] - points[0][1])), 1e-9)
-
-    def bent(place: Array) -> Array:
-        along = float(np.linalg.norm(place - first))
-        there: Array = place + fan * float(np.linalg.norm(place - base)) + curl * along * along / whole
-        return there
-
-    return [(owner, bent(place)) for owner, place in points]
+    lengths = [(owner, float(np.linalg.norm(end - start))) for owner, start, end in bones]
+    owner, last = lengths.pop() if lengths else (finger, (_FINGER_LONG - TIP) * anatomy.height)
+    return [*lengths, (owner, last + TIP * anatomy.height)]
 
 
-def _finger(
-    chain: list[tuple[int, Array]], radii: tuple[float, float], height: float, aside: Array
-) -> list[Step]:
-    """Its bones, each a little thinner."""
-    widths = height * np.linspace(*radii, len(chain))
-    return [
-        Slab(owner, start, end, float(first), float(last), 0.0, aside)
-        for ((_, start), (owner, end)), (first, last) in zip(pairwise(chain), pairwise(widths), strict=True)
-    ]
-
-
-# Fingers of a relaxed hand, in lengths of the hand: knuckle (along, aside), tip (along, aside, inwards).
-_RELAXED = (
-    ((0.50, 0.22), (0.92, 0.33, 0.10)),
-    ((0.53, 0.08), (1.00, 0.11, 0.13)),
-    ((0.51, -0.07), (0.94, -0.12, 0.15)),
-    ((0.46, -0.20), (0.80, -0.34, 0.15)),
-)
-_RELAXED_THUMB = ((0.12, 0.10, 0.03), (0.34, 0.34, 0.10), (0.56, 0.51, 0.13))
+# Fingers of a relaxed hand, in lengths of the hand: knuckle (along, aside), length; then the thumb.
+_RELAXED = ((0.53, 0.185, 0.43), (0.55, 0.065, 0.47), (0.53, -0.06, 0.43), (0.48, -0.175, 0.34))
+_RELAXED_THUMB = ((0.16, 0.17, 0.05), 0.46)
 
 
 def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
@@ -136,11 +158,6 @@ def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
     aside = aside / max(float(np.linalg.norm(aside)), 1e-9)
     inwards = np.cross(ahead, aside)
     inwards = inwards if float(inwards @ _UP) <= 0.0 else -inwards
-
-    def at(along: float, across: float, inside: float = 0.0) -> Array:
-        there: Array = wrist + long * (along * ahead + across * aside + inside * inwards)
-        return there
-
     bones = [Slab(*bone, 0.01, 0.01, 0.0, aside) for bone in anatomy.bones(anatomy.below(joint))]
     mover = [Slab(joint, wrist, far, 0.01, 0.01, 0.0, aside), *bones] if bones else []
     if not anatomy.is_person:
@@ -150,17 +167,14 @@ def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Step], list[Slab]]:
             Slab(joint, wrist, row, wide[0], wide[1], 0.0, aside, 0.25 * half, half),
             Slab(joint, row, far, wide[1], wide[2], 0.0, aside, half, 0.6 * half),
         ], mover
-    knuckles = [at(*knuckle) for knuckle, _ in _RELAXED]
-    steps = _palm(joint, wrist, knuckles, aside, height)
-    for knuckle, (_, tip) in zip(knuckles, _RELAXED, strict=True):
-        bend = 0.5 * (knuckle + at(*tip)) - 0.02 * long * inwards
-        steps += _finger([(joint, knuckle), (joint, bend), (joint, at(*tip))], FINGER, height, aside)
-        web = knuckle + WEB * (at(*tip) - knuckle)
-        steps.append(Slab(joint, knuckle, web, 0.0068 * height, 0.0058 * height, 0.005 * height, aside))
-    root, middle, tip_at = (at(*place) for place in _RELAXED_THUMB)
-    steps.append(Slab(joint, root, middle, 0.0120 * height, 0.0085 * height, 0.014 * height, aside))
-    steps += _finger([(joint, middle), (joint, tip_at)], THUMB, height, aside)
-    return steps, mover
+    modelled = _Hand(joint, wrist, ahead, aside, inwards, height)
+    axes = long * np.array([ahead, aside, inwards])
+    fingers = [
+        (wrist + np.array([along, across, 0.0]) @ axes, [(joint, 0.5 * share * long)] * 2)
+        for along, across, share in _RELAXED
+    ]
+    at, share = _RELAXED_THUMB
+    return modelled.relaxed(fingers, (wrist + np.array(at) @ axes, [(joint, 0.5 * share * long)] * 2)), mover
 
 
 # Sections across a foot: share of the way from the ankle to the toes' joint or end; outwards, half the width,

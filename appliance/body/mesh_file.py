@@ -30,7 +30,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.pose.whole_file import written_whole
 
 MESH_FILE = "body.npz"
-MODEL = 7  # another number where sculpture, surface, weights or `bake` change: files of before are made again
+MODEL = 8  # another number where sculpture, surface, weights or `bake` change: files of before are made again
 LARGEST_BYTES = 4_000_000
 _LARGEST_UNPACKED = 16_000_000
 _DIGITS = 6  # decimals in the key: a skeleton that was written as text has the same

@@ -52,7 +52,7 @@ def sculpture(anatomy: Anatomy) -> Sculpture:
         details.append(_box(end))
     face = head(anatomy)
     if face:
-        limbs.append(Group(tuple(face), 0.008 * anatomy.height))
+        limbs.append(Group(tuple(face), 0.012 * anatomy.height))
         small = [step for step in face if float(np.ptp(step.box, axis=0).max()) < _SMALL * anatomy.height]
         details += [_box(small)] if small else []
     body = Group((*_trunk(anatomy), *neck(anatomy), *_back_and_chest(anatomy)), 0.0)
@@ -313,9 +313,9 @@ _FOREARM = _Flesh(
         (0.12, 0.000, 0.000, 0.0226, 0.0215),
         (0.26, 0.002, 0.000, 0.0230, 0.0232),
         (0.48, 0.002, 0.000, 0.0205, 0.0215),
-        (0.70, 0.001, 0.000, 0.0160, 0.0180),
-        (0.88, 0.000, 0.000, 0.0132, 0.0172),
-        (1.00, 0.000, 0.000, 0.0130, 0.0178),
+        (0.70, 0.001, 0.000, 0.0154, 0.0176),
+        (0.88, 0.000, 0.000, 0.0120, 0.0156),
+        (1.00, 0.000, 0.000, 0.0112, 0.0150),
     ),
     (
         ((0.00, 0.001, 0.002, 0.0080), (0.36, 0.009, 0.004, 0.0120), 0.020),

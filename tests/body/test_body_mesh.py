@@ -53,6 +53,7 @@ def test_the_surface_is_closed_and_looks_outwards(name: str) -> None:
     once, counts = np.unique(edges, axis=0, return_counts=True)
     assert (counts == 1).all(), "an edge that more than two triangles share, or two in the same sense"
     assert np.array_equal(once, np.unique(edges[:, ::-1], axis=0)), "an edge that has one triangle alone"
+    assert len(mesh.vertices) - len(mesh.faces) // 2 == 2, "a hole through it, as between two fingers"
     assert volume(mesh.vertices, mesh.faces) > 0
     assert np.isfinite(mesh.vertices).all()
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-3)
@@ -379,13 +380,74 @@ def pieces(mesh: BodyMesh, chosen: NDArray[np.bool_]) -> int:
     return len(np.unique(label[chosen]))
 
 
-@pytest.mark.parametrize(("name", "hand"), [("dancer", "lHand"), ("mixamo", "mixamorig:LeftHand")])
-def test_a_hand_has_five_fingers_also_where_the_skeleton_has_none(name: str, hand: str) -> None:
+HANDS = [("dancer", "lHand"), ("dancer", "rHand"), ("mixamo", "mixamorig:LeftHand")]
+
+
+@pytest.mark.parametrize(("name", "hand"), HANDS)
+def test_a_hand_has_fingers_also_where_the_skeleton_has_none(name: str, hand: str) -> None:
+    """The two in the middle lie against each other."""
     mesh, wrist = mesh_of(name), mesh_of(name).bind_positions[skeleton_of(name).index(hand)]
     out = np.linalg.norm(mesh.vertices - wrist, axis=1)
-    near = (out < 0.13 * mesh.height) & (mesh.vertices[:, 0] > wrist[0])
-    assert max(pieces(mesh, near & (out > share * out[near].max())) for share in (0.5, 0.6, 0.7, 0.8)) >= 4
+    near = (out < 0.13 * mesh.height) & (np.abs(mesh.vertices[:, 0]) > abs(wrist[0]))
+    near &= mesh.vertices[:, 0] * wrist[0] > 0
+    shares = np.arange(0.5, 0.95, 0.05)
+    assert max(pieces(mesh, near & (out > share * out[near].max())) for share in shares) >= 3
     assert pieces(mesh, near & (out > 0.0)) == 1
+
+
+def finger(side: str, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Knuckle and tip (3,) of one of the dancer's fingers, in heights; the palm looks downwards."""
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    knuckle = mesh.bind_positions[skeleton.index(f"{side}{name}1")] / mesh.height
+    skin_of = mesh.vertices[mesh.joints[:, 0] == skeleton.index(f"{side}{name}2")] / mesh.height
+    far = np.argsort(np.linalg.norm(skin_of - knuckle, axis=1))[-5:]
+    return knuckle.astype(float), skin_of[far].mean(axis=0).astype(float)
+
+
+FINGERS = ("Index", "Mid", "Ring", "Pinky")
+
+
+@pytest.mark.parametrize("side", "lr")
+def test_a_hand_at_rest_is_relaxed(side: str) -> None:
+    """Its fingers lie together, the tips hardly further apart than the knuckles; each bends more to the palm
+    than the one before; the thumb lies beside the index."""
+    bends, tips, knuckles = [], [], []
+    for name in FINGERS:
+        knuckle, tip = finger(side, name)
+        ahead = np.hypot(*(tip - knuckle)[[0, 2]])
+        bends.append(np.degrees(np.arctan2(knuckle[1] - tip[1], ahead)))
+        tips.append(tip)
+        knuckles.append(knuckle)
+    assert bends[0] > 5 and min(np.diff(bends)) > 1, bends
+    assert np.linalg.norm(tips[0] - tips[-1]) < 1.45 * np.linalg.norm(knuckles[0] - knuckles[-1])
+    assert np.linalg.norm(tips[1] - tips[2]) < 0.018
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    index = np.isin(mesh.joints[:, 0], [skeleton.index(f"{side}Index{part}") for part in (1, 2)])
+    away = np.linalg.norm(mesh.vertices[index] / mesh.height - finger(side, "Thumb")[1], axis=1)
+    assert 0.005 < away.min() < 0.022
+
+
+def test_hands_are_left_and_right_alike() -> None:
+    for name in (*FINGERS, "Thumb"):
+        left, right = finger("l", name)[1], finger("r", name)[1]
+        np.testing.assert_allclose(left, right * [-1, 1, 1], atol=0.002)
+
+
+@pytest.mark.parametrize("side", "lr")
+def test_a_wrist_is_narrower_than_hand_and_forearm(side: str) -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    elbow, wrist = (mesh.bind_positions[skeleton.index(side + name)] for name in ("ForeArm", "Hand"))
+    along = (mesh.vertices - wrist) @ (wrist - elbow) / np.linalg.norm(wrist - elbow) / mesh.height
+    arm = np.linalg.norm(mesh.vertices - wrist, axis=1) < 0.15 * mesh.height
+
+    def wide(at: float) -> float:
+        """The longer axis of a section across the arm, in heights."""
+        section = mesh.vertices[arm & (np.abs(along - at) < 0.004)] / mesh.height
+        section = section - section.mean(axis=0)
+        return float(np.ptp(section @ np.linalg.svd(section)[2].T, axis=0).max())
+
+    narrow = min(wide(at) for at in (-0.03, -0.02, -0.01))
+    assert narrow < 0.034 and narrow < 0.68 * wide(-0.10) and narrow < 0.56 * wide(0.04)
 
 
 def test_fingers_that_span_no_palm_are_a_plain_hand() -> None:
