@@ -139,7 +139,7 @@ def _line_problems(directory: Path, line: str) -> Iterator[tuple[str, str]]:
     try:
         if _sha256(directory, name) != found[1]:
             changed = f"'{name}' is not the file that was packed: it is damaged or was changed."
-            yield changed, "Copy the bundle again, or pack it again if you changed it."
+            yield changed, "Copy or export the bundle again, or pack it again if you changed it."
     except FileNotFoundError:
         yield f"'{name}' is missing.", COPY_AGAIN
     except OSError as error:

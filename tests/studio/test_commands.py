@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,13 @@ from appliance.pose import quaternion
 from appliance.pose.body_facts import fronts, sampled_positions
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.reading_options import ReadingOptions
-from appliance.show.bundle import bundle_files, default_show_path, write_checksums
+from appliance.show.bundle import (
+    bundle_files,
+    checksum_problems,
+    default_show_path,
+    unlisted_files,
+    write_checksums,
+)
 from appliance.show.check import not_as_packed, verify_bundle
 from appliance.show.show import load_show
 from appliance.studio.data.catalogue import Catalogue, recordings_in
@@ -206,8 +214,76 @@ def test_an_export_that_is_interrupted_leaves_the_show_that_was_there(
     assert not_as_packed(show) == "" and not list(show.glob(".export-*"))
 
 
+def two_shows(folder: Path) -> tuple[Path, Path]:
+    """A show with an artist's own files, and within its folder the files that an export puts there."""
+    show, made = folder / "show", folder / "show" / ".export-1" / "show"
+    for place in (show / "phrases", show / "pictures", made):
+        place.mkdir(parents=True)
+        (place / "second.bvh").write_text("the artist's")
+    for name in ("puppet.onnx", "answer.png"):
+        (show / name).write_text("old")
+    (made / "puppet.onnx").write_text("new")
+    write_checksums(show)
+    return show, made
+
+
+def network_of(show: Path) -> str:
+    """That of a show which is whole."""
+    assert not checksum_problems(show) and not unlisted_files(show)
+    assert {(show / name / "second.bvh").read_text() for name in ("phrases", "pictures")} == {"the artist's"}
+    network = (show / "puppet.onnx").read_text()
+    assert (show / "answer.png").exists() == (network == "old")
+    return network
+
+
+@contextlib.contextmanager
+def before_each_step(look: Callable[[], object]) -> Iterator[None]:
+    """Steps that may change the disk."""
+
+    def profile(_: object, event: str, called: object) -> None:
+        if event == "c_call" and getattr(called, "__module__", "") in ("posix", "io"):
+            look()
+
+    sys.setprofile(profile)
+    try:
+        yield
+    finally:
+        sys.setprofile(None)
+
+
+def test_an_export_that_is_cut_at_any_step_leaves_one_whole_show(tmp_path: Path) -> None:
+    """By a second Ctrl-C, or with the power; and the next export clears up."""
+    show, made = two_shows(tmp_path / "uncut")
+    seen: list[str] = []
+    with before_each_step(lambda: seen.append(network_of(show))):
+        release.put_in_place(made, show)
+    assert seen[0] == "old" and network_of(show) == "new"
+    for last in range(0, len(seen), len(seen) // 8):
+        show, made = two_shows(tmp_path / str(last))
+        steps = iter(range(last))
+
+        def cut(steps: Iterator[int] = steps) -> None:
+            if next(steps, None) is None:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt), before_each_step(cut):
+            release.put_in_place(made, show)
+        if network_of(show) == "old":
+            release.put_in_place(made, show)
+            assert network_of(show) == "new" and [one.name for one in show.parent.iterdir()] == ["show"]
+
+
+def test_a_folder_in_which_a_shell_works_stays_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    show, made = two_shows(tmp_path)
+    monkeypatch.chdir(show)
+    release.put_in_place(made, show)
+    assert network_of(Path()) == "new"
+
+
 @pytest.mark.usefixtures("unmeasured")
-def test_a_ctrl_c_while_the_files_are_replaced_waits_for_the_checksums(
+def test_where_folders_cannot_be_exchanged_a_ctrl_c_waits_for_the_checksums(
     trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     show = shutil.copytree(trained[0], tmp_path / "show")
@@ -224,13 +300,17 @@ def test_a_ctrl_c_while_the_files_are_replaced_waits_for_the_checksums(
                 signal.raise_signal(signal.SIGINT)
         return replace_file(file, target)
 
+    def not_here(*_: Path) -> None:
+        raise OSError
+
+    monkeypatch.setattr(release, "exchange", not_here)
     monkeypatch.setattr(Path, "replace", replace)
     result = bunraku("export", show / "checkpoint.pt", "--out", show, "--name", "Other", "--hand", "head")
     assert result.exit_code == 0, said(result)
     assert "puppet.onnx" in moved and "show.yaml" not in moved
     assert "stays as it is: --name and --hand are for a new one" in said(result)
     assert verify_bundle(show) == [] and not (show / "answer.png").exists()
-    assert not list(show.glob(".export-*"))
+    assert not list(show.glob(".export-*")) and not (tmp_path / ".show.new").exists()
 
 
 def test_a_wrong_hand_or_phrase_is_refused_before_anything_is_measured(

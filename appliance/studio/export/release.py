@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -20,6 +22,7 @@ from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
 from appliance.pose.roles import UPPER_ARMS
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.whole_file import exchange, sync
 from appliance.show.bundle import write_checksums
 from appliance.studio.autoencoder.training_run import stop_signals
 from appliance.studio.dance_files import write_report
@@ -68,7 +71,8 @@ class Request:
 def release(request: Request, dataset: Dataset, console: Console) -> dict[str, Any]:
     """Write the whole bundle and return its report. Raises StudioError if export and training differ.
 
-    Its files take the place of those in `out` once all are made: after an error or Ctrl-C nothing is changed.
+    Its files take the place of those in `out` once all are made: after an error, Ctrl-C or a power cut the
+    show that was there is as it was.
     """
     request.out.mkdir(parents=True, exist_ok=True)
     for left in request.out.glob(f"{_MADE}*"):  # by an export that was killed
@@ -77,9 +81,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
         made = Path(folder) / "show"
         made.mkdir()
         report = _make(request, dataset, made, console)
-        if not (made / ANSWER).exists():
-            (request.out / ANSWER).unlink(missing_ok=True)
-        _put_in_place(made, request.out)
+        put_in_place(made, request.out.resolve())
     print_answer(console, report["puppetry"])
     return report
 
@@ -150,15 +152,52 @@ def _make(request: Request, dataset: Dataset, folder: Path, console: Console) ->
     return report
 
 
-def _put_in_place(made: Path, folder: Path) -> None:
-    """Replace files of a bundle by those in another folder, and write its checksums.
+def put_in_place(made: Path, folder: Path) -> None:
+    """The files of a show take the place of those in a folder; the others stay. Raises OSError.
 
-    A first Ctrl-C is not obeyed meanwhile: a box refuses a network beside the checksums of another one.
+    All at once: a copy of the folder with them is exchanged for it. Where that cannot be done they follow one
+    another, the checksums last, and a first Ctrl-C waits: until then no box accepts the show.
     """
-    with stop_signals():
-        for file in made.iterdir():
-            file.replace(folder / file.name)
-        write_checksums(folder)
+    whole = folder.with_name(f".{folder.name}.new")
+    try:
+        _copy_with(made, folder, whole)
+        exchange(whole, folder)
+    except OSError:
+        with stop_signals():
+            if not (made / ANSWER).exists():
+                (folder / ANSWER).unlink(missing_ok=True)
+            for file in made.iterdir():
+                file.replace(folder / file.name)
+            write_checksums(folder)
+    finally:
+        shutil.rmtree(whole, ignore_errors=True)
+
+
+def _copy_with(made: Path, folder: Path, whole: Path) -> None:
+    """Links to the files of both, and their checksums, on the disk. Raises OSError."""
+    if Path.cwd().is_relative_to(folder) or folder.stat().st_uid != os.geteuid():
+        raise OSError(errno.EBUSY, "the folder must stay the same one", str(folder))
+    replaced = {file.name for file in made.iterdir()} | {ANSWER}
+
+    def gone(inside: str, names: list[str]) -> list[str]:
+        in_folder = inside == str(folder)
+        return [name for name in names if in_folder and (name in replaced or name.startswith(_MADE))]
+
+    shutil.rmtree(whole, ignore_errors=True)
+    shutil.copytree(made, whole, copy_function=_link)
+    shutil.copytree(folder, whole, symlinks=True, ignore=gone, copy_function=_link, dirs_exist_ok=True)
+    write_checksums(whole)
+    for name in replaced:
+        if (whole / name).exists():
+            sync(whole / name)
+    sync(whole)
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except OSError:  # of another user, or on a disk without links
+        shutil.copy2(source, target)
 
 
 def first_hand(skeleton: Skeleton, joints: Sequence[str], wanted: str | None = None) -> tuple[str, str]:
