@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -139,6 +140,21 @@ def test_coverage_is_the_share_that_is_danced() -> None:
     assert recorded.coverage(poses) > 0.95 and recorded.recall(poses) > 0.95
     assert 0.3 < recorded.coverage(poses[:500]) < 0.8
     assert recorded.coverage(poses[:1].repeat(50, axis=0)) < 0.1
+
+
+def test_recorded_moments_are_found_again_in_little_memory() -> None:
+    """Less than their half seconds take, all at once."""
+    poses = danced(motions(1200.0, 21)).poses[:, PLACES]
+    half_seconds = poses[::2, :, 0].size * 5 * 9 * 4
+    tracemalloc.start()
+    recorded = RecordedMotion([poses[:40], poses[40:9000], poses[9000:]])
+    (copy, share), (new, _) = (
+        recorded.nearest_moments([dance], 4, 2) for dance in (poses[700:1000], poses[1000:700:-3])
+    )
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert copy < 0.5 and share < 0.1 and new > 2
+    assert peak < half_seconds
 
 
 def cells(line: str) -> list[str]:

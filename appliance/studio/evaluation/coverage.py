@@ -19,28 +19,32 @@ NEIGHBOURS = 5
 WINDOW_TICKS = np.array([0, 6, 12, 18, 24])  # half a second, as the critic sees it
 EVERY = 2  # ticks between recorded half seconds
 APART_TICKS = 100  # moments of one stretch that count as different ones
-ROWS = 64
+ROWS, MOMENTS = 1024, 16  # poses made level, and moments searched, at once
 
 
 class RecordedMotion:
     """The recorded stretches (T, M, 4) of a dancer: poses for coverage, half seconds for memorisation."""
 
     def __init__(self, stretches: Sequence[Array]) -> None:
-        level = [without_heading(part).astype(np.float32) for part in stretches if len(part)]
-        poses = np.concatenate(level)
-        chosen = np.unique(np.linspace(0, len(poses) - 1, SAMPLE).astype(int))
-        self._poses = _columns(poses[chosen])
+        parts = [part for part in stretches if len(part)]
+        chosen = np.unique(np.linspace(0, sum(map(len, parts)) - 1, SAMPLE).astype(int))
+        ends = np.cumsum([len(part) for part in parts])
+        within = np.split(chosen, np.searchsorted(chosen, ends[:-1]))
+        begins = ends - [len(part) for part in parts]
+        some = [part[rows - begin] for part, rows, begin in zip(parts, within, begins, strict=True)]
+        self._poses = _columns(without_heading(np.concatenate(some)))
         self._radius = _radius(self._poses)
-        halves, moments, begin = [], [], 0
-        for part in level:
-            starts = _starts(part, EVERY)
-            halves.append(_half_seconds(part, starts))
-            moments.append(begin + starts // APART_TICKS)
-            begin += len(part) // APART_TICKS + 3  # stretches are never neighbours
-        self._halves = np.concatenate(halves)
-        moment = np.concatenate(moments)
-        self._begins = np.flatnonzero(np.diff(moment, prepend=-9))
-        self._moments = moment[self._begins]
+        self._columns = np.concatenate([_level_columns(part[::EVERY]) for part in parts])
+        starts, moments, row, moment = [], [], 0, 0
+        for part in parts:
+            begun = _starts(part, EVERY)
+            starts.append(row + begun // EVERY)
+            moments.append(moment + begun // APART_TICKS)
+            row += -(-len(part) // EVERY)
+            moment += len(part) // APART_TICKS + 3  # stretches are never neighbours
+        self._starts, every_moment = np.concatenate(starts), np.concatenate(moments)
+        self._begins = np.flatnonzero(np.diff(every_moment, prepend=-9))
+        self._moments = every_moment[self._begins]
 
     def coverage(self, danced: Array) -> float:
         """Share of the recorded poses with a danced one in their neighbourhood (Naeem et al. 2020).
@@ -62,23 +66,33 @@ class RecordedMotion:
         is than the nearest one of another moment, 2 s away: 1 if not at all, 0 if it is that recording. NaN
         for less than half a second.
         """
-        level = [without_heading(danced).astype(np.float32) for danced in dances]
-        asked = np.concatenate([_half_seconds(part, _starts(part, every)) for part in level])
+        asked = np.concatenate(
+            [_half_seconds(_level_columns(danced), _starts(danced, every), WINDOW_TICKS) for danced in dances]
+        )
         if not len(asked) or len(self._begins) < 3:
             return float("nan"), float("nan")
-        asked, known = (_without(halves, held) for halves in (asked, self._halves))
-        first, second = [], []
-        for begin in range(0, len(asked), ROWS):
-            apart = np.minimum.reduceat(_squared(asked[begin : begin + ROWS], known), self._begins, axis=1)
-            best = apart.argmin(axis=1)
-            first.append(apart.min(axis=1))
-            beside = np.abs(self._moments[None] - self._moments[best][:, None]) <= 1
-            second.append(np.where(beside, np.inf, apart).min(axis=1))
-        near, other = np.sqrt(np.concatenate(first)), np.sqrt(np.concatenate(second))
-        degrees = np.degrees(2 * np.arcsin(np.minimum(near / np.sqrt(8 / 9 * known.shape[1]), 1)))
+        asked = _without(asked, held)
+        apart = self._from_moments(asked, held)
+        best, near = apart.argmin(axis=1), np.sqrt(apart.min(axis=1))
+        apart[np.abs(self._moments[None] - self._moments[best][:, None]) <= 1] = np.inf
+        other = np.sqrt(apart.min(axis=1))
+        degrees = np.degrees(2 * np.arcsin(np.minimum(near / np.sqrt(8 / 9 * asked.shape[1]), 1)))
         seen = np.isfinite(other)
         share = near[seen] / np.maximum(other[seen], 1e-6)
         return float(degrees.mean()), float(share.mean()) if len(share) else float("nan")
+
+    def _from_moments(self, asked: Floats, held: int) -> Floats:
+        """(N, moments): squared distances of half seconds (N, D) from the nearest of each recorded moment.
+
+        A few moments at a time: all half seconds of an hour are 280 MB.
+        """
+        ends, found = [*self._begins[1:], len(self._starts)], []
+        for first in range(0, len(self._begins), MOMENTS):
+            begins = self._begins[first : first + MOMENTS]
+            starts = self._starts[begins[0] : ends[first + len(begins) - 1]]
+            known = _without(_half_seconds(self._columns, starts, WINDOW_TICKS // EVERY), held)
+            found.append(np.minimum.reduceat(_squared(asked, known), begins - begins[0], axis=1))
+        return np.concatenate(found, axis=1)
 
 
 def _starts(poses: Array, every: int) -> NDArray[np.intp]:
@@ -93,12 +107,19 @@ def _without(halves: Floats, joint: int) -> Floats:
     return rest
 
 
-def _half_seconds(poses: Array, starts: NDArray[np.intp]) -> Floats:
-    """(N, D) of poses (T, M, 4), headings removed."""
-    columns = _columns(poses)
-    seen = columns[starts[:, None] + WINDOW_TICKS]
-    halves: Floats = seen.reshape(len(starts), len(WINDOW_TICKS) * columns.shape[1])
+def _half_seconds(columns: Floats, starts: NDArray[np.intp], window: NDArray[np.intp]) -> Floats:
+    """(N, D): rows of columns (R, C) at each start, in the steps of a window."""
+    seen = columns[starts[:, None] + window]
+    halves: Floats = seen.reshape(len(starts), len(window) * columns.shape[1])
     return halves
+
+
+def _level_columns(poses: Array) -> Floats:
+    """(T, 9 M) of poses (T, M, 4), headings removed. A few at a time: the way there takes much more."""
+    found = np.empty((len(poses), 9 * poses.shape[1]), dtype=np.float32)
+    for first in range(0, len(poses), ROWS):
+        found[first : first + ROWS] = _columns(without_heading(poses[first : first + ROWS]))
+    return found
 
 
 def _columns(poses: Array) -> Floats:

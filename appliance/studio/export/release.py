@@ -196,7 +196,7 @@ def _copy_with(made: Path, folder: Path, whole: Path) -> None:
 def _link(source: str, target: str) -> None:
     try:
         os.link(source, target, follow_symlinks=False)
-    except OSError:  # of another user, or on a disk without links
+    except OSError:  # the file is another user's, or the disk has no links
         shutil.copy2(source, target)
 
 
