@@ -95,12 +95,12 @@ PROFILES ?= mkr1000 mkrwifi1010 xiao_esp32s3 nano_esp32
 
 firmware-bin: ## the wearable's images, out/firmware/wearable-BOARD.bin (needs arduino-cli; PROFILES="mkr1000 ...")
 	@command -v arduino-cli >/dev/null || { echo "arduino-cli 1.0 or newer is missing: docs/firmware.md" >&2; exit 1; }
+	@case "$(PROFILES):$(ESP32_INDEX)" in *esp32*:) echo \
+	    "The ESP32's boards need ESP32_INDEX, the address of Espressif's board index: docs/firmware.md" >&2; exit 1 ;; esac
 	@rm -rf build/sketch && mkdir -p build/sketch && cp -r firmware/wearable build/sketch/
 	@sed -i 's|^\( *\)- platform: esp32:.*|&\n\1  platform_index_url: $(ESP32_INDEX)|' build/sketch/wearable/sketch.yaml
 	@for profile in $(PROFILES); do \
 	    case $$profile in mkr*) flags="-std=gnu++17 -fno-sized-deallocation" ;; *) flags= ;; esac; \
-	    case $$profile:$(ESP32_INDEX) in *esp32*:) \
-	        echo "$$profile needs ESP32_INDEX, the address of Espressif's board index: docs/firmware.md" >&2; exit 1 ;; esac; \
 	    arduino-cli compile --profile $$profile --output-dir build/firmware-bin/$$profile \
 	        --build-property "compiler.cpp.extra_flags=$$flags" build/sketch/wearable \
 	    && install -D -m 644 build/firmware-bin/$$profile/wearable.ino.bin out/firmware/wearable-$$profile.bin \
@@ -246,10 +246,10 @@ wheels: $(VENV)/.ready-to-run ## wheels and source distributions of the last com
 	@ls out/dist/*
 
 dist: ## everything that a release has, signed, in out/downloads (KEY=FILE; root); the same commit gives the same bytes
-	@$(MAKE) --no-print-directory wheels
-	@for arch in $(ARCHITECTURES); do $(MAKE) --no-print-directory image ARCH=$$arch || exit 1; done
 	@if command -v arduino-cli >/dev/null; then $(MAKE) --no-print-directory firmware-bin; \
 	    else echo "arduino-cli is missing: out/firmware stays as it is (docs/firmware.md)."; fi
+	@$(MAKE) --no-print-directory wheels
+	@for arch in $(ARCHITECTURES); do $(MAKE) --no-print-directory image ARCH=$$arch || exit 1; done
 	@$(MAKE) --no-print-directory sbom downloads
 
 ARCHITECTURES ?= amd64 arm64

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -54,6 +56,19 @@ def test_every_profile_is_built_and_every_board_of_the_sketch_has_one() -> None:
     )
     assert sorted(known) == sorted(checked)
     assert len(known) == len(PROFILES)
+
+
+def test_images_that_cannot_all_be_built_are_refused_before_the_first(tmp_path: Path) -> None:
+    (tmp_path / "firmware" / "wearable").mkdir(parents=True)
+    (tmp_path / "firmware" / "wearable" / "sketch.yaml").touch()
+    compiler = tmp_path / "arduino-cli"
+    compiler.write_text("#!/bin/sh\ntouch compiled\n")
+    compiler.chmod(0o755)
+    command = ["make", "--file", str(REPOSITORY / "Makefile"), "firmware-bin", "PROFILES=mkr1000 nano_esp32"]
+    path = {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    done = subprocess.run(command, cwd=tmp_path, env=path, capture_output=True, text=True, check=False)
+    assert done.returncode and "need ESP32_INDEX, the address" in done.stderr
+    assert not (tmp_path / "compiled").exists()
 
 
 def test_the_firmware_speaks_this_wire_under_one_version_number() -> None:
