@@ -8,14 +8,19 @@ import moderngl
 import numpy as np
 import pytest
 
+from appliance.body.body_mesh import body_mesh
 from appliance.outputs.coupling import LAGS, ROW_S, ROWS, coupled, led_by
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
+from appliance.projector.picture import scene
+from appliance.projector.picture.camera import view
 from appliance.projector.picture.looks.strings import tied
+from appliance.projector.picture.poses import poses_of
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import draw_still, moment_of
+from appliance.show.look import CameraConfig, LookConfig
 from tests.projector import skeletons
-from tests.projector.golden_looks import AT_S, SIZE
+from tests.projector.golden_looks import AT_S, SIZE, renderer
 
 HAND, FOLLOWER, LATE, RANDOM, STANDING = range(1, 6)
 
@@ -72,16 +77,65 @@ def test_strings_are_tied_to_every_skeleton(name: str) -> None:
     assert joints and len(joints) == len(set(joints)) and max(joints) < len(skeleton)
 
 
-def test_strings_run_from_the_held_joint(gl: moderngl.Context, dance: Recording, looks: Renderer) -> None:
+def test_strings_leave_the_picture_above_the_hand_that_holds(gl: moderngl.Context, dance: Recording) -> None:
+    """In the colour of what is taut; without a hand they hang from above the root, slack."""
+    looks = {"strings": LookConfig(name="strings", style="strings", vignette=0.0, fog=0.0)}
+    with renderer(gl, dance.skeleton, looks) as made:
+        free, left, right = (
+            draw_still(gl, made, moment_of(dance, AT_S, held), "strings", SIZE).astype(int)
+            for held in (None, holding(dance, "lHand"), holding(dance, "rHand"))
+        )
+    for picture, hand in ((left, "lHand"), (right, "rHand")):
+        leaving = picture[5:20].max(axis=0)
+        assert leaving.max() > 80, "no thread leaves the picture at its top"
+        brightest = int(leaving.sum(axis=1).argmax())
+        assert abs(brightest - column(dance, hand)) <= 2, "its hand's thread does not lead up from it"
+    assert 80 > free[5:20].max() > 15
+    assert (left[..., 0] - left[..., 2]).max() > 80 > (free[..., 0] - free[..., 2]).max()
+
+
+def test_the_more_closely_a_limb_follows_the_brighter_and_straighter_its_string(
+    gl: moderngl.Context, dance: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leader, limb = (dance.skeleton.index(name) for name in ("lHand", "rShin"))
+    plain = {"name": "x", "style": "strings", "vignette": 0.0, "fog": 0.0, "glow": 0.0}
+    look = LookConfig.model_validate({**plain, "held": {"strength": 0.0}})
+    peaks, bends = [], []
+    with renderer(gl, dance.skeleton, {"x": look}) as made:
+
+        def drawn(follows: float) -> np.ndarray:
+            led = np.zeros(len(dance.skeleton), np.float32)
+            led[limb] = follows
+            monkeypatch.setattr(scene, "led_by", lambda *_: (leader, led))
+            moment = moment_of(dance, AT_S, holding(dance, "lHand"))
+            return draw_still(gl, made, moment, "x", (640, 360)).astype(int).sum(axis=2)
+
+        slack = drawn(0.0)
+        for follows in (0.4, 0.7, 1.0):
+            light = drawn(follows) - slack
+            rows, columns = np.nonzero(light > 0.4 * light.max())
+            fit = np.polyfit(rows, columns, 1)
+            peaks.append(np.percentile(light[rows, columns], 90))
+            bends.append(np.abs(columns - np.polyval(fit, rows)).max())
+    assert peaks == sorted(peaks) and peaks[-1] > 1.5 * peaks[0]
+    assert bends == sorted(bends, reverse=True) and bends[-1] < 4 < bends[0]
+
+
+def holding(dance: Recording, name: str) -> np.ndarray:
     held = np.zeros(len(dance.skeleton), np.float32)
-    held[dance.skeleton.index("lShldr")] = 1.0
-    free, led = (
-        draw_still(gl, looks, moment_of(dance, AT_S, one), "strings", SIZE).astype(int)
-        for one in (None, held)
-    )
-    assert led.max() > 200
-    assert (led[..., 0] - led[..., 2]).max() > 80 > (free[..., 0] - free[..., 2]).max()
-    assert free[:20].max() > 25 > led[:20].max(), "no strings from above, or they stay while a hand holds"
+    held[dance.skeleton.index(name)] = 1.0
+    return held
+
+
+def column(dance: Recording, name: str) -> int:
+    """Of the picture, in which a joint is."""
+    moment = moment_of(dance, AT_S)
+    mesh = body_mesh(dance.skeleton)
+    sole = float(mesh.bind_positions[:, 1].min() - mesh.vertices[:, 1].min())
+    poses = poses_of(moment, moment.puppets[0], mesh.height, sole)
+    camera = CameraConfig()
+    seen = view(camera, camera, 1.0, moment.time_s, poses, SIZE[0] / SIZE[1])
+    return int(seen.on_picture(poses.positions[0, dance.skeleton.index(name)])[0] * SIZE[1])
 
 
 def test_partners_are_coupled_where_they_move_alike_and_strangers_are_not() -> None:

@@ -60,6 +60,11 @@ class View:
         x, y, _, w = self.projection @ np.append(place, 1.0)
         return float((0.5 + 0.5 * x / w) * self.slopes[0] / self.slopes[1]), float(0.5 + 0.5 * y / w)
 
+    def over(self, place: Array, beyond: float) -> Array:
+        """The place above this one that is so many figure heights beyond the picture's upper edge."""
+        up, away = (place - self.eye) @ self.up, (self.eye - place) @ self.back
+        return np.asarray(place + (away * self.slopes[1] - up + beyond) * self.up)
+
 
 class _Stand(NamedTuple):
     """A CameraConfig's values at one time."""

@@ -43,7 +43,7 @@ void main() {
     drawn.xyz = mix(drawn.xyz, skin.yxz, molten);
     place += normal * swell * (max(pressed, 0.25) - 0.4);  // fingers and toes stay whole
 #endif
-    mark = held_at(in_joints, in_weights);
+    mark = held_at(in_joints, in_weights, in_position);
     open = mix(2.0 * in_normal.w - 1.0, 1.0, molten);
     gl_Position = projection * vec4(place, 1.0);
 }

@@ -59,7 +59,7 @@ void main() {
     float spark = 0.45 + 0.5 * in_chance.w + 1.4 * pow(in_chance.y, 12.0);
     vec3 on_body = figure_colour * (0.05 + 0.95 * key * key) + accent_colour * (0.16 + 1.2 * rim);
     vec3 in_air = mix(light_colour, accent_colour, smoothstep(0.1, 0.8, age));
-    float mark = held_at(in_joints, in_weights);
+    float mark = held_at(in_joints, in_weights, in_position);
     on_body = mix(on_body, held_colour * (0.7 + 0.5 * key + 0.5 * rim), mark);
     in_air = mix(in_air, held_colour, mark * (1.0 - age));
     float shown = loose ? smoothstep(0.30, 1.5, speed) * pow(1.0 - age, 1.5) : smoothstep(-0.1, 0.3, facing);

@@ -27,7 +27,7 @@ void main() {
     facing = dot(turned(by, 2.0 * in_normal.xyz - 1.0), way);
     strength = in_along.y * (floor_side < 0.0 ? exp(-5.0 * max(place.y, 0.0)) : 1.0);
     pulse = in_along.z * 7.0 + place.y * 0.9 - time * 0.22;
-    mark = held_at(in_joints, in_weights);
+    mark = held_at(in_joints, in_weights, in_position);
     place.y *= floor_side;
     tangent.y *= floor_side;
     vec4 here = projection * vec4(place, 1.0), there = projection * vec4(place + 0.01 * tangent, 1.0);

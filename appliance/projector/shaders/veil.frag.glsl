@@ -31,6 +31,10 @@ void main() {
     for (int i = 0; i < 5; i++) glint *= glint;  // its 32nd power
     glint *= even * (1.0 - thin);
     vec3 glass = figure_colour * (0.05 + rim) + light_colour * 0.6 * glint;
+#ifdef LED
+    vec3 ember = held_colour * (0.04 + 0.13 * facing + rim) + light_colour * 0.4 * glint;  // threads are brighter
+#else
     vec3 ember = held_colour * (0.28 + 0.25 * facing + rim);
+#endif
     colour = vec4(brightness * mix(glass, ember, mark), hides);
 }
