@@ -26,7 +26,7 @@ class MalformedPsnError(ValueError):
 
 @dataclass
 class Tracker:
-    """One point in space, what the packet told of it: metres, seconds, radians."""
+    """One point in space, as the packet has it: metres, seconds, radians."""
 
     position: Vector | None = None
     speed: Vector | None = None

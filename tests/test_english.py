@@ -33,6 +33,9 @@ BAD = {
     "none": ["Raises ValueError for a number that is none.", "A card that is none."],
     "inversion": ["Kept are: displays of Intel.", "Left out is the rest."],
     "tells": ["`-h` tells the options.", "The journal tells what was danced."],
+    "of it": ["What is known of it is kept.", "The newest that was heard of the other box."],
+    "whose": ["The dancer in whose latents it goes on.", "None of whose joints is held."],
+    "to be": ["The folder has what is to be learned.", "Nothing is to be heard."],
     "long": [" ".join(["The box sends a frame and"] * 9) + " ends."],
 }
 GOOD = [

@@ -68,6 +68,13 @@ PATTERNS: dict[str, re.Pattern[str]] = {
         r"^(?:Kept|Left out|Left|Missing|Lost|Held|Told|Counted|Written|Drawn|Made|Meant|Wanted|Needed|Asked"
         r"|Taken|Sent|Said|Shown|Found|Set|Read|Gone|New|Good|Open) (?:is|are)\b[^?]*$"
     ),
+    "of it": re.compile(
+        r"\b(?:known|noted|said|told|heard) of (?:it|them|each|what|a|the)\b(?! (?:clock|hour|half)\b)"
+    ),
+    "whose": re.compile(r"\b(?:in|of|by|with|from|at|to|on) whose\b"),
+    "to be": re.compile(
+        r"\b(?:is|are) to be (?:\w+(?:ed|en|nt|ne|ad|ught)|heard|held|told|said|put|set|kept|known)\b"
+    ),
     "tells": re.compile(
         r"\btells (?:what|how|where|which|why|whether|that|the (?:same|options|rest|truth))\b"
     ),

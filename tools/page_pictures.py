@@ -59,7 +59,7 @@ def at_rest(reported: str, now: float) -> str:
 
 
 def _calm(tab: Page, now: float) -> None:
-    """The page is told of a box at rest from now on; frames and all else are the server's."""
+    """From now on the page sees a box at rest; frames and everything else come from the server."""
 
     def between(browser: WebSocketRoute) -> None:
         server = browser.connect_to_server()

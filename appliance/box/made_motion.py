@@ -18,7 +18,7 @@ _LARGEST, _LARGEST_NAMES = 16384, 8192
 
 class MadeMotion(NamedTuple):
     """recipe: JSON; file: its name in the runtime folder's `material`; name: of the source, or of what was
-    kept. at_once: it is to be danced now, not at the next return. from_s: the second of what is danced
+    kept. at_once: danced now, not at the next return. from_s: the second of what is danced
     from which it goes on; None: from none.
     """
 

@@ -1,4 +1,4 @@
-"""The folder in which page and learner meet: what is to be learned, how far it is, what came of it.
+"""The folder in which page and learner meet: the request, its progress and its result.
 
 It is on the disk: what was begun goes on after a power cut.
 """
@@ -15,6 +15,7 @@ from appliance.box.durable import private_folder, write_whole
 from appliance.pose.foreign_file import stored_json
 
 FOLDER, RECORDINGS = "learning", "recordings"
+UNDER_WAY = "waits", "training", "checking"  # states of a progress while something is wanted
 SHORTEST_MIN, USUAL_MIN, LONGEST_MIN = 0.05, 60.0, 1440.0
 STUDIO_MISSING = (
     "Learning needs the studio, which is not installed on this box: pip install bunraku-studio. The dance "
@@ -72,7 +73,7 @@ class Learning:
 
     def want(self, wanted: Wanted) -> None:
         """Write the request. Raises OSError."""
-        self.report(state="waits")
+        private_folder(self.folder)
         write_whole(self._wanted, json.dumps(wanted._asdict()).encode())
 
     def wanted(self) -> Wanted | None:
@@ -98,8 +99,10 @@ class Learning:
         write_whole(self._progress, json.dumps(values).encode())
 
     def reported(self) -> dict[str, Any]:
-        """The progress; {} before the first."""
+        """The progress; {} before the first. That of a learning before this one does not count."""
         try:
-            return dict(stored_json(self._progress))
+            reported = dict(stored_json(self._progress))
         except (OSError, ValueError, TypeError):
-            return {}
+            reported = {}
+        is_of_now = reported.get("state") in UNDER_WAY or self.wanted() is None
+        return reported if is_of_now else {"state": UNDER_WAY[0]}

@@ -50,7 +50,7 @@ from appliance.show.show import Show
 HELD = 0.5  # a hand with less weight is ignored
 STEADY = 0.03  # fraction of the map: a limb that trembles by less stays where it pointed
 
-_TAKEN_S = 5.0  # what is to be danced at once and is not taken over until then is made again
+_TAKEN_S = 5.0  # a motion for now that no stage has taken over by then is made again
 _REST_S = 0.2  # from one motion to the next, at least
 _AHEAD_S = 1.2  # until an improvisation is made that is wanted at once
 _FILES = 3  # each puppet's newest besides the one that dances: the stage may still open the one before

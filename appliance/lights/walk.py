@@ -122,7 +122,7 @@ def _meaning(slot: Slot) -> str:
 class Walking:
     """A walk, pass by pass: each step takes `step_s`, or as long as its heads need.
 
-    step: what is to be looked at now; None before the first pass and after the last step.
+    step: the fixture and attribute that move now; None before the first pass and after the last step.
     """
 
     def __init__(self, patch: Patch, to_see: Sequence[Step], step_s: float, rate_hz: float) -> None:

@@ -79,7 +79,7 @@ class Roles:
 
     @property
     def peer(self) -> Heard | None:
-        """The newest that was heard of the other box."""
+        """The newest message of the other box."""
         return self._peer
 
     @property

@@ -86,7 +86,7 @@ def part_in(body: bytes) -> tuple[int, int, int, bytes] | None:
 
 
 class Incoming:
-    """The follower's end: messages in order, and which are to be asked for."""
+    """The follower's end: messages in order, and which ones are missing."""
 
     def __init__(self) -> None:
         self.next = 1  # number of the message that `take` gives next

@@ -136,8 +136,8 @@ Met = tuple[Array, Array, Array]  # which rays (rows, columns), bool; their dept
 def _meet(x: Array, y: Array, a: Array, b: Array, ra: float, rb: float, behind: Array) -> Iterator[Met]:
     """Where rays along -z at x (1, columns) and y (rows, 1) meet a rounded cone in front of `behind`.
 
-    The ray against the cone's side is a quadratic; the rounded ends are two spheres. `behind` (rows, columns)
-    is to be brought up to date between what is given.
+    The ray against the cone's side is a quadratic; the rounded ends are two spheres. The caller updates
+    `behind` (rows, columns) after each item.
     """
     for centre, radius in ((a, ra), (b, rb)):
         dx, dy = x - centre[0], y - centre[1]

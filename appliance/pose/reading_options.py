@@ -1,4 +1,4 @@
-"""How to read other people's recordings: what is known of them beyond their files."""
+"""How to read other people's recordings: facts that are not in the files."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ReadingOptions:
     all_frames: bool = False
 
     def conventions_of(self, name: str) -> FileConventions:
-        """How a recording of this name, without its ending, is to be read."""
+        """Conventions for a recording of this name (without its ending)."""
         found = (first_fit(one, name) for one in (self.metres_per_unit, self.up, self.facing, self.root))
         return FileConventions(*found)
 

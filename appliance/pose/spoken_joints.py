@@ -1,4 +1,4 @@
-"""What people call the joints of a skeleton: left shoulder for lShldr, lower back for abdomen."""
+"""The joints of a skeleton in people's words: left shoulder for lShldr, lower back for abdomen."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ UPS = ("y", "z")
 
 @dataclass(frozen=True)
 class FileConventions:
-    """How a file is to be read; None: guessed. root: name of the joint that becomes the root; up: 'y' or 'z';
+    """Conventions of a file; None: guessed. root: name of the joint that becomes the root; up: 'y' or 'z';
     facing: where the dancer of the file faces once it is upright, a key of FACINGS.
     """
 

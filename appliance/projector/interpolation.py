@@ -99,7 +99,7 @@ class Interpolation:
         self._seen.append(_Seen(frame.tick, frame.frame_time, frame.left, figures, ahead))
 
     def _ahead(self, tick: int, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
-        """The figures as predicted; as they are after a gap, or where nothing is to be predicted."""
+        """The figures as predicted; as they are after a gap, or with prediction off."""
         if not self._prediction_s or self._reader.facts is None or len(self._seen) < 2 * SPAN:
             return figures
         before, earlier = self._seen[-SPAN], self._seen[-2 * SPAN]

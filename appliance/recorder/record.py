@@ -1,4 +1,4 @@
-"""The layout of a journal: what is noted of a tick and of an event, and the facts that explain them."""
+"""The layout of a journal: the fields of a tick and of an event, and the facts that explain them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ORDER = "order"  # kind of the event that show control asked for something, and 
 # Exceptions that parsing a corrupt journal may raise.
 DAMAGED = (ValueError, LookupError, ArithmeticError, TypeError, AttributeError, RecursionError, struct.error)
 _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970: the year 5138
-SAID = "said"  # kind of the event that people were told something
+SAID = "said"  # kind of the event for a message to people
 
 
 def record(joints: int, hands: int, sensors: int, live: int, puppets: int = 1) -> np.dtype[np.void]:

@@ -156,7 +156,7 @@ def _put_aside(chosen: Path, choice: Choice, starts: int, say: Callable[[str], N
 
 
 def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Choice:
-    """Without pairs at the front that are gone with their disk: to try them would cost the audience time."""
+    """Drops leading pairs whose disk is missing, instead of timing out on each."""
     there = next((number for number, one in enumerate(choice.pairs) if one.is_there), len(choice.pairs) - 1)
     if there == 0:
         return choice

@@ -100,7 +100,7 @@ class HeadingDrift:
         self.take_neutral()
 
     def take_front(self, uncertainty: float = _AFTER_GAP) -> None:
-        """The heading was set, so exactly (degrees); what is known of the rate and of the habit stays."""
+        """The heading was set, so exactly (degrees); the estimates of the rate and of the habit stay."""
         self.corrected = self._drift = 0.0
         self._spread = [uncertainty**2, 0.0, 0.0, self._spread[3], 0.0, self._spread[5]]
         self._forget_window()

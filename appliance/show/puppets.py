@@ -118,7 +118,7 @@ class PuppetStart:
 
 
 def require_each_joint_once(hands: list[HandConfig]) -> list[HandConfig]:
-    """The hands of one puppet, none of whose joints is held twice by orientation or twice by position.
+    """The hands of one puppet; no joint is held twice by orientation or twice by position.
 
     Raises a refusal.
     """

@@ -20,7 +20,7 @@ CEILING = 0.9
 _RECOVERS_S = 0.5  # in which the limiter lets go
 _FOLLOWS_S = 0.03  # in which the bowing follows the dance
 # Strings that decay in three seconds grow and fall slowly. So their loudness follows the dance: up within
-# the first of these, down within the second, to the share that is still heard of a string at rest.
+# the first of these, down within the second, to the share at which a string at rest still sounds.
 _RISES_S, _FALLS_S, _RINGS = 0.015, 0.06, 0.12
 _DOWN, _UP = 0.6, 0.7  # height of the root on the floor, and up again; shares of the tallest so far
 

@@ -91,7 +91,7 @@ class Strings:
 
     @property
     def rings(self) -> bool:
-        """Whether anything is to be heard of them."""
+        """Whether they are audible."""
         return float(np.abs(self._state).max(initial=0.0)) > _SILENT
 
     def strike(self, strength: Samples) -> None:

@@ -201,7 +201,7 @@ class PairedStage:
     def follow(self, clock: TickClock, pulse: Callable[[float, float], None]) -> None:
         """One pass of a box that does not lead: run what has come; take over where it is time.
 
-        pulse: told of each tick that was run: now, and its cost in ms.
+        pulse: called after each tick with the time and the cost of the tick in ms.
         """
         self.pair.await_datagram(0.004 if self.pair.is_ready else 0.01)
         now = clock.now()

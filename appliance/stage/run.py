@@ -58,7 +58,7 @@ _FORGET_PHASE_S = 5.0  # a sensor silent for longer may return at any phase: it 
 class Stage:
     """A show ready to dance, all ports open. Raises StageError or ConfigError before anything dances.
 
-    rehearsal: what is noted of it is not for the venue's keeper, and goes with it.
+    rehearsal: journal and checkpoint go to a temporary folder that is deleted at the end.
     """
 
     def __init__(

@@ -38,7 +38,7 @@ _KEPT_DEGREES = 1.0  # a heading that was corrected by more is remembered
 
 
 class SensorFit:
-    """Joins what the sensors say with what the joints get; what is to be said leaves with `look`.
+    """Joins what the sensors say with what the joints get; messages leave with `look`.
 
     One neutral pose is taken by itself at each power-on, when the dancer stands still; after that only when
     asked for. A wearable that is back within a minute, or whose IMU restarted, keeps the pose: its heading is

@@ -174,7 +174,7 @@ class Watch:
         every.concern(rows.SOURCE_LATE.name, dict.fromkeys(late))
 
     def _changes(self, what: str, name: str, is_so: bool) -> bool:
-        """Whether this is to be said: it was not so at the last call and is now, or the reverse."""
+        """Whether this is news: it was not so at the last call and is now, or the reverse."""
         if is_so == ((what, name) in self._said):
             return False
         self._said ^= {(what, name)}

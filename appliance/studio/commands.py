@@ -128,7 +128,7 @@ def train(
     ] = False,
     puppet: Annotated[
         Path | None,
-        typer.Option(help="checkpoint.pt of the dancer in whose latents an improviser (moves) goes on."),
+        typer.Option(help="checkpoint.pt of the dancer that encodes for an improviser (moves)."),
     ] = None,
     start: Annotated[
         Path | None,

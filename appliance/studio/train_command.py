@@ -28,7 +28,7 @@ from appliance.studio.evaluation.masked import draw_masked
 from appliance.studio.export.improviser_network import export_improviser
 from appliance.studio.export.motion_network import FILES, export_motion
 from appliance.studio.export.release import Request, release
-from appliance.studio.going_on import open_start, require_same_joints, settings_of
+from appliance.studio.going_on import doubt, open_start, require_same_joints, settings_of, takes_known_to
 from appliance.studio.improviser import own_output
 from appliance.studio.improviser.improviser_training import ImproviserTraining
 from appliance.studio.improviser.learning import AnyTraining, train_until_done, training_for
@@ -62,14 +62,18 @@ def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
     console = Console(stderr=True, quiet=not processes.leads)
     checkpoint = options.out / "checkpoint.pt"
     settings, source, state = _settings_and_source(options, checkpoint)
-    start = None if options.start is None else open_start(options.start)
-    if start is not None:
+    start = known = None
+    if options.start is not None:
+        start, known = open_start(options.start), takes_known_to(options.start)
         settings = settings_of(start, settings, options)
+        source = source.for_network(known or ())
     if processes.leads:
         require_room(options.out)
     dataset = source.load(reading_progress(console))
     for line in findings(dataset):
         console.print(f"- {line}", highlight=False)
+    if options.start is not None and (doubtful := doubt(options.start, known, dataset)):
+        console.print(doubtful, highlight=False, soft_wrap=True)
     if processes.leads and any(take.errors for take in dataset.takes):
         draw_masked(options.out / MASKED_PICTURE, dataset.takes)
     training: Training | AnyTraining
@@ -81,7 +85,7 @@ def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
         training = Training(dataset, settings, device, processes, begin)
     else:
         training = training_for(settings, dataset, _puppet(options, state), device, processes)
-    training.origin |= source.learned_by(dataset).as_state()
+    training.origin |= source.learned_by(dataset, known or ()).as_state()
     begun_with = (
         options.start.resolve().name if options.start else (state or {}).get("origin", {}).get("from")
     )
@@ -243,7 +247,7 @@ def _require_as_begun(options: TrainOptions, settings: AnySettings, source: Sour
 
 
 def _puppet(options: TrainOptions, state: dict[str, Any] | None) -> Path | None:
-    """The dancer in whose latents our improviser goes on: given, or remembered by its checkpoint."""
+    """The dancer that encodes for our improviser: given, or remembered by its checkpoint."""
     remembered = None if state is None else state["origin"].get("puppet")
     return options.puppet or (None if remembered is None else Path(remembered))
 

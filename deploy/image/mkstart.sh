@@ -22,7 +22,7 @@ start=$work/start
 mkdir -p "$start"/{dev,proc,sys,run,root,usr/bin,scripts}
 cp "$root/usr/bin/busybox" "$start/usr/bin/"
 install -m 755 "$here/pi/init" "$start/init"
-install -m 644 "$here/tree/etc/initramfs-tools/scripts/init-bottom/bunraku-overlay" "$start/over-the-root" # busybox would take a file `overlay` for what is to be mounted
+install -m 644 "$here/tree/etc/initramfs-tools/scripts/init-bottom/bunraku-overlay" "$start/over-the-root" # busybox would take a file `overlay` for the thing to mount
 : >"$start/scripts/functions" # the overlay's script reads it; its panic() is in init
 
 depmod -b "$root" "$version"

@@ -16,7 +16,7 @@ folder = Path(__file__).parent
 
 class Played(NamedTuple):
     """Output of a card: the samples (N,) of all loudspeakers added, each with the monotonic second at which
-    the card's clock plays it (N,). late: blocks that came too late, in whose place there is silence."""
+    the card's clock plays it (N,). late: blocks that came too late and were replaced by silence."""
 
     at: NDArray[np.float64]
     samples: NDArray[np.float64]

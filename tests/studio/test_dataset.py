@@ -215,7 +215,7 @@ def test_keep_on_the_command_line_is_remembered(tmp_path: Path) -> None:
     again = remembered({"origin": source.as_state()}, None, tmp_path / "checkpoint.pt")
     assert again.catalogue == source.catalogue
     for asked in ({"keep": ["solo_*"]}, {"held_out": ["solo_*"]}):
-        with pytest.raises(StudioError, match=r"'solo_\*' is to be kept, masked or held out, but no"):
+        with pytest.raises(StudioError, match=r"'solo_\*' has to be kept, masked or held out, but no"):
             given(folder, **asked)
 
 

@@ -1,4 +1,4 @@
-"""Improviser network: an improviser and the autoencoder in whose latents it goes on, by onnxruntime."""
+"""Improviser network: an improviser and the autoencoder that encodes for it, by onnxruntime."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def matrix_of_products() -> Tensor:
 
 
 class MeanLatent(nn.Module):
-    """Three layers, the middle one residual: the mean latent (B, Z) for what is known of a window (B, S)."""
+    """Three layers, the middle one residual: the mean latent (B, Z) for the known part of a window (B, S)."""
 
     def __init__(self, seen: int, width: int, latent: int) -> None:
         super().__init__()

@@ -1,1 +1,1 @@
-"""Recordings as training data: what is known of them, what is masked, what is held out."""
+"""Recordings as training data: facts about them, masks, and held-out takes."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Callable, Sequence
+import glob
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,9 +26,23 @@ class Sources:
         """Plain values for a checkpoint."""
         return {"recordings": str(self.recordings.resolve()), "catalogue": asdict(self.catalogue)}
 
-    def learned_by(self, dataset: Dataset) -> Sources:
-        """The same, and which takes a network learns from: they are not held out later."""
-        known = {*self.catalogue.learned, *(take.take for take in dataset.training)}
+    def for_network(self, learned: Collection[str]) -> Sources:
+        """For a network that learned from these takes before: another one is held out, if there is one."""
+        files = recordings_in(self.recordings)
+        takes = {file.stem: self.catalogue.take_of(file.stem) for file in files}
+        names = sorted(set(takes.values()))
+        if self.catalogue.held_out or len(names) == 1 or names[-1] not in learned:
+            return self
+        held = ([name for name in names if name not in learned] or names)[-1]
+        apart = tuple(glob.escape(file) for file, take in takes.items() if take == held)
+        return replace(self, catalogue=replace(self.catalogue, held_out=apart))
+
+    def learned_by(self, dataset: Dataset, before: Collection[str] = ()) -> Sources:
+        """The same, and which takes a network learns from: they are not held out later.
+
+        before: those that it learned from elsewhere.
+        """
+        known = {*before, *self.catalogue.learned, *(take.take for take in dataset.training)}
         return replace(self, catalogue=replace(self.catalogue, learned=tuple(sorted(known))))
 
     def load(self, progress: Callable[[Sequence[Path]], Sequence[Path]]) -> Dataset:
@@ -51,7 +66,7 @@ def given(
     for pattern in (*known.keep, *known.mask, *held_out):
         if not any(fnmatch.fnmatch(file.stem, pattern) for file in files):
             raise StudioError(
-                f"'{pattern}' is to be kept, masked or held out, but no recording in {recordings} has that "
+                f"'{pattern}' has to be kept, masked or held out, but no recording in {recordings} has that "
                 "name. Give the name of a file without .bvh, or a pattern such as 'solo_*'."
             )
     known = known.with_options(reading)

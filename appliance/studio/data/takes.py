@@ -37,7 +37,7 @@ class DatasetError(ValueError):
 
 @dataclass(frozen=True)
 class Take:
-    """One recording at 50 Hz with what is known of it."""
+    """One recording at 50 Hz with the facts about it."""
 
     name: str
     take: str

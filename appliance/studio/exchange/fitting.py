@@ -166,8 +166,8 @@ def pose_frames(
     in straight lines: there joints turn evenly from the pose before to the pose after.
 
     Each bone is aimed from where the figure's joint is to where the point was seen, so that differences in
-    length do not add up along a limb. One bone at a joint leaves its twist open: it keeps the
-    parent's, smoothly. Several bones say it.
+    length do not add up along a limb. With one child bone the twist is
+    open, and follows the parent's smoothly; with two or more it is determined.
     """
     too_long = [gap for gap in gaps_of(points) if gap.last - gap.first + 1 > longest_gap_s * fps]
     unseen: NDArray[np.bool_] = np.zeros(points.shape[:2], dtype=bool)

@@ -121,7 +121,7 @@ def _improviser_state(model: Path) -> dict[str, Any]:
 def _puppet(
     options: ImproviseOptions, state: dict[str, Any] | None
 ) -> tuple[TorchCoder, dict[str, Any], Path]:
-    """The dancer in whose latents ours goes on: as given, or as the improviser's checkpoint remembers."""
+    """The dancer that encodes for our improviser: as given, or as the improviser's checkpoint remembers."""
     remembered = None if state is None else state["origin"].get("puppet")
     puppet = options.checkpoint or (None if remembered is None else Path(remembered))
     if puppet is None:

@@ -80,7 +80,7 @@ class Figures:
 
 @dataclass(frozen=True)
 class _Danced:
-    """poses (T, M, 4) of the moving joints, and the recording on whose path and floor they stand."""
+    """poses (T, M, 4) of the moving joints; path: the recording that gives the path and the floor."""
 
     poses: Poses
     path: Recording | None
