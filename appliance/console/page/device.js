@@ -4,7 +4,9 @@ import { byId } from "./elements.js";
 import { twice } from "./hold.js";
 import { date, language, translated } from "./words.js";
 
-let known = false, waiting = null, words = (key) => key, silence = 0;
+let known = false, waiting = null, silence = 0;
+/** @type {(key: string, values?: object) => string} */
+let words = (key) => key;
 
 export function initDevice(me, table) {
   words = table;
@@ -32,23 +34,30 @@ export function initDevice(me, table) {
 
 // Ask the box for something; a device that it does not know gives the PIN first, and then it is done at once. Where the
 // PIN is not given, the answer is that it is needed.
-export async function ask(path, said, patience) {
+// why: what the question says of it.
+export async function ask(path, said, patience = undefined, why = "") {
   const answer = await request(path, said, patience);
   if (answer.status !== 401) return answer;
   render(false);
-  return new Promise((answered) => askPin(() => answered(ask(path, said, patience)), "", () => answered(answer)));
+  return new Promise((answered) => askPin(() => answered(ask(path, said, patience)), why, () => answered(answer)));
 }
 
-export async function command(address, ...given) {
-  const answer = await ask("/api/command", { address, arguments: given });
+export const command = (address, ...given) => sent(address, given);
+
+async function sent(address, given, why = "") {
+  const answer = await ask("/api/command", { address, arguments: given }, undefined, why);
   const done = answer.status === 200 && answer.value.done;
   say(translated(answer.status === 200 ? answer.value.message : answer.message) || words("no_page"), !done);
   return done;
 }
 
-// Never behind a question: while the PIN is asked for something else, PANIC takes its place.
-export function panic() {
-  return byId("pin").open ? askPin(() => command("/panic"), "pin_panic") : command("/panic");
+// Never behind a question: while the PIN is asked for something else, these two take its place.
+export const panic = () => urgent("/panic", [], "panic");
+export const blackout = (wanted) => urgent("/blackout", [wanted], "blackout");
+
+function urgent(address, given, name) {
+  const why = words("pin_follows", { what: words(name) });
+  return byId("pin").open ? askPin(() => command(address, ...given), why) : sent(address, given, why);
 }
 
 // Do something that needs the PIN, which a device that is not known gives first.
@@ -72,12 +81,17 @@ function askPin(then, why = "", instead = () => {}) {
   const before = waiting;
   waiting = { then, instead };
   before?.instead();
-  byId("pin-said").textContent = why && words(why);
+  sayOfPin(why, true);
   if (!byId("pin").open) {
     byId("pin-input").value = "";
     byId("pin").show(); // not modal: PANIC stays in reach
   }
   byId("pin-input").focus();
+}
+
+function sayOfPin(sentence, isWhy = false) {
+  byId("pin-said").textContent = sentence;
+  byId("pin-said").classList.toggle("why", isWhy);
 }
 
 function closePin() {
@@ -93,7 +107,7 @@ async function givePin() {
   byId("pin-send").disabled = false;
   if (answer.status !== 200) {
     const keys = { 403: "pin_wrong", 429: "pin_wait", 0: "no_page" };
-    byId("pin-said").textContent = words(keys[answer.status] ?? "pin_wrong");
+    sayOfPin(words(keys[answer.status] ?? "pin_wrong"));
     byId("pin-input").select();
     return;
   }
@@ -117,26 +131,40 @@ async function render(isKnown) {
   known = isKnown;
   document.body.dataset.known = known ? "yes" : "no";
   byId("known").textContent = words(known ? "known" : "unknown");
+  byId("own-name").textContent = deviceName();
+  byId("own-since").textContent = "";
   byId("give-pin").hidden = known;
-  byId("devices-part").hidden = !known;
+  byId("devices-part").hidden = byId("own-part").hidden = true;
   if (!known) return;
   const answer = await request("/api/devices");
-  if (answer.status === 200) byId("devices").replaceChildren(...answer.value.map(listed));
+  if (answer.status !== 200) return;
+  const own = answer.value.find((one) => one.own), others = answer.value.filter((one) => !one.own);
+  byId("devices-part").hidden = others.length === 0;
+  byId("devices").replaceChildren(...others.map(listed));
+  byId("own-part").hidden = !own;
+  if (!own) return;
+  byId("own-name").textContent = own.name;
+  byId("own-since").textContent = words("pin_given", { time: date(own.since) });
+  byId("own-part").replaceChildren(revoking(own, "revoke_own"));
 }
 
 function listed(device) {
-  const item = document.createElement("li"), since = document.createElement("small"), row = document.createElement("div");
-  item.textContent = device.own ? `${device.name} (${words("this_device")})` : device.name;
-  since.textContent = date(device.since);
+  const item = document.createElement("li"), name = document.createElement("b"), since = document.createElement("small");
+  name.textContent = device.name;
+  since.textContent = words("pin_given", { time: date(device.since) });
+  item.append(name, since, revoking(device, "revoke"));
+  return item;
+}
+
+function revoking(device, key) {
   const button = document.createElement("button");
   button.type = "button";
-  button.textContent = words("revoke");
+  button.className = "danger";
+  button.textContent = words(key);
+  button.setAttribute("aria-label", `${words(key)}: ${device.name}`);
   twice(button, async () => {
     await request("/api/revoke", { id: device.id });
     render(!device.own);
   }, "sure_revoke");
-  row.className = "row";
-  row.append(button);
-  item.append(since, row);
-  return item;
+  return button;
 }
