@@ -15,6 +15,7 @@ from hw_sim.bundled_shows import show_folder
 from hw_sim.peers import ProbeError
 from hw_sim.soak.figures import figures_of, limits_of, table
 from hw_sim.soak.run import Soak, soak
+from hw_sim.soak.vitals import Vitals
 
 REFUSED, FAILED = 2, 1
 WRITE_EACH_S = 60.0
@@ -68,7 +69,7 @@ def write(out: Path, seen: Soak, is_over: bool) -> None:
     figures: dict[str, Any] = {"is_over": is_over, **figures_of(seen), "limits": limits}
     (out / "soak.json").write_text(json.dumps(figures, indent=2) + "\n")
     names = [unit.name for unit in seen.box.units]
-    held = [f"{name}_{what}" for name in names for what in ("rss_mb", "handles", "threads")]
+    held = [f"{name}_{what}" for name in names for what in ("rss_mb", "own_mb", "handles", "threads")]
     with (out / "soak.csv").open("w") as file:
         file.write(
             ",".join(["second", "load", "frame_ms", "cyclictest_ms", "spoilt", "celsius", *held]) + "\n"
@@ -82,8 +83,12 @@ def write(out: Path, seen: Soak, is_over: bool) -> None:
             ]
             for name in names:
                 one = look.held.get(name)
-                cells += ["", "", ""] if one is None else [f"{one.rss_mb:.2f}", one.handles, one.threads]
+                cells += [""] * 4 if one is None else _cells(one)
             file.write(",".join(map(str, cells)) + "\n")
+
+
+def _cells(one: Vitals) -> list[object]:
+    return [f"{one.rss_mb:.2f}", f"{one.anonymous_mb:.2f}", one.handles, one.threads]
 
 
 class _Progress:

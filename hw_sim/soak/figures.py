@@ -112,13 +112,15 @@ def limits_of(soak: Soak) -> list[Limit]:
     ]
     grown = [one for unit in soak.box.units if (one := growth(unit, soak.seconds)) is not None]
     for one in grown:
-        message = f"{one.first.rss_mb:.1f} -> {one.last.rss_mb:.1f} MB, {one.last.handles} handles"
+        message = (
+            f"{one.first.anonymous_mb:.1f} -> {one.last.anonymous_mb:.1f} MB, {one.last.handles} handles"
+        )
         found.append(
             Limit(
-                f"memory and handles of {one.name}",
+                f"own memory and handles of {one.name}",
                 f"{message} in {_time(one.lived_s)}",
                 f"at most {MOST_GROWTH_MB:g} MB more after the first minute, no more handles or threads",
-                one.rss_mb <= MOST_GROWTH_MB and one.handles <= 0 and one.threads <= 0,
+                one.own_mb <= MOST_GROWTH_MB and one.handles <= 0 and one.threads <= 0,
             )
         )
     untold = [u.name for u in soak.box.units if not u.is_away and u.name not in [one.name for one in grown]]

@@ -29,8 +29,9 @@ class Growth:
     threads: int
 
     @property
-    def rss_mb(self) -> float:
-        return self.last.rss_mb - self.first.rss_mb
+    def own_mb(self) -> float:
+        """Memory that no file backs. The stage maps motions that come and go; one it keeps is a handle more."""
+        return self.last.anonymous_mb - self.first.anonymous_mb
 
 
 def growth(unit: Unit, run_s: float) -> Growth | None:

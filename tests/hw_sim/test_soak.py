@@ -215,7 +215,7 @@ def test_a_short_soak_has_the_same_acts_sooner() -> None:
 def lived(tmp_path: Path, megabytes: list[float], handles: list[int]) -> Unit:
     unit = Unit("one", ("true",), tmp_path / "output")
     unit.history = [
-        (float(second), Vitals(mb, mb / 2, count, 3))
+        (float(second), Vitals(2 * mb, mb, count, 3))
         for second, (mb, count) in enumerate(zip(megabytes, handles, strict=True))
     ]
     return unit
@@ -226,7 +226,7 @@ def test_growth_counts_from_the_first_minute_on(tmp_path: Path) -> None:
     unit = lived(tmp_path, [*start, *[110.0] * 240, *[110.7] * 20], [9] * 320)
     grown = growth(unit, 320.0)
     assert grown is not None
-    assert grown.rss_mb == pytest.approx(0.7)
+    assert grown.own_mb == pytest.approx(0.7)
     assert grown.handles == 0
 
 
@@ -245,7 +245,7 @@ def test_the_longest_life_is_judged(tmp_path: Path) -> None:
     unit.longest, unit.history = unit.history, unit.history[:5]
     grown = growth(unit, 400.0)
     assert grown is not None
-    assert grown.rss_mb == pytest.approx(3.0)
+    assert grown.own_mb == pytest.approx(3.0)
 
 
 def test_a_life_that_was_too_short_is_not_judged(tmp_path: Path) -> None:
