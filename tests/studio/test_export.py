@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +22,12 @@ from appliance.studio.autoencoder.coupled import Coupled
 from appliance.studio.autoencoder.held_joints import HeldJoints, HeldPlaces
 from appliance.studio.autoencoder.models import PUPPETS
 from appliance.studio.data.dataset import load_dataset
+from appliance.studio.data.sources import given
 from appliance.studio.evaluation.coders import OnnxCoder, load_checkpoint
 from appliance.studio.export import gate
 from appliance.studio.export.export import export
 from appliance.studio.export.exported import read_exported
+from appliance.studio.going_on import doubt, takes_known_to
 from appliance.studio.model_uses import REMOVED
 from appliance.studio.studio_error import StudioError
 from tests.studio.conftest import Said, bunraku
@@ -262,9 +265,11 @@ def test_a_training_goes_on_from_a_show(
         train_command, "release", lambda *_: {"puppetry": {}}
     )  # as after any training, and slow
     show, _ = trained
-    train = ("train", "--recordings", recordings, "--from", show / "puppet.onnx", "--threads", 1)
+    network = shutil.copy(show / "puppet.onnx", tmp_path)
+    train = ("train", "--recordings", recordings, "--from", network, "--threads", 1)
     result = bunraku(*train, "--out", tmp_path / "next", "--steps", 2)
     assert result.exit_code == 0, result.output
+    assert "It is not known which takes puppet.onnx learned from" in result.stderr
     before, after = (json.loads((each / "training.json").read_text()) for each in (show, tmp_path / "next"))
     assert after["settings"]["width"] == 48 and after["settings"]["learning_rate"] == 2e-4
     assert after["settings"]["alive_from"] == 0 < before["settings"]["alive_from"]
@@ -277,6 +282,29 @@ def test_a_training_goes_on_from_a_show(
     ):
         refused = bunraku(*train, "--out", tmp_path / options[0], *options[1:])
         assert refused.exit_code == 2 and message in refused.stderr
+
+
+def test_a_network_that_goes_on_is_not_measured_on_what_it_knows(
+    trained: tuple[Path, Said], recordings: Path, tmp_path: Path
+) -> None:
+    show, known = trained[0], frozenset({"sway_0", "sway_1"})
+    assert takes_known_to(show / "checkpoint.pt") == takes_known_to(show / "puppet.onnx") == known
+    shutil.copy(show / "report.json", tmp_path)
+    assert takes_known_to(tmp_path) == known
+    assert takes_known_to(tmp_path / "elsewhere" / "puppet.onnx") is None
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    for name in ("sway_0", "sway_1"):
+        shutil.copy(recordings / f"{name}.bvh", folder)
+    dataset = given(folder).for_network(known).load(lambda files: files)
+    assert "show learned from sway_1: the figures flatter" in doubt(tmp_path / "show", known, dataset)
+    shutil.copy(recordings / "sway_2.bvh", folder / "a_new_one.bvh")
+    source = given(folder).for_network(known)
+    dataset = source.load(lambda files: files)
+    assert [take.name for take in dataset.held_out] == ["a_new_one"] and doubt(show, known, dataset) == ""
+    chained = source.learned_by(dataset, {"before"}).catalogue
+    assert set(chained.learned) == {"before", *known} and chained.held_out == ("a_new_one",)
+    assert given(folder, held_out=["sway_0"]).for_network(known).catalogue.held_out == ("sway_0",)
 
 
 def judged(autoencoder: Autoencoder, folder: Path) -> gate.Verdict:

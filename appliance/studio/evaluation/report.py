@@ -47,6 +47,7 @@ def write_up(
             "steps": state["step"],
             **{name: state["origin"][name] for name in ("from",) if name in state.get("origin", {})},
             **{name: state["settings"][name] for name in LISTED},
+            "learned": list(state.get("origin", {}).get("catalogue", {}).get("learned", ())),
             "takes": sorted(take.name for take in dataset.training),
             "held_out": sorted(take.name for take in dataset.held_out),
         },
