@@ -95,13 +95,14 @@ def main(given: Sequence[str]) -> int:
     path, config = found
     learning = Learning(devices_file_made(config).parent / FOLDER)
     if learning.wanted() is None:
+        learning.end()  # a request that cannot be read: else systemd would begin it again and again
         return 0
     try:
         return Learner(learning, Proving(runtime_folder(config)).show_goes, path).run()
     except Exception as error:
         from appliance.cli.app import refuse
 
-        learning.end()  # else systemd would begin it again and again
+        learning.end()  # as above
         learning.report(state="failed", message=str(error))
         refuse(error)
 

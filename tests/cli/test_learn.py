@@ -271,8 +271,12 @@ def test_a_broken_box_file_is_said_once_and_learning_goes_on_when_it_is_mended(t
     assert "Unknown key 'colour'" in learner.stdout.readline()
     with pytest.raises(subprocess.TimeoutExpired):
         learner.wait(2.0)
+    request = tmp_path / "state" / "learning" / "wanted.json"
+    request.parent.mkdir(parents=True)
+    request.write_text('{"recordings": ')
     box_file.write_text(whole)
-    assert learner.wait(30.0) == 0, "nothing is wanted here"
+    assert learner.wait() == 0, "nothing that can be read is wanted here"
+    assert not request.exists()
     assert "the box file cannot be read" not in learner.stdout.read()
 
 
@@ -306,6 +310,26 @@ def test_a_power_cut_as_learning_begins_loses_no_show(
     train, _ = box.begun()
     assert train[train.index("--from") + 1] == str(box.learning.before) and "--resume" not in train
     assert (box.learning.before / "checkpoint.pt").exists()
+
+
+def test_a_power_cut_before_learning_begins_leaves_the_last_show_offered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learning = Learning(tmp_path)
+    learning.report(state="learned")
+    learning.show.mkdir()
+
+    def cut(path: Path, content: bytes) -> None:
+        if path.name == "wanted.json":
+            raise KeyboardInterrupt
+        write_whole(path, content)
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr("appliance.console.learning.write_whole", cut)
+        learning.begin(Wanted("takes", 60.0, str(learning.show)))
+    assert learning.wanted() is None and learning.playable() == learning.show
+    learning.want(Wanted("takes", 60.0, str(learning.show)))
+    assert learning.reported() == {"state": "waits"} and learning.playable() is None
 
 
 def test_a_power_cut_while_the_last_show_is_deleted_offers_no_half_of_it(
