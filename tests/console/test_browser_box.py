@@ -84,7 +84,7 @@ def test_a_venue_changes_its_ports_and_a_mistake_has_its_line(tab: Tab, venue: t
     expect(tab.locator("#file-said")).to_contain_text("counts from the next start")
     assert load_box(path).sensors.udp == UdpConfig(host="127.0.0.1", port=int(wanted))
     assert path.with_name("box.yaml.before").read_text() == before
-    tab.locator("#file-part summary").focus()
+    tab.locator("#file-whole summary").focus()
     tab.keyboard.press("Enter")
     tab.fill("#file-text", "contrl: {port: 9002}\n" + before)
     press(tab, "#file-check")
@@ -101,6 +101,42 @@ def test_a_venue_changes_its_ports_and_a_mistake_has_its_line(tab: Tab, venue: t
     expect(tab.locator("#file-problems")).to_contain_text("Another device has changed the box file")
     assert path.read_text() == others
     path.write_text(before)
+
+
+def test_what_differs_from_the_file_is_marked_and_a_mistake_in_a_folded_part_is_shown(
+    tab: Tab, venue: tuple[Box, Page]
+) -> None:
+    unlock(tab, venue[1])
+    press(tab, '[data-page="box"]')
+    press(tab, "#file-read")
+    port, group = tab.locator('[name="console.port"]'), tab.locator('details:has([name="console.port"])')
+    expect(port).to_be_hidden()
+    group.locator("summary").tap()
+    before = port.input_value()
+    help_of_it = tab.locator('.venue-field:has([name="console.port"]) .help')
+    help_of_it.tap()
+    expect(tab.locator('.venue-field:has([name="console.port"]) > small')).to_contain_text("console.port")
+    port.fill("70000")
+    expect(tab.locator("label:has([name='console.port'])")).to_contain_text(f"was {before}")
+    expect(group.locator("summary")).to_have_text("This page Changed: 1")
+    group.locator("summary").tap()
+    tab.evaluate("scrollTo(0, document.querySelector('#file-part').offsetTop)")
+    assert tab.evaluate(IN_REACH, "#file-check"), (
+        "the button that saves is in reach from anywhere in the form"
+    )
+    press(tab, "#file-check")
+    expect(port).to_be_visible()
+    expect(port).to_have_attribute("aria-invalid", "true")
+    expect(tab.locator("label:has([aria-invalid])")).to_contain_text("out of range")
+    port.fill(before)
+    expect(tab.locator("#file-changes")).to_be_hidden()
+
+
+# Whether a tap on the middle of an element meets it.
+IN_REACH = """(selector) => {
+  const one = document.querySelector(selector), at = one.getBoundingClientRect();
+  return document.elementFromPoint(at.x + at.width / 2, at.y + at.height / 2) === one;
+}"""
 
 
 @ON_BOTH

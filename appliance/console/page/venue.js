@@ -13,6 +13,7 @@ export function initVenue() {
   byId("file-read").addEventListener("click", readFile);
   byId("file-check").addEventListener("click", () => save(false));
   byId("file-add").addEventListener("click", addReceiver);
+  byId("file-part").addEventListener("input", showChanges);
   twice(byId("file-now"), () => save(true), "sure_now");
 }
 
@@ -34,12 +35,12 @@ async function readFile() {
   byId("file-now").hidden = !file.at_once;
   byId("file-check").textContent = words(file.at_once ? "file_later" : "file_write");
   const isReceiver = ({ location }) => location[0] === RECEIVERS[0] && location[1] === RECEIVERS[1];
-  byId("file-keys").replaceChildren(...file.keys.filter((key) => !isReceiver(key)).map(field));
+  byId("file-keys").replaceChildren(...groupsOf(file.keys.filter((key) => !isReceiver(key))));
   showReceivers();
   return showSentence("", []);
 }
 
-// A label in the reader's language; below it the key, for those who edit the file.
+// In the reader's language.
 function labelOf(location) {
   const [group, list, place, key] = location;
   if (group === "outputs") return `${words(`list_${list}`, { n: place + 1 })}: ${words(`key_${key}`)}`;
@@ -48,21 +49,83 @@ function labelOf(location) {
 
 const dotted = (location) => location.reduce((said, step) => typeof step === "number" ? `${said}[${step}]` : said ? `${said}.${step}` : step, "");
 
+// Keys of one part of the box fold together; the part is what their labels have before the colon.
+function groupsOf(keys) {
+  const groups = new Map();
+  for (const key of keys) {
+    const name = key.location.slice(0, key.location[0] === "outputs" ? 3 : 1).join(".");
+    groups.set(name, [...groups.get(name) ?? [], key]);
+  }
+  return [...groups.values()].map((members, place) => {
+    const group = document.createElement("details"), head = document.createElement("summary"), count = document.createElement("small");
+    const [, title] = /^(.+?)\s?: /.exec(labelOf(members[0].location)) ?? [];
+    group.open = place === 0 || matchMedia("(min-width: 900px)").matches;
+    head.append(title ?? members[0].location[0], " ", count);
+    group.append(head, ...members.map(field));
+    return group;
+  });
+}
+
+// Label, value, its bounds; what it is for opens on a tap, with the key for those who edit the file.
 function field(key) {
-  const label = document.createElement("label"), name = document.createElement("span"), small = document.createElement("small");
-  const input = document.createElement("input");
-  name.textContent = labelOf(key.location);
+  const whole = document.createElement("div"), label = document.createElement("label"), name = document.createElement("span");
+  const input = document.createElement("input"), bounds = document.createElement("span"), was = document.createElement("small");
+  const why = document.createElement("small"), help = document.createElement("button");
+  const said = labelOf(key.location).replace(/^.+?\s?: /, "");
+  name.textContent = said.charAt(0).toUpperCase() + said.slice(1);
   input.type = key.kind === "switch" ? "checkbox" : "text";
   if (key.kind === "number") input.inputMode = "numeric";
   if (key.kind === "switch") input.checked = key.value;
   else input.value = key.kind === "list" ? key.value.join(", ") : key.value ?? "";
   plain(input, key.location);
-  const within = key.within ? ` (${translated(key.within)})` : "";
-  small.textContent = `${translated(key.purpose)}${within} · ${dotted(key.location)}`;
+  bounds.className = "bounds";
+  bounds.textContent = key.kind === "number" ? translated(key.within) : "";
+  was.className = "was";
+  const within = key.within && key.kind !== "number" ? ` (${translated(key.within)})` : "";
+  why.textContent = `${translated(key.purpose)}${within} · ${dotted(key.location)}`;
+  why.hidden = true;
+  help.type = "button";
+  help.className = "help";
+  help.textContent = "?";
+  help.setAttribute("aria-label", `${words("file_help")}: ${labelOf(key.location)}`);
+  help.setAttribute("aria-expanded", "false");
+  help.addEventListener("click", () => {
+    why.hidden = !why.hidden;
+    help.setAttribute("aria-expanded", String(!why.hidden));
+  });
+  label.append(name, input, bounds, was);
+  whole.className = "venue-field";
   label.className = "venue-key";
-  label.append(name, input, small);
-  return label;
+  label.dataset.kind = key.kind;
+  whole.append(label, help, why);
+  return whole;
 }
+
+// What differs from the file: at the field, in the head of its group, and beside the buttons.
+function showChanges() {
+  for (const input of keyInputs()) {
+    const key = keyOf(input), differs = JSON.stringify(typed(key, input)) !== JSON.stringify(key.value);
+    const label = input.closest("label"), before = Array.isArray(key.value) ? key.value.join(", ") : key.value;
+    label.classList.toggle("changed", differs);
+    label.querySelector(".was").textContent = !differs ? "" : key.kind === "switch" || before === "" || before === null
+      ? words("file_changed") : words("file_was", { value: before });
+  }
+  const rows = [...byId("file-receivers").children];
+  receivers.forEach((one, place) => {
+    const differs = one.added || one.removed || Object.entries(one.typed ?? {}).some(([key, value]) => plainNumber(value) !== one.written[key]);
+    rows[place].classList.toggle("changed", differs);
+  });
+  for (const group of byId("file-keys").children) {
+    const count = group.querySelectorAll(".changed").length;
+    group.querySelector("summary small").textContent = count ? words("file_changes", { count }) : "";
+  }
+  const all = document.querySelectorAll("#file-part .changed").length + Number(byId("file-text").value !== file.text);
+  byId("file-bar").dataset.changes = all;
+  byId("file-changes").textContent = all ? words("file_changes", { count: all }) : "";
+}
+
+const keyInputs = () => /** @type {HTMLInputElement[]} */ ([...byId("file-keys").querySelectorAll("input")]);
+const keyOf = (input) => file.keys.find((key) => key.location.join(".") === input.name);
 
 function plain(input, location) {
   input.autocomplete = "off";
@@ -100,6 +163,7 @@ function showReceivers() {
     row.append(legend, ...inputs, button, small);
     return row;
   }));
+  showChanges();
 }
 
 function addReceiver() {
@@ -111,10 +175,8 @@ function addReceiver() {
 // Only what was changed: what the file leaves out stays out. A list of receivers is written as a whole where one was
 // added or removed; comments inside of it go then.
 function changed() {
-  const inputs = [...byId("file-keys").querySelectorAll("input")];
-  const keys = inputs.map((input) => file.keys.find((key) => key.location.join(".") === input.name));
-  const found = keys.flatMap((key, place) => {
-    const value = typed(key, inputs[place]);
+  const found = keyInputs().flatMap((input) => {
+    const key = keyOf(input), value = typed(key, input);
     return JSON.stringify(value) === JSON.stringify(key.value) ? [] : [[key.location, value]];
   });
   const entry = ({ written, typed: said = {} }) => ({ ...written, ...Object.fromEntries(Object.entries(said).map(([key, value]) => [key, plainNumber(value)])) });
@@ -187,5 +249,7 @@ function mark(input, said) {
   note.className = "wrong";
   note.textContent = said;
   input.setAttribute("aria-invalid", "true");
-  input.after(note);
+  input.closest("label").append(note);
+  const group = input.closest("details");
+  if (group) group.open = true;
 }
