@@ -30,6 +30,7 @@ FREE_SETTLING_S = 1.0
 LATE = 1  # flag of the journal
 POWER_ON_S, POWER_ON_AND_JOIN_S = 1.0, 5.0  # until a reading is used: network up; Wi-Fi joined first
 RESTART_S = 1.5
+TRANSPORT_MS = {"transport, median": ("p50", 3.0), "transport, p99": ("p99", 12.0)}
 RESPONSE_MS = 45.0  # from a step of the sensor to half of it in the output joint
 DANCE_TO_LIGHT_MS = 60.0  # how late the wall follows a hand that dances
 SOUND_MS = 15.0  # from a step of the hand to the first audible change that the card's clock plays
@@ -172,8 +173,10 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
     late_share = 100.0 * figures["late_ticks"] / max(1, figures["ticks"])
     light, sound = figures.get("hand_to_light_ms"), figures.get("hand_to_sound_ms")
     return [
-        Limit("transport, median", figures["transport_ms"]["p50"], 3.0, "ms"),
-        Limit("transport, p99", figures["transport_ms"]["p99"], 12.0, "ms"),
+        *(
+            Limit(label, figures["transport_ms"][name], most, "ms")
+            for label, (name, most) in TRANSPORT_MS.items()
+        ),
         Limit(
             "transport, median, against free running / 4",
             figures["transport_ms"]["p50"],

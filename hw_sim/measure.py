@@ -17,7 +17,7 @@ from appliance.pose.foreign_file import content
 from appliance.sensor.keys import create_keys
 from hw_sim.bundled_shows import show_folder
 from hw_sim.emulated_sensor import REBOOT_S
-from hw_sim.figures import FREE_SETTLING_S, SETTLING_S, Evidence, figures_of, table, verdict
+from hw_sim.figures import FREE_SETTLING_S, SETTLING_S, TRANSPORT_MS, Evidence, figures_of, table, verdict
 from hw_sim.peers import ProbeError, Setting, scratch_folder
 from hw_sim.probe import Course, Run, run, run_restarts
 from hw_sim.progress import Progress
@@ -85,7 +85,11 @@ def measure(
             parts = 5 if setting.sounds else 4
             print(f"Measuring {seconds:g} s in phase with the sensor ...", flush=True)
             page.report(
-                phase="locked", parts=parts, seconds=seconds, settling_s=min(SETTLING_S, seconds / 2.0)
+                phase="locked",
+                parts=parts,
+                seconds=seconds,
+                settling_s=min(SETTLING_S, seconds / 2.0),
+                limits=[{"label": label, "most": most} for label, (_, most) in TRANSPORT_MS.items()],
             )
             locked = run(setting, locked_course(seconds), page)
             free_s = max(6.0, seconds / 3.0)

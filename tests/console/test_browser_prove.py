@@ -13,6 +13,7 @@ from playwright.sync_api import Page as Tab
 
 from tests.console.browser import (
     ON_A_LAPTOP,
+    ON_BOTH,
     PATIENCE_MS,
     PHONE,
     await_box,
@@ -75,6 +76,38 @@ def test_latency_is_proven_on_a_phone_once_the_show_is_stopped(
     press(tab, "#resume")
     wait_until(lambda: declared(box).going)
     context.close()
+
+
+@ON_BOTH
+def test_limits_are_marks_on_scales_and_the_ones_that_are_not_met_come_first(tab: Tab) -> None:
+    values = {"tick, median": (1.1, 2.0), "tick, p99": (7.5, 6.0), "hand to sound, median": (None, 15.0)}
+    limits = [
+        {
+            "label": label,
+            "value": value,
+            "most": most,
+            "unit": "ms",
+            "holds": value is not None and value <= most,
+        }
+        for label, (value, most) in values.items()
+    ]
+    head = {"id": "000001", "kind": "latency", "made": 1_767_816_900.0, "holds": False}
+    about = {"host": "box", "machine": {"cores": 4, "memory_mb": 1}, "software": {}, "box_file": None}
+    figures = {"transport_ms": {"p50": 1.0}, "response_ms": {"p50": 30.0}}
+    proof = {**head, **about, "limits": limits, "figures": figures, "show": {"name": "a", "checksum": "b"}}
+    proof |= {"seconds": 6, "settling_s": 3.0, "at_s": [1.0, 4.0], "transport_ms": [1.0, 1.0]}
+    listed = {"runs": None, "show_goes": False, "proofs": [head]}
+    tab.route("**/api/prove", lambda route: route.fulfill(json=listed))
+    tab.route("**/api/prove/000001", lambda route: route.fulfill(json=proof))
+    press(tab, '[data-page="prove"]')
+    press(tab, "#proofs button")
+    lines = tab.locator("#prove-lines li")
+    expect(lines).to_have_text([re.compile(said) for said in ("tick, p99", "hand to sound", "tick, median")])
+    share = "one => ['--value', '--mark'].map((name) => parseFloat(one.style.getPropertyValue(name)))"
+    over, unknown, under = (lines.nth(place).locator(".scale").evaluate(share) for place in range(3))
+    assert over[0] > over[1] and under[0] < under[1] and unknown[0] == 0
+    assert over[1] == under[1] == unknown[1] < 100, "the mark is at the same place of each scale"
+    assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
 # From now on: the readings in what the page is told of a measurement, and its pictures of them.

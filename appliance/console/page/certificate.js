@@ -26,6 +26,12 @@ export function findingWords(finding) {
 export const valueOf = (limit) => limit.value === null ? words("prove_nothing_came") : `${number(limit.value, 2)} ${limit.unit}`;
 export const mostOf = (limit) => words("prove_at_most", { most: `${number(limit.most, 2)} ${limit.unit}` });
 
+// Limits of the transport, in ms, from those of a proof.
+export function limitsOf(limits) {
+  const most = (label) => limits.find((one) => one.label === label)?.most;
+  return { median: most("transport, median"), p99: most("transport, p99") };
+}
+
 export function drawCertificate(canvas, proof) {
   const context = canvas.getContext("2d");
   canvas.width = WIDTH;
@@ -71,7 +77,7 @@ function facts(proof) {
 
 function latency(context, proof, y) {
   drawPlots(context, { x: MARGIN, y, width: WIDTH - 2 * MARGIN, height: 500 },
-    { at: proof.at_s, ms: proof.transport_ms, settling: proof.settling_s, seconds: proof.seconds }, PAPER, 22);
+    { at: proof.at_s, ms: proof.transport_ms, settling: proof.settling_s, seconds: proof.seconds, limits: limitsOf(proof.limits) }, PAPER, 22);
   y += 540;
   context.textAlign = "left";
   const { transport_ms: way, response_ms: response } = proof.figures;

@@ -1,6 +1,6 @@
 // Prove it: a measurement begins here, grows while it is looked at, and stays as a document.
 import { request } from "./box.js";
-import { drawCertificate, findingWords, limitWords, madeAt, mostOf, valueOf, verdictOf } from "./certificate.js";
+import { drawCertificate, findingWords, limitsOf, limitWords, madeAt, mostOf, valueOf, verdictOf } from "./certificate.js";
 import { ask, command, say } from "./device.js";
 import { byId } from "./elements.js";
 import { twice } from "./hold.js";
@@ -9,6 +9,7 @@ import { translated, words } from "./words.js";
 
 const LOOK_MS = 500;
 const FADED_MS = 20_000; // for a show that stops
+const MARK = 0.6; // where a limit is on its scale
 let goes = false, isShown = false, timer = 0, next = 0, measured = null, proof = null;
 
 export function initProve() {
@@ -87,6 +88,7 @@ async function look() {
 
 function take(progress) {
   if (progress.phase) {
+    if (progress.limits) measured.limits = limitsOf(progress.limits);
     measured.inPhase = progress.phase === "locked";
     if (measured.inPhase) Object.assign(measured, { settling: progress.settling_s, seconds: progress.seconds });
     showSentence(words(`prove_phase_${progress.phase}`, progress));
@@ -145,7 +147,7 @@ async function open(id) {
   byId("prove-document").hidden = false;
   byId("prove-verdict").textContent = verdictOf(proof);
   byId("prove-verdict").className = proof.holds ? "well" : "fault";
-  byId("prove-lines").replaceChildren(...(proof.kind === "latency" ? proof.limits.map(limitItem) : proof.findings.map(findingItem)));
+  byId("prove-lines").replaceChildren(...(proof.kind === "latency" ? wrongFirst(proof.limits).map(limitItem) : proof.findings.map(findingItem)));
   drawCertificate(byId("prove-sheet"), proof);
   byId("prove-json").href = `/api/prove/${id}`;
   byId("prove-json").download = `bunraku-${proof.kind}-${id}.json`;
@@ -153,8 +155,19 @@ async function open(id) {
   return undefined;
 }
 
+const wrongFirst = (limits) => [...limits].sort((one, other) => Number(one.holds) - Number(other.holds));
+
+// A value on a scale with its limit as a mark: what is good is left of it.
 function limitItem(limit) {
-  return line(`${limit.holds ? "✓" : "✗"} ${limitWords(limit)}: ${valueOf(limit)}`, mostOf(limit), limit.holds ? "" : "wrong");
+  const item = line(`${limit.holds ? "✓" : "✗"} ${limitWords(limit)}`, "", limit.holds ? "" : "wrong");
+  const value = document.createElement("b"), scale = document.createElement("i"), small = document.createElement("small");
+  value.textContent = valueOf(limit);
+  small.textContent = mostOf(limit);
+  scale.className = "scale";
+  scale.style.setProperty("--value", `${100 * Math.min(1, (limit.value ?? 0) / limit.most * MARK)}%`);
+  scale.style.setProperty("--mark", `${100 * MARK}%`);
+  item.append(value, scale, small);
+  return item;
 }
 
 function findingItem(finding) {
