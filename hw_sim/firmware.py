@@ -20,7 +20,6 @@ STEP_S = 0.002
 ANSWER_WITHIN_US = 1_000_000
 POLL_US = 5_000
 CLOCK_WRAPS_S = (1 << 32) * 1e-6
-LANES = {0: Lane.NETWORK, 1: Lane.CABLE}
 # The lamp by the seconds from flash to flash, see docs/dancer.md.
 LIGHTS = ((0.15, "strobe"), (0.5, "fast"), (1.6, "slow"), (4.0, "on"))
 

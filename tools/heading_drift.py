@@ -88,33 +88,33 @@ def evening(dancer: Dancer, seed: int, pauses: bool, table: bool) -> Evening:
     """Two hours of takes in any order. pauses: every 5 minutes the dancer stands for 10 s, mostly facing the
     front; table: before the neutral pose the sensor lies on a table.
     """
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     total, danced_s = round(3600 * HOURS / SAMPLE_S), 0.0
     parts: list[Array] = []
     while sum(len(part) for part in parts) < total:
-        take = dancer.takes[chance.integers(len(dancer.takes))]
+        take = dancer.takes[rng.integers(len(dancer.takes))]
         parts.append(take)
         danced_s += len(take) * SAMPLE_S
         if pauses and danced_s >= PAUSE_EVERY_S:
             danced_s = 0.0
-            faces_front = chance.random() < FACES_FRONT
-            facing = chance.normal(0.0, FRONT_WITHIN) if faces_front else chance.uniform(-180.0, 180.0)
-            parts.append(standing(facing, round(PAUSE_S / SAMPLE_S), chance))
+            faces_front = rng.random() < FACES_FRONT
+            facing = rng.normal(0.0, FRONT_WITHIN) if faces_front else rng.uniform(-180.0, 180.0)
+            parts.append(standing(facing, round(PAUSE_S / SAMPLE_S), rng))
     arm = np.concatenate(parts)[:total]
     if table:
         still = round(TABLE_S / SAMPLE_S)
-        noise = about_vertical(chance.normal(0.0, 0.1, still))
+        noise = about_vertical(rng.normal(0.0, 0.1, still))
         lying = quaternion.multiply(
             noise, quaternion.from_axis_angle(np.array([1.0, 0.3, 0.2]), np.array(1.1))
         )
-        return Evening(np.concatenate([lying, standing(0.0, 10, chance), arm]), still)
+        return Evening(np.concatenate([lying, standing(0.0, 10, rng), arm]), still)
     return Evening(arm)
 
 
-def standing(facing: float, samples: int, chance: np.random.Generator) -> Array:
+def standing(facing: float, samples: int, rng: np.random.Generator) -> Array:
     """An arm that hangs, nearly still: it sways by half a degree."""
     sway = 0.5 * np.sin(np.arange(samples) * SAMPLE_S * 2.0)
-    swing = np.array(math.radians(chance.normal(0.0, 3.0)))
+    swing = np.array(math.radians(rng.normal(0.0, 3.0)))
     hangs = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), swing)
     hangs = quaternion.multiply(hangs, np.array(AT_NEUTRAL))
     return quaternion.multiply(about_vertical(facing + sway), hangs)
@@ -122,14 +122,14 @@ def standing(facing: float, samples: int, chance: np.random.Generator) -> Array:
 
 def drift(samples: int, rate: float, seed: int) -> Array:
     """(N,) degrees; rate: degrees a minute, in one direction or the other."""
-    chance = np.random.default_rng(1000 + seed)
+    rng = np.random.default_rng(1000 + seed)
     at_s = np.arange(samples) * SAMPLE_S
-    walk, keep, value = np.empty(samples), math.exp(-SAMPLE_S / 1200.0), chance.normal()
+    walk, keep, value = np.empty(samples), math.exp(-SAMPLE_S / 1200.0), rng.normal()
     for sample in range(samples):
-        value = keep * value + math.sqrt(1.0 - keep * keep) * chance.normal()
+        value = keep * value + math.sqrt(1.0 - keep * keep) * rng.normal()
         walk[sample] = value
     rates = rate * (0.6 + 0.4 * (1.0 - np.exp(-at_s / 900.0)) + 0.2 * walk)
-    degrees: Array = np.cumsum(rates) * SAMPLE_S / 60.0 * chance.choice([-1.0, 1.0])
+    degrees: Array = np.cumsum(rates) * SAMPLE_S / 60.0 * rng.choice([-1.0, 1.0])
     return degrees
 
 

@@ -114,8 +114,7 @@ class Continuation(Takeover):
         is_ready = self._is_going and self._end - self._head >= self._length
         goes = self._chosen and is_ready
         if is_ready and self._share in (0.0, 1.0):
-            alike = np.einsum("mk,mk->m", self._rows[self._head], window[0, self._network.places])
-            self._signs[:] = np.copysign(1.0, alike)[:, None]
+            self._signs[:] = quaternion.sides(self._rows[self._head], window[0, self._network.places])
         self._fade(goes)
         if not self._share or not is_ready:
             self._is_going = self._is_going and self._chosen

@@ -99,8 +99,7 @@ class Live(Takeover):
         reference = phrase if was_silent and not self._share else self._before
         if not self._is_whole:
             reference = np.where((self._came == 0.0)[:, None], phrase, reference)
-        signs = np.where(np.einsum("jk,jk->j", self._newest, reference) < 0.0, -1.0, 1.0)
-        self._newest *= signs[:, None].astype(np.float32)
+        self._newest *= quaternion.sides(self._newest, reference)
         knows_root = bool((np.abs(root) <= FARTHEST_M).all())
         if self._has_root and not was_silent:
             if not knows_root:
@@ -166,10 +165,9 @@ class Live(Takeover):
         """The phrase's window (T, J, 4) in the stream's hemisphere, as of when a joint was last of one of the
         two only.
         """
-        alike = np.copysign(1.0, np.einsum("jk,jk->j", self._present, window[0]))[:, None]
-        of_joint = np.broadcast_to(shares, window.size // 4)[: len(alike)]
+        of_joint = np.broadcast_to(shares, window.size // 4)[: len(self._signs)]
         settled = ((of_joint == 0.0) | (of_joint == 1.0))[:, None] | (self._signs == 0.0)
-        np.copyto(self._signs, alike, where=settled)
+        np.copyto(self._signs, quaternion.sides(self._present, window[0]), where=settled)
         np.multiply(window, self._signs, out=self._phrase)
 
     def look(self, now: float) -> tuple[FloatArray, FloatArray] | None:

@@ -138,7 +138,7 @@ class Loop:
         leaving = self.poses[end].copy()
         leaving[-1] = self.poses[self.length - 1]  # the frame of weight 0; it only lends its signs
         middle = (self.fade + 1) // 2
-        flip = np.copysign(1.0, np.sum(leaving[middle] * entering[middle], axis=-1, keepdims=True))
+        flip = quaternion.sides(leaving[middle], entering[middle])
         joints = leaving.shape[1]
         Slerp((self.fade + 1) * joints, short=False)(
             leaving.reshape(-1, 4),

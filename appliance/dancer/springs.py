@@ -34,7 +34,6 @@ _PARTS = {
     "storm": slice(26, 27),
     "gate": slice(27, 28),  # whether feedback may act
 }
-KNOBS = ("wind", "gravity", "feedback", "stiffness", "storm", "gate")
 
 JUMP_M = 0.25  # an anchor that moves further in a tick has jumped: the masses are carried along
 FARTHEST = 2.0  # times the body's reach that a mass may be from the anchor, along each axis
@@ -138,8 +137,7 @@ class Springs(Puppeteer):
             self.kick(self.settings[name].kick)
 
     def turn(self, knob: str, values: Sequence[float], seconds: float = 0.0) -> None:
-        """Turn one of springs_parameters.KNOBS: wind (x, y, z m/s), gravity (m/s^2), stiffness (a factor),
-        feedback, storm and gate (0..1)."""
+        """knob: wind (x, y, z m/s), gravity (m/s^2), stiffness (a factor), feedback, storm or gate (0..1)."""
         self._is.turn(knob, values, seconds)
         self.settle()
 
@@ -342,7 +340,7 @@ class SpringsParameters:
         self.settle()
 
     def turn(self, knob: str, values: Sequence[float], seconds: float) -> None:
-        """Turn one of KNOBS."""
+        """The same."""
         self._glide.aim(_PARTS[knob], values, seconds)
         self.settle()
 

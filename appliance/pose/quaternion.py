@@ -141,14 +141,6 @@ def to_6d(q: Array) -> Array:
     return np.concatenate([matrix[..., :, 0], matrix[..., :, 1]], axis=-1)
 
 
-def from_6d(columns: Array) -> Array:
-    """Unit quaternions (..., 4) of two column vectors (..., 6), made orthonormal by Gram-Schmidt."""
-    first = columns[..., :3] / np.linalg.norm(columns[..., :3], axis=-1, keepdims=True)
-    rest = columns[..., 3:] - np.sum(first * columns[..., 3:], axis=-1, keepdims=True) * first
-    second = rest / np.linalg.norm(rest, axis=-1, keepdims=True)
-    return from_matrix(np.stack([first, second, np.cross(first, second)], axis=-1))
-
-
 def from_euler(angles: Array, axes: str) -> Array:
     """Rotation of angles (..., len(axes)) in radians about axes such as 'zxy', applied as in BVH: z*x*y."""
     q: Array = np.broadcast_to(IDENTITY.astype(np.float64), (*angles.shape[:-1], 4))
@@ -173,6 +165,12 @@ def to_euler_zxy(q: Array) -> Array:
 def aligned(q: Array, reference: Array) -> Array:
     """The same rotations with signs that bring them into the reference's hemisphere."""
     return np.where(np.sum(q * reference, axis=-1, keepdims=True) < 0, -q, q)
+
+
+def sides(q: Array, reference: Array) -> Array:
+    """1 or -1, (..., 1): the signs with which `aligned` multiplies; for those that keep them."""
+    signs: Array = np.copysign(1.0, np.einsum("...k,...k->...", q, reference))[..., None]
+    return signs
 
 
 def continuous(q: Array, axis: int = 0) -> Array:

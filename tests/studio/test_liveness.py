@@ -14,7 +14,7 @@ import torch
 from appliance.dancer.material.liveness import network_liveness, what_is_dead
 from appliance.dancer.material.motion_network import MotionNetwork
 from appliance.pose.bvh import read_bvh
-from appliance.show.bundle import default_show_path
+from appliance.show.bundle import default_show_path, write_checksums
 from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.export import packing
@@ -93,7 +93,8 @@ def test_check_map_and_path_say_so(bunraku: Command, tmp_path: Path) -> None:
     show = tmp_path / "show"
     shutil.copytree(default_show_path(), show)
     made("deaf", show / "pose.onnx")
-    packing.seal(show)
+    packing.write_surface(show)
+    write_checksums(show)
     out = bunraku("check", show, "--box", write_box(tmp_path)).out
     assert f"pose.onnx: The network is dead: {CAUSES['deaf']}" in " ".join(out.split())
     options = ["--show", show, "--seconds", 1, "--wobble", 1, 1, "--out", tmp_path / "x.bvh"]

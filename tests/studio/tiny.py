@@ -12,6 +12,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.show.bundle import write_checksums
 from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.export import packing
@@ -97,7 +98,8 @@ def write_tiny_show(folder: Path) -> Path:
     packing.write_skeleton(folder, phrase.skeleton, phrase.poses[0])
     packing.write_phrase(folder, phrase)
     packing.write_show_yaml(folder, "tiny", [{"sensor": "left-wrist", "joint": "lShldr"}])
-    packing.seal(folder)
+    packing.write_surface(folder)
+    write_checksums(folder)
     return folder
 
 

@@ -99,10 +99,10 @@ def _seen(seen: Seen) -> tuple[str, str]:
     if much != "answers":
         return "little", f"The dancer answers a little: a hand moves the rest by {seen.answer:.1f} degrees."
     alive = "stays alive" if seen.energy or seen.critic is not None else "nothing speaks against it"
-    reported = "" if seen.critic is None else f"; a critic tells it from the dancer in {_of_100(seen.critic)}"
+    critic = "" if seen.critic is None else f"; a critic tells it from the dancer in {_of_100(seen.critic)}"
     return (
         "good",
-        f"The dancer answers, and {alive}: a hand moves the rest by {seen.answer:.0f} degrees{reported}.",
+        f"The dancer answers, and {alive}: a hand moves the rest by {seen.answer:.0f} degrees{critic}.",
     )
 
 

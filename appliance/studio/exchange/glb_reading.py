@@ -20,7 +20,6 @@ from appliance.pose.recording import Recording
 from appliance.studio.exchange.figure_facts import MAX_VALUES, checked_recording, checked_skeleton
 
 _DAMAGED = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError)
-_STILL_SCALE = 1e-3  # a joint that is scaled by less is not scaled
 _SHORTEST_ROTATION = 0.5  # length of a quaternion; a shorter one is a hole in the data
 _PROP = 0.5  # fraction of the joints of the largest skeleton: a smaller one is not a second dancer
 _SHOWN = 8

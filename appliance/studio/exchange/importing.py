@@ -109,7 +109,7 @@ def _with_zeros_as_gaps(
     zero = (points == 0.0).all(axis=2)
     if not zero.any():
         return points
-    size, places, found, reported = figure_size(points), places_of(names), points.copy(), list[str]()
+    size, places, found, unseen = figure_size(points), places_of(names), points.copy(), list[str]()
     for joint in np.flatnonzero(zero.any(axis=0)).tolist():
         always = bool(zero[:, joint].all())
         place = places[joint]
@@ -124,11 +124,11 @@ def _with_zeros_as_gaps(
                 found[gap.first : gap.last + 1, joint] = np.nan
                 if not always:
                     frames = place_text(range(gap.first, gap.last + 1), "frame")
-                    reported.append(f"{names[joint]} is 0, 0, 0 in {frames}: taken as not seen.")
-    for line in reported[:_SHOWN_GAPS]:
+                    unseen.append(f"{names[joint]} is 0, 0, 0 in {frames}: taken as not seen.")
+    for line in unseen[:_SHOWN_GAPS]:
         say(line)
-    if len(reported) > _SHOWN_GAPS:
-        say(f"And {len(reported) - _SHOWN_GAPS} more such points and times.")
+    if len(unseen) > _SHOWN_GAPS:
+        say(f"And {len(unseen) - _SHOWN_GAPS} more such points and times.")
     return found
 
 
@@ -142,8 +142,8 @@ def _require_seen(source: Path, names: Sequence[str], points: Array) -> None:
 def _as_model(
     source: Path, model: Path, names: Sequence[str], points: Array, say: Callable[[str], None]
 ) -> tuple[Skeleton, Array]:
-    reported = ReadingOptions(true_fps={"*": USUAL_FPS})  # its dance is not asked for
-    recording, guesses = read_as_given(model, reported)
+    reading = ReadingOptions(true_fps={"*": USUAL_FPS})  # its dance is not asked for
+    recording, guesses = read_as_given(model, reading)
     figure = recording.skeleton
     for guess in guesses:
         say(f"{model.name}: {guess.sentence()}.")

@@ -294,8 +294,8 @@ def _read_long(path: Path, head: Sequence[str], reader: Iterator[list[str]]) -> 
         if timed:
             times[words[counted]] = _number(path, line, words[timed[0]]) * timed[1]
     points, seen = _stacked(list(frames.values()), len(MEDIAPIPE))
-    reported = np.array([times[key] for key in frames]) if timed and frames else None
-    return LAYOUTS["mediapipe"], points, seen, reported, z is None or _is_picture(points)
+    given_times = np.array([times[key] for key in frames]) if timed and frames else None
+    return LAYOUTS["mediapipe"], points, seen, given_times, z is None or _is_picture(points)
 
 
 def _number(path: Path, line: int, word: str) -> float:

@@ -59,8 +59,8 @@ def _table(axes: Any, name: str, claims: Sequence[Claim], nulls: Mapping[str, Se
         drawn = _drawn(claim)
         text = fill(f"({claim.letter}) {claim.text}", 70)
         axes.text(0, row + 0.06, text, color=INK, fontsize=9.5, va="top")
-        reported = " / ".join(name.replace("_", " ") for name in drawn)
-        axes.text(0, row + 0.92, f"{reported}\n{worth(claim, nulls)}", color=FAINT, fontsize=8.5, va="bottom")
+        measured = " / ".join(name.replace("_", " ") for name in drawn)
+        axes.text(0, row + 0.92, f"{measured}\n{worth(claim, nulls)}", color=FAINT, fontsize=8.5, va="bottom")
         for column, excerpt in enumerate(names):
             figures = claim.figures.get(excerpt)
             if figures is None:

@@ -220,8 +220,8 @@ def dense_stack(
             at_latent = place == (len(steps) - 1 if side == "encoder" else 0)
             kind = EXACT if at_latent or (side == "encoder" and place == 0) else layers
             is_last = place == len(steps) - 1
-            reported = bias if (is_last if side == "decoder" else place == 0) else ""
-            x = kind.linear(graph, x, layer, name, out if is_last else None, reported)
+            given = bias if (is_last if side == "decoder" else place == 0) else ""
+            x = kind.linear(graph, x, layer, name, out if is_last else None, given)
         elif isinstance(layer, nn.LayerNorm):
             x, _ = layers.layer_norm(graph, x, layer, name, skipped)
             skipped = ""

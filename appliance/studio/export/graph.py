@@ -69,18 +69,18 @@ class Layers:
         self.int8 = int8
 
     def linear(
-        self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None, reported: str = ""
+        self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None, bias: str = ""
     ) -> str:
-        """(B, in) -> (B, out); told: (B, out) in place of the layer's own bias."""
+        """(B, in) -> (B, out); bias: a node of shape (B, out) in place of the layer's own."""
         weight = _array(layer.weight).T
-        bias = reported or graph.constant(f"{name}.bias", _array(layer.bias))
+        added = bias or graph.constant(f"{name}.bias", _array(layer.bias))
         if not self.int8:
-            return graph.op("Gemm", x, graph.constant(f"{name}.weight", weight), bias, out=out)
+            return graph.op("Gemm", x, graph.constant(f"{name}.weight", weight), added, out=out)
         quantized = _quantized(graph, f"{name}.weight", weight)
-        if reported:  # the quantized product takes one bias for all rows
+        if bias:  # the quantized product takes one bias for all rows
             product = graph.op("DynamicQuantizeMatMul", x, *quantized, domain=MICROSOFT)
-            return graph.op("Add", product, reported, out=out)
-        return graph.op("DynamicQuantizeMatMul", x, *quantized, bias, out=out, domain=MICROSOFT)
+            return graph.op("Add", product, bias, out=out)
+        return graph.op("DynamicQuantizeMatMul", x, *quantized, added, out=out, domain=MICROSOFT)
 
     def layer_norm(
         self, graph: Graph, x: str, layer: nn.LayerNorm, name: str, skipped: str = ""

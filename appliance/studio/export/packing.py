@@ -15,7 +15,6 @@ from appliance.pose.body_facts import with_stance
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.show.bundle import write_checksums
 
 SKELETON, PHRASE, SHOW = "skeleton.bvh", "phrase.bvh", "show.yaml"
 PHRASE_DIGITS = 4  # in degrees and centimetres: finer than any eye or projector resolves
@@ -119,9 +118,3 @@ cues:                          # /cue opening, or /cue alone for the next one; w
 def write_surface(folder: Path) -> None:
     """The surface of the body whose skeleton is in the bundle."""
     write_body(folder, with_stance(read_bvh(folder / SKELETON)))
-
-
-def seal(folder: Path) -> None:
-    """Write the body's surface, then the checksums over all that is in the bundle."""
-    write_surface(folder)
-    write_checksums(folder)

@@ -103,7 +103,8 @@ def _make(request: Request, dataset: Dataset, folder: Path, console: Console) ->
     places = [dataset.skeleton.index(name) for name in coder.joints]
     judged_on = dataset.measured_on()
     joint, doubt = first_hand(dataset.skeleton, coder.joints, request.hand)
-    given = None if request.phrase is None else _given_phrase(request.phrase, coder, dataset)
+    file = request.phrase
+    given = None if file is None else (_given_phrase(file, coder, dataset), f"made of {file.name}")
     with tempfile.TemporaryDirectory(dir=folder.parent) as networks:
         files = _export_both(coder, state["settings"]["network"], Path(networks))
         coders = {precision: OnnxCoder(file) for precision, file in files.items()}
@@ -123,9 +124,9 @@ def _make(request: Request, dataset: Dataset, folder: Path, console: Console) ->
     report["puppetry"] = own_answer(coder, dataset, folder / ANSWER, error, state["step"], console)
     packing.write_skeleton(folder, dataset.skeleton, _shown_pose(dataset))
     about = "what the show starts from; another: bunraku export --phrase FILE"
-    if request.phrase is not None and given is not None:
-        packing.write_phrase(folder, given)
-        about = f"made of {request.phrase.name}"
+    if given is not None:
+        phrase, about = given
+        packing.write_phrase(folder, phrase)
     elif not (request.out / packing.PHRASE).exists():
         phrase, about, report["phrase"] = _own_phrase(dataset)
         packing.write_phrase(folder, phrase)
