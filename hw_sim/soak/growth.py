@@ -30,7 +30,7 @@ class Growth:
 
     @property
     def own_mb(self) -> float:
-        """Memory that no file backs. The stage maps motions that come and go; one it keeps is a handle more."""
+        """Memory that no file backs; of mapped motions that stay, the handles tell."""
         return self.last.anonymous_mb - self.first.anonymous_mb
 
 
