@@ -17,7 +17,7 @@ _PAGES = ("/", "/page.css", "/status")
 
 
 class Viewers:
-    """`visits`: pages opened. `frames` and `texts`: received by WebSocket. All in a thread of their own."""
+    """Watches in a separate thread. `visits`: pages opened. `frames` and `texts`: received by WebSocket."""
 
     def __init__(self, port: int) -> None:
         self.visits = self.frames = self.texts = 0
