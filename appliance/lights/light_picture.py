@@ -19,7 +19,7 @@ _SPOT_CORE = 0.8  # a spot is even up to here, and soft at its edge; all else fa
 
 
 class Space(NamedTuple):
-    """What is drawn, metres: two opposite corners."""
+    """The drawn part of the stage, metres: two opposite corners."""
 
     low: Array
     high: Array
@@ -107,9 +107,9 @@ def _chords(
 ) -> tuple[NDArray[np.bool_], Array, Array, tuple[Array, Array]]:
     """Where lines of sight at x (1, columns) and y (rows, 1) cross a beam's cone within the space.
 
-    Which do (rows, columns); for those where they enter and leave it, metres from the lamp along the line;
-    and at the lamp's own depth: the squared distance from it, and metres along its axis. The cone is a
-    quadratic in that depth.
+    Returns which of them do (rows, columns). Of these: the depths at which they enter and leave the cone,
+    metres from the lamp's own; and at the lamp's depth the squared distance to it, and the distance along its
+    axis. The cone is a quadratic in the depth.
     """
     right, up, depth = axes
     across, upwards = x - beam.place[right], y - beam.place[up]

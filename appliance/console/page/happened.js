@@ -91,7 +91,7 @@ function faults() {
   return found;
 }
 
-// What was commanded and said. One that comes several times in a row is one with a count; a cue is one with all that
+// Commands and messages. One that comes several times in a row is one with a count; a cue is one with all that
 // it changes.
 function said() {
   const found = [];

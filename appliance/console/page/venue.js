@@ -101,7 +101,7 @@ function field(key) {
   return whole;
 }
 
-// What differs from the file: at the field, in the head of its group, and beside the buttons.
+// Marks the fields that differ from the file; the head of a group and the bar of buttons count them.
 function showChanges() {
   for (const input of keyInputs()) {
     const key = keyOf(input), differs = JSON.stringify(typed(key, input)) !== JSON.stringify(key.value);
