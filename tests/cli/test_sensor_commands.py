@@ -15,7 +15,7 @@ import yaml
 
 from appliance.box.orders import Order
 from appliance.cli.sensors import box_keys
-from appliance.cli.sensors.control_client import Answer, ControlClient, NoBoxError, Roll
+from appliance.cli.sensors.control_client import ControlClient, NoBoxError, Reply, Roll
 from appliance.release import choice
 from appliance.release.choice import Choice, Pair
 from appliance.sensor.keys import create_keys, load_keys
@@ -55,7 +55,7 @@ def test_a_late_answer_of_the_stage_replaces_the_refusal(box: RunningBox) -> Non
 
     box.stage.answer = late
     client = ControlClient(("127.0.0.1", box.control.port), patience_s=20.0)
-    assert client.ask("/sensors/strobe", "left-wrist") == Answer(True, "It is.")
+    assert client.ask("/sensors/strobe", "left-wrist") == Reply(True, "It is.")
 
 
 def test_a_stage_that_never_answers_is_reported_after_the_timeout(box: RunningBox) -> None:

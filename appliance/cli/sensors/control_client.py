@@ -29,7 +29,7 @@ class NoBoxError(Exception):
 
 
 @dataclass(frozen=True)
-class Answer:
+class Reply:
     """The box's reply: whether it was done, and a sentence."""
 
     done: bool
@@ -65,7 +65,7 @@ class ControlClient:
         """Whether the box file gives it a control port."""
         return self._control is not None
 
-    def ask(self, address: str, *arguments: str) -> Answer:
+    def ask(self, address: str, *arguments: str) -> Reply:
         """Send one command and return its answer. Raises NoBoxError.
 
         After the reply that it was not carried out in time a second one may follow; this waits for it.
@@ -74,7 +74,7 @@ class ControlClient:
         with contextlib.closing(self._replies((address, *arguments))) as replies:
             for about, values in replies:
                 if about == reply_to(address) and len(values) == 3 and values[0] == address:
-                    answer = Answer(bool(values[1]), readable(str(values[2])))
+                    answer = Reply(bool(values[1]), readable(str(values[2])))
                     if answer.done or time.monotonic() - asked < ERRAND_S:  # refused, for good
                         return answer
         if answer is None:
