@@ -81,9 +81,10 @@ function latency(context, proof, y) {
   y += 540;
   context.textAlign = "left";
   const { transport_ms: way, response_ms: response } = proof.figures;
-  const figures = Object.entries(way).map(([name, value]) => `${name} ${value === null ? "–" : number(value, 2)} ms`).join("   ");
-  y = text(context, `${words("prove_transport")}: ${figures}`, MARGIN, y, 22, PAPER.ink, "600");
-  y = text(context, `${words("prove_response")}: ${response.p50 === null ? "–" : number(response.p50, 1)} ms`, MARGIN, y + 2, 22, PAPER.ink, "600") + 12;
+  const figures = Object.entries(way).filter(([, value]) => value !== null).map(([name, value]) => `${name} ${number(value, 2)} ms`).join("   ");
+  if (figures) y = text(context, `${words("prove_transport")}: ${figures}`, MARGIN, y, 22, PAPER.ink, "600");
+  if (response.p50 !== null) y = text(context, `${words("prove_response")}: ${number(response.p50, 1)} ms`, MARGIN, y + 2, 22, PAPER.ink, "600");
+  y += 12;
   for (const limit of proof.limits) {
     text(context, limit.holds ? "✓" : "✗", MARGIN, y + 3, 23, limit.holds ? PAPER.well : PAPER.fault, "700");
     text(context, limitWords(limit), MARGIN + 40, y + 3, 22, PAPER.ink, "400");

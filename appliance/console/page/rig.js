@@ -7,6 +7,8 @@ import { words } from "./words.js";
 const LOOK_MS = 200, WIDE_PX = 640;
 const LONGEST_M = 12, MARGIN_M = 1.2, STAGE_M = 2;
 const VIEWS = [["rig_front", 1, 1], ["rig_above", 2, -1]]; // words; the axis upwards, and its sense
+const SLICES = 10, THROW = [0, 0.1, 0.25, 0.5, 0.75, 1]; // of a beam, across and along
+const STEEPEST = 1.5; // radians: a beam's far edge that never meets the floor
 const INK = { floor: "#3d434b", quiet: "#b3b7bd", lamp: "#f3ece0", dark: "#22262b" };
 let beams = [], isLit = false, isAsking = false;
 
@@ -112,35 +114,72 @@ function drawView(ink, view, x, y, wide, ratio) {
     ink.fill();
     ink.stroke();
   }
+  drawNames(ink, at, ratio, [x, x + wide]);
   ink.font = `600 ${13 * ratio}px system-ui, sans-serif`;
   ink.fillStyle = INK.quiet;
   ink.fillText(words(view.title), x + 10 * ratio, y + 18 * ratio);
 }
 
-// A cone to the floor, and from above the patch that it lights there; the brighter the denser.
+// The name of each lamp above or below it, where it covers no other; the buttons have them all.
+function drawNames(ink, at, ratio, [left, right]) {
+  const taken = beams.map(([, place]) => at(place)).map(([px, py]) => [px - 7 * ratio, py - 7 * ratio, px + 7 * ratio, py + 7 * ratio]);
+  ink.font = `${12 * ratio}px system-ui, sans-serif`;
+  ink.fillStyle = INK.lamp;
+  ink.textAlign = "center";
+  for (const [name, place] of new Map(beams.map((beam) => [beam[0], beam[1]]))) {
+    const [px, py] = at(place), half = ink.measureText(name).width / 2;
+    const [middle, high] = [Math.min(Math.max(px, left + half + 4), right - half - 4), 13 * ratio];
+    for (const top of [py - 9 * ratio - high, py + 9 * ratio]) {
+      const box = [middle - half - 3, top, middle + half + 3, top + high];
+      if (taken.some((one) => box[0] < one[2] && one[0] < box[2] && box[1] < one[3] && one[1] < box[3])) continue;
+      taken.push(box);
+      ink.fillText(name, middle, top + 0.8 * high);
+      break;
+    }
+  }
+  ink.textAlign = "left";
+}
+
+// A cone to the floor that fades along its throw and towards its edge, and from above the pool where it meets the floor.
 function drawBeam(ink, [, place, way, colour, level, degrees], at, scale, view) {
   if (level < 0.005) return;
-  const reach = way[1] < -0.001 ? Math.min(LONGEST_M, place[1] / -way[1]) : LONGEST_M;
-  const end = place.map((value, axis) => value + reach * way[axis]), radius = reach * Math.tan(degrees * Math.PI / 360) * scale;
+  const hitsFloor = way[1] < -0.001 && place[1] / -way[1] < LONGEST_M, reach = hitsFloor ? place[1] / -way[1] : LONGEST_M;
+  const end = place.map((value, axis) => value + reach * way[axis]), half = degrees * Math.PI / 360;
   const [from, to] = [at(place), at(end)], long = Math.hypot(to[0] - from[0], to[1] - from[1]) || 1;
-  const isPlan = view.axis === 2, hitsFloor = way[1] < -0.001 && reach < LONGEST_M;
+  const isPlan = view.axis === 2, radius = reach * Math.tan(half) * scale;
   // To the side of the beam; on the floor, seen from the audience, along the floor.
   const aside = !isPlan && hitsFloor ? [radius, 0] : [-(to[1] - from[1]) / long * radius, (to[0] - from[0]) / long * radius];
-  const cone = ink.createLinearGradient(...from, ...to);
   const seen = Math.sqrt(level); // the eye sees a dimmer at 25 % half as bright
-  cone.addColorStop(0, rgb(colour, 0.04 + 0.36 * seen));
-  cone.addColorStop(1, rgb(colour, 0.01 + 0.13 * seen));
+  const cone = ink.createLinearGradient(...from, ...to);
+  for (const share of THROW) cone.addColorStop(share, rgb(colour, 0.9 * seen / SLICES / (1 + 4 * share)));
   ink.fillStyle = cone;
+  for (let slice = 1; slice <= SLICES; slice++) {
+    const wide = slice / SLICES;
+    ink.beginPath();
+    ink.moveTo(...from);
+    ink.lineTo(to[0] + wide * aside[0], to[1] + wide * aside[1]);
+    ink.lineTo(to[0] - wide * aside[0], to[1] - wide * aside[1]);
+    ink.fill();
+  }
+  if (isPlan && hitsFloor) drawPool(ink, { place, way, half, colour, seen, radius }, at, scale);
+}
+
+// An ellipse, long along the throw.
+function drawPool(ink, { place, way, half, colour, seen, radius }, at, scale) {
+  const slant = Math.acos(Math.min(1, -way[1])), flat = Math.hypot(way[0], way[2]) || 1;
+  const near = place[1] * Math.tan(slant - half), far = Math.min(LONGEST_M, place[1] * Math.tan(Math.min(slant + half, STEEPEST)));
+  const middle = (near + far) / 2, to = at([place[0] + middle * way[0] / flat, 0, place[2] + middle * way[2] / flat]);
+  ink.save();
+  ink.translate(...to);
+  ink.rotate(Math.atan2(way[2], way[0]));
+  ink.scale((far - near) / 2 * scale, radius);
+  const pool = ink.createRadialGradient(0, 0, 0, 0, 0, 1);
+  for (const share of THROW) pool.addColorStop(share, rgb(colour, 0.55 * seen * (1 - share ** 2) ** 2));
+  ink.fillStyle = pool;
   ink.beginPath();
-  ink.moveTo(...from);
-  ink.lineTo(to[0] + aside[0], to[1] + aside[1]);
-  ink.lineTo(to[0] - aside[0], to[1] - aside[1]);
+  ink.arc(0, 0, 1, 0, 7);
   ink.fill();
-  if (!isPlan || !hitsFloor) return;
-  ink.fillStyle = rgb(colour, 0.02 + 0.2 * seen);
-  ink.beginPath();
-  ink.arc(...to, radius, 0, 7);
-  ink.fill();
+  ink.restore();
 }
 
 function line(ink, from, to) {
