@@ -157,6 +157,18 @@ def test_recorded_moments_are_found_again_in_little_memory() -> None:
     assert peak < half_seconds
 
 
+def test_a_dance_is_matched_in_little_memory() -> None:
+    """Less than three times what is kept."""
+    poses = danced(motions(600.0, 21)).poses[:, PLACES].astype(np.float32)
+    tracemalloc.start()
+    matching = MotionMatching([poses])
+    kept = tracemalloc.get_traced_memory()[0]
+    matching.dance(poses[:20], 2, poses[:20, 2])
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 3 * kept
+
+
 def cells(line: str) -> list[str]:
     return [cell for cell in line.split("  ") if cell.strip()]
 

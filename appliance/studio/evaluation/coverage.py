@@ -10,16 +10,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
-from appliance.studio.evaluation.nearest import Floats, without_heading
+from appliance.studio.evaluation.nearest import Floats, columns_of, piecewise, without_heading
 
 SAMPLE = 2000  # recorded poses that coverage and recall look at
 NEIGHBOURS = 5
 WINDOW_TICKS = np.array([0, 6, 12, 18, 24])  # half a second, as the critic sees it
 EVERY = 2  # ticks between recorded half seconds
 APART_TICKS = 100  # moments of one stretch that count as different ones
-ROWS, MOMENTS = 1024, 16  # poses made level, and moments searched, at once
+MOMENTS = 16  # searched at once
 
 
 class RecordedMotion:
@@ -32,7 +31,7 @@ class RecordedMotion:
         within = np.split(chosen, np.searchsorted(chosen, ends[:-1]))
         begins = ends - [len(part) for part in parts]
         some = [part[rows - begin] for part, rows, begin in zip(parts, within, begins, strict=True)]
-        self._poses = _columns(without_heading(np.concatenate(some)))
+        self._poses = _level_columns(np.concatenate(some))
         self._radius = _radius(self._poses)
         self._columns = np.concatenate([_level_columns(part[::EVERY]) for part in parts])
         starts, moments, row, moment = [], [], 0, 0
@@ -51,12 +50,12 @@ class RecordedMotion:
 
         danced: poses (T, M, 4). Their neighbourhood reaches to the fifth nearest recorded pose.
         """
-        nearest = _squared(self._poses, _columns(without_heading(danced))).min(axis=1)
+        nearest = _squared(self._poses, _level_columns(danced)).min(axis=1)
         return float((nearest <= self._radius).mean())
 
     def recall(self, danced: Array) -> float:
         """Share of the recorded poses in the neighbourhood of a danced one (Kynkaanniemi et al. 2019)."""
-        columns = _columns(without_heading(danced))
+        columns = _level_columns(danced)
         return float((_squared(self._poses, columns) <= _radius(columns)[None]).any(axis=1).mean())
 
     def nearest_moments(self, dances: Sequence[Array], every: int, held: int) -> tuple[float, float]:
@@ -115,17 +114,8 @@ def _half_seconds(columns: Floats, starts: NDArray[np.intp], window: NDArray[np.
 
 
 def _level_columns(poses: Array) -> Floats:
-    """(T, 9 M) of poses (T, M, 4), headings removed. A few at a time: the way there takes much more."""
-    found = np.empty((len(poses), 9 * poses.shape[1]), dtype=np.float32)
-    for first in range(0, len(poses), ROWS):
-        found[first : first + ROWS] = _columns(without_heading(poses[first : first + ROWS]))
-    return found
-
-
-def _columns(poses: Array) -> Floats:
-    """(T, 9 M): rotation matrices, whose distance is sqrt(8) sin(angle / 2) for each joint."""
-    columns: Floats = quaternion.to_matrix(poses).reshape(len(poses), -1).astype(np.float32)
-    return columns
+    """(T, 9 M) of poses (T, M, 4), headings removed."""
+    return piecewise(lambda piece: columns_of(without_heading(piece)), poses)
 
 
 def _squared(a: Floats, b: Floats) -> Floats:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.ease import ease
 from appliance.pose.quaternion import Array
-from appliance.studio.evaluation.nearest import Floats, without_heading
+from appliance.studio.evaluation.nearest import Floats, piecewise, without_heading
 
 SEARCH_TICKS = 5
 BEFORE, CHANGE = 8, 4  # ticks: the held joint 0.16 s ago; the others' change over 0.08 s
@@ -37,7 +37,7 @@ class MotionMatching:
         if not kept:
             raise ValueError("No recording has half a second without a capture error.")
         self._poses = np.concatenate(
-            [quaternion.continuous(without_heading(part)).astype(np.float32) for part in kept]
+            [quaternion.continuous(piecewise(without_heading, part)) for part in kept]
         )
         self._left = np.concatenate(
             [np.arange(len(part))[::-1] for part in kept]
@@ -49,7 +49,7 @@ class MotionMatching:
                 for begin, part in zip(begins, kept, strict=False)
             ]
         )
-        self._six = quaternion.to_6d(self._poses)
+        self._six = piecewise(quaternion.to_6d, self._poses)
 
     def dance(self, phrase: Array, held: int, hand: Array) -> Floats:
         """(T, M, 4): the answer to a hand (T, 4) on joint `held` over a phrase (T, M, 4).
@@ -57,8 +57,8 @@ class MotionMatching:
         Headings are removed from all of them. The hand's orientation is put in at the end.
         """
         others = [joint for joint in range(phrase.shape[1]) if joint != held]
-        known = self._features(self._moments, held, others)
-        lengths = (known**2).sum(axis=1)
+        known = piecewise(lambda moments: self._features(moments, held, others), self._moments)
+        lengths = np.einsum("nd,nd->n", known, known)
         asked, hands = quaternion.to_6d(phrase[:, others]), quaternion.to_6d(hand)
         faded, danced, place = _Fade(phrase.shape[1]), np.empty(phrase.shape, dtype=np.float32), -1
         for tick in range(len(phrase)):

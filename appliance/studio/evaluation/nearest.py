@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,11 @@ from appliance.studio.studio_error import StudioError
 STRAINED_DEGREES = 10.0  # from every orientation that the joint ever had: no longer how this dancer moves
 HOLDS_DEGREES = 15.0  # a recorded joint this close to the hand's orientation counts as held by it
 CANDIDATES = 128
+PIECE = 1024  # poses converted at once
 ROWS = 128  # ticks searched at once: their scores against 35,000 poses are 18 MB
 
 Floats = NDArray[np.float32]
+Rows = NDArray[Any]
 
 
 class Reference:
@@ -32,8 +35,8 @@ class Reference:
     def __init__(self, poses: Array, largest_step: float = float("nan")) -> None:
         """largest_step: the furthest that a joint goes from tick to tick in the recordings, degrees."""
         self.largest_step = largest_step
-        self.poses = without_heading(poses).astype(np.float32)
-        self._features = _features(self.poses)
+        self.poses = piecewise(without_heading, poses)
+        self._features = piecewise(columns_of, self.poses)
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -96,7 +99,7 @@ class Reference:
     ) -> Floats:
         chosen = np.zeros_like(poses)
         chosen[:, compared] = poses[:, compared]
-        scores = _features(chosen) @ self._features.T
+        scores = columns_of(chosen) @ self._features.T
         if allowed is not None:
             scores[~allowed] = -np.inf
         count = min(CANDIDATES, len(self))
@@ -136,7 +139,20 @@ def _largest_step(take: Take, places: Sequence[int]) -> float:
     return float(steps[take.sound[1:] & take.sound[:-1]].max(initial=0.0))
 
 
-def _features(poses: Floats) -> Floats:
-    """(N, 9 M): rotation matrices; zero quaternions, for joints that are left out, give zeros."""
-    features: Floats = quaternion.to_matrix(poses).reshape(len(poses), -1).astype(np.float32)
-    return features
+def columns_of(poses: Array) -> Floats:
+    """(N, 9 M): rotation matrices, whose distance is sqrt(8) sin(angle / 2) for each joint.
+
+    Zero quaternions, for joints that are left out, give zeros.
+    """
+    columns: Floats = quaternion.to_matrix(poses).reshape(len(poses), -1).astype(np.float32)
+    return columns
+
+
+def piecewise(make: Callable[[Rows], Rows], rows: Rows) -> Floats:
+    """What is made of rows (N, ...), in float32. A few at a time: the steps to it take ten times as much."""
+    first = make(rows[:PIECE])
+    found = np.empty((len(rows), *first.shape[1:]), dtype=np.float32)
+    found[:PIECE] = first
+    for begin in range(PIECE, len(rows), PIECE):
+        found[begin : begin + PIECE] = make(rows[begin : begin + PIECE])
+    return found
