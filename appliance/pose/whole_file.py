@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import errno
 import os
 from collections.abc import Iterator
@@ -52,6 +51,8 @@ def sync(path: Path) -> None:
 
 def exchange(one: Path, other: Path) -> None:
     """Each of two folders takes the other's name in one step. Raises OSError where the system has none."""
+    import ctypes
+
     libc = ctypes.CDLL(None, use_errno=True)
     if not hasattr(libc, "renameat2"):
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS), str(one))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from appliance.box.durable import new_file, private_folder, write_whole
-from appliance.pose.whole_file import sync
+from appliance.pose.whole_file import exchange, sync
 from appliance.release.arrivals import SHOW, Arrival
 from appliance.release.choice import Choice, appliance_box
 from appliance.show.bundle import WORKSHOP
@@ -165,15 +165,12 @@ def _remove(found: Path) -> None:
 
 
 def _put(part: Path, place: Path) -> Path:
-    """Moves the copy into place; it replaces an existing one, whose disk may have damaged it."""
+    """Moves the copy into place; an existing one, whose disk may have damaged it, takes its place."""
     if place.exists():
-        before = place.with_name(f"{_PART}-before-{os.getpid()}")
-        place.rename(before)
-        part.rename(place)
-        shutil.rmtree(before, ignore_errors=True)
+        exchange(part, place)
     else:
         part.rename(place)
-    sync(place.parent)
+        sync(place.parent)
     return place
 
 

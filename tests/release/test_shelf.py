@@ -44,6 +44,19 @@ def test_a_file_that_ends_too_early_is_no_copy(venue: Venue) -> None:
     assert not list((venue.places.data / "shows").iterdir())
 
 
+def test_a_damaged_copy_gives_way_to_a_whole_one_in_one_step(
+    venue: Venue, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    venue.bring(venue.stick, "spring")
+    shelf, arrival = Shelf(venue.places.data), look("stick", venue.stick)
+    identity, place = shelf.take_show(arrival)
+    (place / "puppet.onnx").write_bytes(b"damaged")
+    monkeypatch.setattr(Path, "rename", lambda *_: pytest.fail("a power cut would leave no show"))
+    assert shelf.take_show(arrival) == (identity, place)
+    assert (place / "puppet.onnx").stat().st_size == 300_000
+    assert [one.name for one in place.parent.iterdir()] == [identity]
+
+
 def test_a_stick_that_gives_errors_is_unreadable(venue: Venue) -> None:
     (venue.stick / "show").mkdir()
     (venue.stick / "show" / "show.yaml").symlink_to("/proc/self/mem")  # its first page: EIO
