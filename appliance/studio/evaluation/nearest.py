@@ -149,7 +149,7 @@ def columns_of(poses: Array) -> Floats:
 
 
 def piecewise(make: Callable[[Rows], Rows], rows: Rows) -> Floats:
-    """What is made of rows (N, ...), in float32. A few at a time: the steps to it take ten times as much."""
+    """Converts rows (N, ...) to float32, a few at a time: the steps to it take ten times as much memory."""
     first = make(rows[:PIECE])
     found = np.empty((len(rows), *first.shape[1:]), dtype=np.float32)
     found[:PIECE] = first
