@@ -475,6 +475,17 @@ def test_a_head_has_a_crown_a_nose_and_a_chin() -> None:
     assert np.ptp(face[:, 0]) == pytest.approx(0.105, abs=0.015), "ears"
 
 
+def test_a_face_has_no_ledge() -> None:
+    """The profile recedes gently, also below the nose: a ledge there throws a hard shadow."""
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    places = (mesh.vertices - mesh.bind_positions[skeleton.index("head")]) / mesh.height
+    middle = places[(np.abs(places[:, 0]) < 0.004) & (places[:, 2] > 0)]
+    levels = np.arange(-0.01, 0.08, 0.005)
+    front = np.array([middle[np.abs(middle[:, 1] - level) < 0.003, 2].max() for level in levels])
+    assert np.abs(np.diff(front)).max() < 0.006
+    assert front.max() - np.median(front) > 0.004, "no nose"
+
+
 def test_a_pelvis_is_not_wider_than_hips_and_thighs() -> None:
     mesh = mesh_of("dancer")
     at = mesh.vertices[np.abs(mesh.vertices[:, 0]) < 0.14 * mesh.height]
