@@ -90,6 +90,11 @@ def observe(tab: Tab) -> None:
     tab.evaluate(_OBSERVED)
 
 
+def open_part(tab: Tab, part: str) -> None:
+    """Of the rehearsal: phrase, iterations, answer, hands and so on."""
+    press(tab, f'#rehearsal-parts [data-opens="{part}"]')
+
+
 def sensor_card(name: str) -> str:
     """The selector of a sensor's card."""
     return f'#cards article:has(h3:text-is("{name}"))'

@@ -17,7 +17,7 @@ from appliance.show.bundle import default_show_path
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError
-from tests.console.browser import LAPTOP, PHONE, declared, opened_context, press, unlocked_tab
+from tests.console.browser import LAPTOP, PHONE, declared, open_part, opened_context, press, unlocked_tab
 from tests.console.page import Page, box_with_page
 from tests.system.box import Box
 from tests.system.processes import wait_until
@@ -130,6 +130,7 @@ def test_the_settings_of_now_become_a_cue(browser: Browser, studio: tuple[Box, P
     assert page.order("/liveliness", 0.4, 0.5)["done"] and page.order("/seed", 12)["done"]
     wait_until(lambda: round(page.status()["status"]["liveliness"], 3) == 0.4)
     tab = unlocked_tab(opened_context(browser, **LAPTOP), page, "rehearsal")
+    open_part(tab, "cue")
     for name, said in [("anna", "The cue anna is in the copy"), ("anna", "another name"), ("ben", "cue ben")]:
         tab.fill("#cue-name", name)
         press(tab, "#cue-keep")
@@ -153,6 +154,7 @@ def test_the_settings_of_now_become_a_cue(browser: Browser, studio: tuple[Box, P
 def test_knobs_of_springs_and_strings(browser: Browser, studio: tuple[Box, Page]) -> None:
     box, page = studio
     tab = unlocked_tab(opened_context(browser, **PHONE, locale="de-DE"), page, "rehearsal")
+    open_part(tab, "springs")
     setting, feedback = tab.locator("#springs >> text=strings"), tab.locator("#springs-feedback")
     expect(tab.locator("#springs >> text=loose")).to_have_attribute("aria-pressed", "true")
     expect(feedback).to_have_value("0")

@@ -98,6 +98,48 @@ def test_nothing_moves_when_fallbacks_come_and_go(tab: Tab, language: str) -> No
     expect(tab.locator("#fallbacks-now")).not_to_contain_text("`")
 
 
+# From now on the box says that the second cue was called `ago` seconds ago, with a fade of ten.
+CALLED = """async () => {
+  window.ago = 5;
+  const { Box } = await import("/box.js"), hear = Box.prototype.hear, get = fetch;
+  const cues = [{ name: "calm" }, { name: "storm", fade_s: 10 }, { name: "end", at: "01:00:30:00" }];
+  window.fetch = async (path, ...more) => path !== "/api/show" ? get(path, ...more)
+    : new Response(JSON.stringify({ ...await (await get(path)).json(), cues }));
+  Box.prototype.hear = function (value) {
+    value.cue_since = value.time - window.ago;
+    value.fade = window.ago < 10 ? [value.cue_since, 10] : null;
+    value.generation += 1000;
+    value.cues = cues.map(({ name }) => ({ name, now: name === "storm" }));
+    value.status = { ...value.status, cue: "storm" };
+    value.remote = { state: "running", timecode: "01:00:10:00" };
+    hear.call(this, value);
+  };
+}"""
+PROGRESS = """() => {
+  const cue = (state) => document.querySelector(`#cues [aria-${state}="true"]`);
+  const fade = document.querySelector("#fade");
+  return {
+    runs: fade.classList.contains("runs"), fade: fade.value,
+    share: Number(cue("current")?.style.getPropertyValue("--share") ?? -1),
+    since: document.querySelector("#now-since").textContent, next: cue("pressed")?.textContent ?? "",
+  };
+}"""
+
+
+@ON_BOTH
+def test_the_cue_in_force_shows_how_far_its_fade_is(tab: Tab) -> None:
+    """Since when it is in force, and when the timecode calls the next one; and nothing moves by it."""
+    tab.evaluate(CALLED)
+    await_true(tab, f"({PROGRESS})().share >= 0.5 && ({PROGRESS})().next.includes('in 0:20')")
+    running = tab.evaluate(PROGRESS)
+    assert running["runs"] and 0.5 <= running["fade"] < 1 and running["since"].startswith("0:0")
+    places = tab.evaluate(PLACES, CONTROLS)
+    tab.evaluate("window.ago = 70")
+    await_true(tab, f"!({PROGRESS})().runs && ({PROGRESS})().since === '1:10'")
+    assert tab.evaluate(PROGRESS)["share"] == 0
+    assert tab.evaluate(PLACES, CONTROLS) == places
+
+
 @ON_BOTH
 def test_an_answer_of_the_box_covers_nothing_that_is_touched(tab: Tab, venue: tuple[Box, Page]) -> None:
     unlock(tab, venue[1])

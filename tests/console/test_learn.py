@@ -16,7 +16,7 @@ from appliance.console.settings import WHERE
 from appliance.pose.bvh import write_bvh
 from appliance.show.bundle import bundled_shows
 from tests.bundles import swaying_phrase, write_show
-from tests.console.browser import ON_A_LAPTOP, ON_BOTH, press, unlock
+from tests.console.browser import ON_A_LAPTOP, ON_BOTH, open_part, press, unlock
 from tests.console.page import Page, page_alone
 from tests.system.box import Box
 from tests.system.processes import wait_until
@@ -49,6 +49,7 @@ def nothing_stays(venue: tuple[Box, Page]) -> Iterator[None]:
 def test_two_touches_begin_and_it_waits_for_the_show(tab: Tab, venue: tuple[Box, Page], kept: Path) -> None:
     unlock(tab, venue[1])
     press(tab, '[data-page="rehearsal"]')
+    open_part(tab, "learn")
     folder = tab.locator("#learn-folders button")
     expect(folder).to_have_text("box/mine · 1 files, 0.1 min")
     expect(tab.locator("#learn-begin")).to_be_disabled()
@@ -76,6 +77,7 @@ def test_recordings_from_the_browser_are_learned_from_another_show(
     (tmp_path / "torn.bvh").write_bytes((tmp_path / "solo.bvh").read_bytes()[:2000])
     unlock(tab, venue[1])
     press(tab, '[data-page="rehearsal"]')
+    open_part(tab, "learn")
     tab.locator("#learn-files").set_input_files([tmp_path / "solo.bvh"])
     uploaded = tab.locator("#learn-folders button", has_text="upload of ")
     expect(uploaded).to_contain_text("1 files, 0.1 min")

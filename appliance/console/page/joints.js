@@ -1,6 +1,6 @@
 // Joints by the names that people use, in the reader's language. The box knows the parts of each skeleton
 // (appliance/pose/spoken_joints.py); a joint that it does not understand keeps the skeleton's own name.
-import { words } from "./words.js";
+import { hasWords, words } from "./words.js";
 
 const parts = new Map();
 
@@ -8,6 +8,9 @@ export function nameJoints({ joints, parts: spoken }) {
   parts.clear();
   joints.forEach((name, joint) => parts.set(name, spoken[joint]));
 }
+
+// What holds a joint: a sensor by its name, others by a word.
+export const sourceName = (source) => hasWords(`source_of_${source}`) ? words(`source_of_${source}`) : source;
 
 // left shoulder, right index finger 2
 export function jointName(name) {

@@ -4,6 +4,7 @@ import { showChoices } from "./choices.js";
 import { ask, withPin } from "./device.js";
 import { byId } from "./elements.js";
 import { twice } from "./hold.js";
+import { offer } from "./idle.js";
 import { sent } from "./update.js";
 import { clock, date, day as dayOf, number, translated, words } from "./words.js";
 
@@ -59,7 +60,7 @@ async function read() {
   byId("learn-show").replaceChildren(new Option(words("learn_new"), ""), ...offered);
   byId("learn-from").hidden = byId("learn-files").closest(".row").hidden = runs;
   byId("learn-begin").hidden = runs || !recordings.length;
-  byId("learn-begin").disabled = !chosen || studio !== "";
+  offer(byId("learn-begin"), translated(studio) || (chosen ? "" : words("learn_choose")));
   byId("learn-end").hidden = !runs;
   byId("learn-rehearsal").hidden = runs || !journal;
   byId("learn-dance").hidden = progress.state !== "learned" || !canDance;

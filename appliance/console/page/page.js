@@ -2,14 +2,15 @@
 import { readAbout, showClock } from "./about.js";
 import { Box } from "./box.js";
 import { pictureOfStyle, showChoices } from "./choices.js";
-import { goOn, showCues } from "./cues.js";
+import { goOn, showCues, showTime } from "./cues.js";
 import { Dance } from "./dance.js";
-import { command, initDevice, panic } from "./device.js";
+import { blackout, command, initDevice, panic } from "./device.js";
 import { byId, every, fact, first } from "./elements.js";
 import { initFleet } from "./fleet.js";
+import { offer } from "./idle.js";
 import { initHelp, readNight } from "./help.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
-import { jointName } from "./joints.js";
+import { jointName, sourceName } from "./joints.js";
 import { initLogs } from "./logs.js";
 import { initMidi, read as readMidi, showMidi } from "./midi.js";
 import { initPhones } from "./phones.js";
@@ -25,6 +26,7 @@ import { clock, hasWords, loadWords, locale, number, quoted, translated, words }
 
 const wide = matchMedia("(min-width: 900px)");
 const DAYS = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"]; // as the box says them
+const LONG = 75; // letters: more are four lines of a phone
 const STILL_PX = 14; // a thumb that scrolls moves farther between touch and release
 
 function show(page) {
@@ -76,7 +78,9 @@ function verdict() {
   if ("since" in said) said.since = clock(said.since);
   if ("rate" in said) said.rate = number(said.rate, 1);
   if (key === "fallbacks") said.message = beginning(value.fallbacks.find((one) => one.active) ?? said);
-  setText(byId("verdict"), words(`verdict_${key}`, said));
+  const sentence = words(`verdict_${key}`, said);
+  setText(byId("verdict"), sentence);
+  byId("verdict").classList.toggle("long", sentence.length > LONG);
 }
 
 // In the reader's language, and always by the name of the sensor, receiver, wire or disk that it is about. The box
@@ -109,15 +113,14 @@ function tonight(value) {
   const status = value.status;
   const worn = value.sensors.filter((one) => one.is_worn);
   const figures = [
-    ["show", status?.show || "–"],
+    ["show", status?.show],
     ["state", words(`state_${status?.state ?? "unknown"}`)],
-    ["cue_now", status?.cue || "–"],
-    ["phrase_now", status?.phrase || "–"],
-    ["sensors", worn.length ? words("n_of_m", { n: worn.filter((one) => one.heard).length, m: worn.length }) : "–"],
-    ["rate", status ? `${number(status.rate_hz, 1)} Hz` : "–"],
-    ["late_ticks", status ? number(status.late + status.skipped) : "–"],
-    ["temperature", status && status.temperature_c >= 0 ? `${number(status.temperature_c)} °C` : "–"],
-  ];
+    ["phrase_now", status?.phrase],
+    ["sensors", worn.length && words("n_of_m", { n: worn.filter((one) => one.heard).length, m: worn.length })],
+    ["rate", status && `${number(status.rate_hz, 1)} Hz`],
+    ["late_ticks", status && number(status.late + status.skipped)],
+    ["temperature", status?.temperature_c >= 0 && `${number(status.temperature_c)} °C`],
+  ].filter(([, said]) => said); // what is not known is left out
   if (value.remote?.state) figures.push(["timecode", `${value.remote.timecode || "–"} · ${words(`code_${value.remote.state}`)}`]);
   if (value.remote?.hours) figures.push(...house(value.remote.hours));
   const list = byId("figures");
@@ -129,8 +132,8 @@ function tonight(value) {
   const cards = value.cards.map((one) => one.name === "none" ? { ...one, label: words("card_none") } : one);
   showChoices(byId("overlays"), byId("overlays-part"), cards, (name) => command("/card", name));
   if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
-  byId("panic").setAttribute("aria-pressed", String(Boolean(status?.panic)));
-  byId("blackout").setAttribute("aria-pressed", String(Boolean(status?.blackout)));
+  const trouble = translated(value.trouble);
+  for (const id of ["stop", "resume"]) offer(byId(id), trouble);
   byId("stop").setAttribute("aria-pressed", String(status?.state === "stopped"));
   byId("resume").classList.toggle("wanted", ["stopped", "panic"].includes(status?.state ?? ""));
   const over = value.fallbacks.filter((one) => !one.active);
@@ -142,15 +145,28 @@ function tonight(value) {
   byId("fallbacks-now").replaceChildren(...active.map(fallbackItem));
 }
 
-// While nothing is wrong: what holds which joint, and how full its battery is.
-function handItem({ joint, source, holds }, sensors) {
-  const item = document.createElement("li"), name = document.createElement("b"), held = document.createElement("span");
+// BLACKOUT and PANIC say what a tap does now on this device, and in force how it ends.
+function safety() {
+  const { value } = box, status = value?.status, isKnown = document.body.dataset.known === "yes";
+  for (const act of ["blackout", "panic"]) {
+    const isOn = Boolean(status?.[act]), does = isOn ? `${act}_on` : isKnown ? `${act}_does` : "asks_pin";
+    byId(act).setAttribute("aria-pressed", String(isOn));
+    setText(byId(`${act}-does`), words(value && box.isSilent ? "no_link" : does));
+  }
+  byId("go").firstChild.dataset.pin = isKnown ? "" : ` · ${words("asks_pin")}`;
+}
+
+// While nothing is wrong: which joint is held by what, whether it is at this moment, and how full a battery is.
+function handItem({ joint, source, holds, is_held: isHeld }, sensors) {
+  const item = document.createElement("li"), what = document.createElement("b");
+  const [by, state] = ["span", "small"].map((tag) => document.createElement(tag));
   const battery = sensors.find((one) => one.name === source)?.battery ?? null;
-  item.dataset.holds = String(holds);
-  name.textContent = source;
-  held.textContent = jointName(joint);
-  held.title = joint;
-  item.append(held, name, battery === null ? "" : `${words("battery")} ${battery} %`);
+  item.dataset.hand = !holds ? "off" : isHeld ? "holds" : "waits";
+  what.textContent = jointName(joint);
+  what.title = joint;
+  by.textContent = sourceName(source);
+  state.textContent = [words(`hand_${item.dataset.hand}`), battery === null ? "" : `${battery} %`].filter(Boolean).join(" · ");
+  item.append(what, by, state);
   return item;
 }
 
@@ -196,7 +212,10 @@ const dance = new Dance(byId("stage"), byId("held"), box, words);
 const beside = new Dance(byId("tonight-stage"), byId("tonight-held"), box, words);
 wide.addEventListener("change", showFrames);
 initDevice(me, words);
-document.addEventListener("known", () => box.reopen());  // as a device with the PIN, which gives way to nobody
+document.addEventListener("known", () => {
+  safety();
+  box.reopen(); // as a device with the PIN, which gives way to nobody
+});
 initPhones();
 initPicture();
 initHappened();
@@ -212,6 +231,7 @@ initUpdate();
 initRehearsal(me, box);
 for (const button of every("nav button")) button.addEventListener("click", () => show(button.dataset.page));
 for (const id of ["show-dance", "show-ghost"]) byId(id).addEventListener("change", () => show("dance"));
+byId("show-dance").addEventListener("change", (event) => offer(byId("show-ghost").parentElement, event.target.checked ? "" : words("dance_off")));
 addEventListener("hashchange", () => show(location.hash.slice(1)));
 for (const button of every("#views button")) {
   const [yaw, pitch] = button.dataset.view.split(" ").map(Number);
@@ -226,7 +246,7 @@ document.addEventListener("keydown", (event) => { // as in other programs for cu
   if (!event.repeat) goOn();
 });
 press(byId("panic"), panic);
-press(byId("blackout"), () => command("/blackout", box.value?.status?.blackout ? 0 : 1));
+press(byId("blackout"), () => blackout(box.value?.status?.blackout ? 0 : 1));
 byId("master").addEventListener("input", () => master(null));
 byId("master").addEventListener("change", () => {
   command("/master", Number(byId("master").value) / 100, 0.3);
@@ -248,5 +268,7 @@ box.addEventListener("value", () => {
 });
 box.addEventListener("value", verdict);
 box.addEventListener("beat", verdict);
+for (const one of ["value", "beat"]) box.addEventListener(one, safety);
+box.addEventListener("beat", () => showTime());
 show(location.hash.slice(1) || "tonight");
 verdict();

@@ -15,7 +15,7 @@ import { hasWords, number, translated, words } from "./words.js";
 
 const PHRASE_FADE_S = 1, LIVELINESS_FADE_S = 1, KEEPING_MS = 430_000;
 const SEEDS = 1_000_000; // six digits are easily noted down
-let figure = null;
+let figure = null, chosen = "phrase";
 
 export function initRehearsal(me, box) {
   first('[data-page="rehearsal"]').hidden = !me.rehearsal;
@@ -33,11 +33,16 @@ export function initRehearsal(me, box) {
     byId("liveliness").blur();
   });
   byId("seed-new").addEventListener("click", () => command("/seed", Math.floor(Math.random() * SEEDS)));
-  byId("rehearsal-parts").append(...[...headings()].map((heading) => {
+  byId("rehearsal-parts").append(...[...parts()].map(({ dataset: { part } }) => {
     const button = document.createElement("button");
     button.type = "button";
-    button.textContent = heading.textContent;
-    button.addEventListener("click", () => heading.scrollIntoView());
+    button.dataset.opens = part;
+    button.textContent = words(`part_${part}`);
+    button.addEventListener("click", () => {
+      chosen = part;
+      showParts();
+      button.scrollIntoView({ block: "nearest", inline: "center" });
+    });
     return button;
   }));
   figure = new Figure(byId("figure"), byId("figure-said"), box, words);
@@ -81,11 +86,17 @@ export function showRehearsal(value, show) {
   showParts();
 }
 
-const headings = () => every("#rehearsal h2");
+const parts = () => every("#rehearsal [data-part]");
 
-// A way to each part that is shown.
+// One part at a time, so that the figure stays in view: of those that this show has.
 function showParts() {
-  headings().forEach((heading, place) => { byId("rehearsal-parts").children[place].hidden = heading.parentElement.hidden; });
+  const there = [...parts()].filter((part) => [...part.children].some((one) => !(/** @type {HTMLElement} */ (one).hidden)));
+  const open = there.find((part) => part.dataset.part === chosen) ?? there[0];
+  for (const part of parts()) part.hidden = part !== open;
+  for (const button of every("#rehearsal-parts button")) {
+    button.hidden = !there.some((part) => part.dataset.part === button.dataset.opens);
+    button.setAttribute("aria-pressed", String(button.dataset.opens === open?.dataset.part));
+  }
 }
 
 // The settings of now become a cue in a copy of the show; what dances stays as it is.

@@ -38,11 +38,11 @@ export function showSensorChanges(value, show) {
 function open(what, sensor) {
   [act, name] = [what, sensor];
   byId("change-title").textContent = what === "pair" ? words("pair") : `${words(what === "revoke" ? "sensor_revoke" : what)}: ${sensor}`;
-  byId("change-how").textContent = words(`${what}_how`);
   for (const part of ["name", "spare", "port", "network", "password"]) byId(`change-${part}-part`).hidden = true;
   const parts = { rename: ["name"], replace: ["spare"], revoke: [], pair: ["name", "port", "network", "password"] }[what];
   for (const part of parts) byId(`change-${part}-part`).hidden = false;
   byId("change-spare").replaceChildren(...spares(sensor));
+  byId("change-how").textContent = words(what === "replace" && !byId("change-spare").length ? "no_spare" : `${what}_how`);
   byId("change-name").value = what === "rename" ? sensor : "";
   byId("change-password").value = "";
   byId("change-steps").replaceChildren();

@@ -1,9 +1,10 @@
 // One row for each sensor. It stays the same element, so that a press on it is never lost.
 import { command } from "./device.js";
-import { fact } from "./elements.js";
+import { offer } from "./idle.js";
+import { byId, fact } from "./elements.js";
 import { jointName } from "./joints.js";
 import { changeButton } from "./sensor_changes.js";
-import { hasWords, number, translated } from "./words.js";
+import { duration, hasWords, number, translated } from "./words.js";
 
 const FRESH_S = 0.1;
 const cards = new Map();
@@ -24,7 +25,9 @@ export function showSensors(parent, value, words) {
     const joints = value.hands.filter((one) => one.source === sensor.name).map((one) => one.joint);
     fill(cards.get(sensor.name), sensor, joints, words);
   }
-  parent.title = names.length ? "" : words("no_sensors");
+  const areHeard = value.sensors.some((one) => one.is_worn && one.heard);
+  for (const id of ["neutral-all", "heading-all"]) offer(byId(id), areHeard ? "" : words("sensors_silent"));
+  setText(byId("sensors-none"), names.length ? "" : words("no_sensors"));
 }
 
 // A row: name, joint, state, and what goes bad in the night; its buttons. A press on the row opens the rest.
@@ -52,7 +55,7 @@ function made(name, words) {
   head.append(title, joint, state, brief);
   more.append(head, last, facts, rare);
   root.append(more, complaint, row);
-  return { root, joint, state, brief, facts, complaint };
+  return { root, joint, state, brief, facts, complaint, acts: [...row.querySelectorAll("button:not(.changes)")] };
 }
 
 function fill(card, sensor, joints, words) {
@@ -66,28 +69,26 @@ function fill(card, sensor, joints, words) {
   card.complaint.textContent = translated(sensor.complaint);
   const grades = ["system", "gyro", "accel", "mag"].map((_, place) => (sensor.calibration >> (6 - 2 * place)) & 3);
   const left = sensor.heard && sensor.battery_left_s >= 0 ? words("battery_left", { time: duration(sensor.battery_left_s) }) : "";
-  const age = sensor.age_s < 0 ? "–" : sensor.age_s < FRESH_S ? `< ${number(FRESH_S, 1)} s` : duration(sensor.age_s);
+  const silent = sensor.heard ? "" : words("sensor_silent", { name: sensor.name });
+  for (const button of card.acts) offer(button, silent);
   fillList(card.brief, [
-    ["battery", sensor.battery === null ? words("unknown_value") : `${sensor.battery} %${left}`],
-    ["reading_age", age],
-    ["signal", sensor.flags >> 4 ? `${4 * (sensor.flags >> 4) - 90} dBm` : words("unknown_value")], // docs/wire.md
+    ["battery", sensor.battery !== null && `${sensor.battery} %${left}`],
+    ["reading_age", sensor.age_s >= 0 && (sensor.age_s < FRESH_S ? `< ${number(FRESH_S, 1)} s` : duration(sensor.age_s))],
+    ["signal", sensor.flags >> 4 && `${4 * (sensor.flags >> 4) - 90} dBm`], // docs/wire.md
   ], words);
   fillList(card.facts, [
-    ["rate", sensor.heard ? `${number(sensor.rate_hz, 1)} Hz` : "–"],
-    ["loss", sensor.heard ? `${number(100 * sensor.loss, 1)} %` : "–"],
-    ["round_trip", sensor.heard && sensor.round_trip_s >= 0 ? `${number(1000 * sensor.round_trip_s, 1)} ms` : "–"],
-    ["calibration", words("of_three", { gyro: grades[1], accel: grades[2] })],
+    ["rate", sensor.heard && `${number(sensor.rate_hz, 1)} Hz`],
+    ["loss", sensor.heard && `${number(100 * sensor.loss, 1)} %`],
+    ["round_trip", sensor.heard && sensor.round_trip_s >= 0 && `${number(1000 * sensor.round_trip_s, 1)} ms`],
+    ["calibration", (sensor.heard || sensor.calibration > 0) && words("of_three", { gyro: grades[1], accel: grades[2] })],
     ["neutral_pose", hasWords(`neutral_${sensor.neutral}`) ? words(`neutral_${sensor.neutral}`) : sensor.neutral || words("not_worn")],
-    ["heading_corrected", sensor.is_worn ? `${number(sensor.corrected, 0)}°` : "–"],
-    ["way", sensor.way || "–"],
-    ["firmware", sensor.firmware || "–"],
+    ["heading_corrected", sensor.is_worn && `${number(sensor.corrected, 0)}°`],
+    ["way", sensor.way],
+    ["firmware", sensor.firmware],
   ], words);
 }
 
-const fillList = (list, facts, words) => list.replaceChildren(...facts.map(([key, said]) => fact(words(key), said)));
+// What is not known is left out.
+const fillList = (list, facts, words) => list.replaceChildren(...facts.filter(([, said]) => said).map(([key, said]) => fact(words(key), said)));
 
-function duration(seconds) {
-  if (seconds < 9) return `${number(seconds, 1)} s`;
-  if (seconds < 90) return `${Math.round(seconds)} s`;
-  return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${number(seconds / 3600, 1)} h`;
-}
+const setText = (element, text) => { if (element.textContent !== text) element.textContent = text; };
