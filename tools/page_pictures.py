@@ -36,6 +36,17 @@ _FADED_MS, _PROVEN_WITHIN_MS, _DRAWN_WITHIN_MS = 4_000, 120_000, 120_000
 _EVENING = 1_767_816_900.0  # 20:15 of an evening
 _INSTALLED = {"host": "bunraku", "box_file": "/etc/bunraku/box.yaml", "addresses": [["eth0", "192.168.0.10"]]}
 _DANCED_S = 45 * 60.0  # the show has danced this long
+_BINS = 240
+_JOURNAL = (  # second, kind, words
+    (4.0, "said", "Sensor left-wrist: neutral pose taken. Dance."),
+    (8.0, "order", "look plaster"),
+    (610.0, "order", "look lines"),
+    (1290.0, "said", "Sensor left-wrist silent for 0.5 s. The dancer moves freely. Check its battery."),
+    (1312.0, "said", "Sensor left-wrist is back. It takes its joint again."),
+    (1745.0, "order", "look ink"),
+    (2480.0, "order", "master 0.8 3.0"),
+    (2512.0, "order", "look veil"),
+)
 _LINKED_S = 15.0  # the emulated sensor is on, its neutral pose taken, and no fallback of the start in force
 
 
@@ -82,15 +93,17 @@ def _calm(tab: Page, now: float) -> None:
 
 
 def _calm_run(run: dict[str, Any], now: float) -> dict[str, Any]:
-    """A run of the journal in which no tick was late."""
-    none = [0 for _ in run["late"]]
-    slowest = [round(3.0 + place % 3 * 0.4, 1) for place in range(len(none))]
-    events = [one for one in run["events"] if one[1] == "order"]
-    return run | {
-        **dict.fromkeys(("late", "skipped", "failed"), none),
+    """A run of the journal as an evening leaves it: looks, a silent sensor, a fault at its start."""
+    counts: dict[str, list[int]] = {name: [0] * _BINS for name in ("late", "skipped", "failed")}
+    slowest = [round(3.0 + place % 3 * 0.4, 1) for place in range(_BINS)]
+    counts["late"][0], slowest[0] = 2, 26.0
+    return {
+        **(run | counts),
         "slowest_ms": slowest,
-        "events": events,
-        "begun": now - run["seconds"],
+        "bin_s": _DANCED_S / _BINS,
+        "seconds": _DANCED_S,
+        "events": [list(one) for one in _JOURNAL],
+        "begun": now - _DANCED_S,
     }
 
 
