@@ -115,7 +115,7 @@ def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> Non
     assert tab.evaluate("document.querySelector('#timeline').width") > 200
     expect(tab.locator("#happened-kinds button")).to_have_count(4)
     entries = tab.locator("#happened-events details").first
-    expect(entries.locator("li").first).to_contain_text(re.compile(r"\d\d:\d\d:\d\d(message|command)."))
+    expect(entries.locator("li").first).to_contain_text(re.compile(r"\d\d:\d\d:\d\d(message|command|fault)."))
     at = tab.locator("#happened-second")
     tab.locator("#timeline").click(position={"x": 52, "y": 40})  # where its axis begins
     expect(at).to_have_value("0")

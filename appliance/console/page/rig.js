@@ -7,7 +7,7 @@ import { words } from "./words.js";
 const LOOK_MS = 200, WIDE_PX = 640;
 const LONGEST_M = 12, MARGIN_M = 1.2, STAGE_M = 2;
 const VIEWS = [["rig_front", 1, 1], ["rig_above", 2, -1]]; // words; the axis upwards, and its sense
-const SLICES = 10, THROW = [0, 0.1, 0.25, 0.5, 0.75, 1]; // of a beam, across and along
+const SLICES = 10, THROW = [0, 0.1, 0.25, 0.5, 0.75, 1]; // how finely a beam is drawn across and along
 const STEEPEST = 1.5; // radians: a beam's far edge that never meets the floor
 const INK = { floor: "#3d434b", quiet: "#b3b7bd", lamp: "#f3ece0", dark: "#22262b" };
 let beams = [], isLit = false, isAsking = false;
