@@ -24,7 +24,7 @@ from appliance.show.look import STYLES, CameraConfig, LookConfig
 
 SIZE = 864, 486
 ADDRESS = "https://192.168.0.12:8443"
-HELD, COLOURS = "lShldr", 256
+HELD = "lShldr"
 UPRIGHT, TOGETHER_S = (320, 400), 49.6  # for the four looks side by side
 STROKES_S, STROKES_STEP_S, SMALL = 30.0, 0.2, (192, 108)  # the dance whose strokes ink's paper has kept
 SHOW = default_show_path()
@@ -58,7 +58,7 @@ PICTURES = {  # what each picture is called: the look, and the moment of the phr
     "veil": (LookConfig(name="veil", style="veil"), 17.4),
     "strings": (LookConfig(name="strings", style="strings"), 17.4),
     "chalk": (CHALK, 17.4),
-    "above": (LookConfig(name="above", camera=CameraConfig(elevation_deg=50, figure=0.85)), 17.4),
+    "above": (LookConfig(name="above", camera=CameraConfig(elevation_deg=50, figure=0.85)), 49.6),
 }
 
 
@@ -92,8 +92,7 @@ def draw_looks(folder: Path) -> list[Path]:
         paths.append(folder / "looks.png")
         Files.fromarray(_side_by_side(ctx, recording)).save(paths[-1], optimize=True)
         paths.append(folder / "looks-held.png")
-        held = Files.fromarray(_side_by_side(ctx, recording, holds))
-        held.quantize(COLOURS, method=Files.Quantize.MAXCOVERAGE, kmeans=2).save(paths[-1], optimize=True)
+        Files.fromarray(_side_by_side(ctx, recording, holds)).save(paths[-1], optimize=True)
     return paths
 
 
@@ -141,7 +140,7 @@ def _body(ctx: moderngl.Context, recording: Recording) -> Image:
 
 def _melt(ctx: moderngl.Context, recording: Recording) -> Image:
     """From human to amorphous, in steps beside each other."""
-    looks = {str(melt): LookConfig(name=str(melt), vignette=0.2, melt=melt) for melt in (0.0, 0.35, 0.7, 1.0)}
+    looks = {str(melt): LookConfig(name=str(melt), melt=melt) for melt in (0.0, 0.35, 0.7, 1.0)}
     renderer = Renderer(ctx, recording.skeleton, looks)
     size = UPRIGHT[0] * FINER, UPRIGHT[1] * FINER
     moment = moment_of(recording, PICTURES["plaster"][1])
@@ -153,9 +152,7 @@ def _melt(ctx: moderngl.Context, recording: Recording) -> Image:
 def _side_by_side(ctx: moderngl.Context, recording: Recording, holds: Floats | None = None) -> Image:
     """Four looks of one instant, upright, beside each other; holds: (J,) how firmly joints are held."""
     size = UPRIGHT[0] * FINER, UPRIGHT[1] * FINER
-    looks: dict[str, LookConfig] = {
-        style: LookConfig(name=style, style=style, vignette=0.2) for style in STYLES[:4]
-    }
+    looks: dict[str, LookConfig] = {style: LookConfig(name=style, style=style) for style in STYLES[:4]}
     renderer = Renderer(ctx, recording.skeleton, looks)
     moment = moment_of(recording, TOGETHER_S, holds)
     pictures = [shrink(draw_still(ctx, renderer, moment, style, size)) for style in looks]

@@ -44,7 +44,12 @@ def draw_still(
 
 
 def shrink(image: Image) -> Image:
-    """Shrink an image drawn FINER times too large: each pixel is the mean of those in its place."""
+    """Shrink an image drawn FINER times too large: each pixel is the mean of those in its place.
+
+    It is dithered again, because rounded means are bands where light fades; black stays black.
+    """
     height, width = image.shape[0] // FINER, image.shape[1] // FINER
-    fine = image.reshape(height, FINER, width, FINER, 3)
-    return np.asarray(fine.mean(axis=(1, 3)).round(), np.uint8)
+    fine = image.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
+    across, up = np.arange(width), np.arange(height)[:, None]
+    grain = 52.9829189 * ((0.06711056 * across + 0.00583715 * up) % 1.0) % 1.0 - 0.5  # tone.glsl's
+    return np.asarray(np.clip((fine + 0.999 * grain[..., None]).round(), 0, 255), np.uint8)

@@ -15,7 +15,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.picture import scene
 from appliance.projector.picture.renderer import Renderer
-from appliance.projector.still import draw_still, moment_of
+from appliance.projector.still import draw_still, moment_of, shrink
 from appliance.show.look import STYLES, LookConfig, looks_by_name
 from tests.projector.golden_looks import AT_S, FOLDER, MEAN_LIMIT, P99_LIMIT, SIZE, difference, renderer
 from tests.projector.gpu_cost import GpuCost
@@ -91,6 +91,29 @@ def test_edge_is_true_black_and_the_figure_inside(
         rim = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])
         assert not rim.any(), style
         assert picture.max() > 100, style
+
+
+@pytest.mark.parametrize("style", ("plaster", "cloud", "veil", "strings"))
+def test_no_frame_can_be_seen_on_a_wall(style: str, dance: Recording, gl: moderngl.Context) -> None:
+    """Light falls off around the middle: there is next to none near an ellipse that touches all four edges.
+
+    Where it only fades along the edges, the corners of the frame are as bright as its inside.
+    """
+    looks = {"x": LookConfig(name="x", style=style, fog=1.0, trail_s=0.0)}
+    with renderer(gl, dance.skeleton, looks) as made:
+        picture = draw_still(gl, made, moment_of(dance, AT_S), "x", SIZE).max(axis=2).astype(float)
+    across, up = (2.0 * (np.arange(size) + 0.5) / size - 1.0 for size in SIZE)
+    away = np.hypot(across[None], up[:, None])
+    inside, outside = picture[(away > 0.45) & (away < 0.6)], picture[(away > 0.95) & (away < 1.05)]
+    assert outside.mean() < 0.1 * inside.mean() and outside.max() < 24
+
+
+def test_a_shrunk_still_has_no_bands() -> None:
+    """Its means lie between two steps of light, and black stays black."""
+    fine = np.full((64, 64, 3), 10, np.uint8)
+    fine[::2, ::2] = 11
+    assert abs(shrink(fine).mean() - 10.25) < 0.05
+    assert not shrink(np.zeros_like(fine)).any()
 
 
 def test_cross_fade_mixes_the_two_pictures(

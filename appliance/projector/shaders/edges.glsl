@@ -8,6 +8,11 @@ float edge(vec2 uv, float aspect) {
     return near.x * near.y;
 }
 
+// Light in the air falls off around the picture's middle, long before it ends: else it shows the picture's frame.
+float fall(vec2 uv) {
+    return 1.0 - smoothstep(0.70 - 0.45 * vignette, 1.05, length(2.0 * uv - 1.0));
+}
+
 // Air that is nearly black is black where the wall shows it as grey.
 uniform float toe;
 

@@ -24,8 +24,8 @@ float head_ink(vec3 at, vec3 n, float body) {
     float strand = smoothstep(0.34, 0.52, bristle);
     if (is_light) {
         float mouth = stroke(vec2(side, at.y), vec2(0.0, -0.043), vec2(0.013, -0.0415), vec2(0.0050, 0.0020));
-        float left_out = max(0.9 * under, front * max(max(0.75 * brow, 0.6 * lid), 0.7 * mouth));
-        return mix(max(body, 0.16 + 0.34 * (1.0 - shade)), body * (0.15 + 0.6 * strand), hair) * (1.0 - left_out);
+        float left_out = max(0.9 * under, front * max(max(0.45 * brow, 0.30 * lid), 0.6 * mouth));
+        return mix(max(body, 0.30 + 0.30 * (1.0 - shade)), body * (0.15 + 0.6 * strand), hair) * (1.0 - left_out);
     }
     float drawn = max(0.70 * shade * (1.0 - 0.7 * nose), front * max(0.85 * brow, 0.40 * lid));
     drawn = max(drawn, max(under, hair * max(mix(0.78, 1.0, strand), 0.25 + shade)));

@@ -75,7 +75,8 @@ void main() {
         on_floor = exp(-dot(off, off) * 2.4);
     }
     vec3 light = reflected + glow * (1.6 * near * near + 2.6 * far * far);
-    light += fog * haze * (air_colour * (1.5 * on_floor + 0.9 * exp(-7.0 * dot(off_heart, off_heart))) + 0.22 * far * far);
+    float lit = fall(uv);
+    light += fog * haze * (lit * lit * air_colour * (1.5 * on_floor + 0.9 * exp(-7.0 * dot(off_heart, off_heart))) + 0.22 * far * far);
     float speck = texelFetch(noise, ivec2(gl_FragCoord.xy) & 255, 0).a;
     colour = vec4(deep(toned(exposure * light), speck), edge(uv, aspect));
 }

@@ -6,7 +6,8 @@ uniform sampler2D contact;
 uniform vec2 contact_middle;
 uniform sampler2D noise;
 uniform vec3 eye;
-uniform vec2 ground;
+uniform vec2 pool_at;
+uniform vec3 lamp;
 uniform vec2 middle;
 uniform float reach;
 uniform float spread;
@@ -28,8 +29,9 @@ out vec4 colour;
 vec3 floor_light() {
     if (ray.y > -1e-3) return vec3(0.0);
     vec3 at = eye - ray * (eye.y / ray.y);
-    vec2 off = (at.xz - ground) / spread;
-    float far = length(off), pool = 1.25 * (1.0 - smoothstep(0.22, 0.92, far)) + 0.12 * exp(-2.5 * far * far);
+    vec2 off = (at.xz - pool_at) / spread, away = normalize(lamp.xz);
+    off -= 0.45 * dot(off, away) * away;  // the lamp's cone on the floor is longer than wide
+    float far = length(off), pool = 1.25 * (1.0 - smoothstep(0.12, 0.68, far)) + 0.12 * exp(-2.5 * far * far);
     vec2 on_cast = (at.xz - middle) / reach;
     vec3 bands = texture(floor_shadow, 0.5 + 0.5 * on_cast).rgb;
     float inside = 1.0 - smoothstep(0.75, 1.0, max(abs(on_cast.x), abs(on_cast.y)));
@@ -53,7 +55,8 @@ float beam() {
 }
 
 void main() {
-    vec3 light = floor_light() + fog * light_colour * air_colour * 0.42 * beam();
+    float lit = fall(uv);
+    vec3 light = lit * (floor_light() + lit * fog * light_colour * air_colour * 0.42 * beam());
     float speck = texelFetch(noise, ivec2(gl_FragCoord.xy) & 255, 0).a;
     colour = vec4(deep(toned(exposure * light), speck), edge(uv, aspect));
 }

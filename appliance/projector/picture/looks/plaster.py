@@ -14,6 +14,7 @@ from appliance.show.look import LookConfig
 
 KEY_FROM, KEY_ABOVE = -1.35, 44.0  # radians beside the camera, degrees above the floor
 RIM_FROM, RIM_ABOVE = 2.25, 24.0
+AIMED = 0.22  # figure heights above the floor: where the lamp's beam crosses the dancer
 BEAM, BEAM_WIDTH = 2.4, 0.42  # figure heights from the pool of light to the lamp, and across the pool
 AIR_LINES = 180  # lines of the picture of the empty stage, which is soft everywhere
 
@@ -60,8 +61,9 @@ class Plaster:
             picture.finish()
 
         exposed = easel.expose(picture, scene.shutter(wall), draw)
-        pool = np.array([view.ground[0], 0.0, view.ground[1]])
+        pool = np.array([view.ground[0], 0.0, view.ground[1]]) - AIMED * lamp * [1.0, 0.0, 1.0] / lamp[1]
         inputs |= {
+            "pool_at": pool[[0, 2]],
             "beam_from": view.on_picture(pool + BEAM * lamp),
             "beam_to": view.on_picture(pool),
             "beam_width": scene.spread * BEAM_WIDTH * scene.share_of_picture,
