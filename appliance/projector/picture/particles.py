@@ -11,6 +11,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.projector.picture.body_buffers import BodyBuffers, merged
 
 FINEST = 2.6  # how much smaller grains are, and closer, where the surface has details
+OUT = 0.8  # share of the way from the root to the end of a limb beyond which points leave trails
 Parts = dict[
     str, Any
 ]  # (P, ..): places in figure heights, rest pose; normals, and sizes; four chances 0 to 1; what moves them
@@ -42,7 +43,9 @@ def particles_of(body: BodyBuffers, count: int) -> Parts:
 
 
 def traced(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array, count: int) -> Parts:
-    """`count` points that leave trails, most of them far out along the limbs: hands, feet and head.
+    """`count` points that leave trails, at the ends of limbs: hands, feet and head.
+
+    One on a shin would draw a dash across the leg.
 
     bind_positions (J, 3): the joints in the rest pose, figure heights.
     """
@@ -50,10 +53,15 @@ def traced(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array, count: 
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0:
             reach[joint] = reach[parent] + np.linalg.norm(bind_positions[joint] - bind_positions[parent])
+    ends = reach.copy()  # the same of where its limb ends
+    for joint in reversed(range(1, len(skeleton))):
+        ends[skeleton.parents[joint]] = max(ends[skeleton.parents[joint]], ends[joint])
+    share = reach / np.maximum(ends, 1e-9)
     candidates, _ = merged(body.positions, body.faces, 0.02)
-    out = np.sum(reach[body.joints[candidates]] * body.weights[candidates], axis=1)
-    has_limbs = out.max() > 0.0  # a skeleton of one joint has none
-    likely = np.clip(out / out.max() - 0.35, 0.0, None) ** 2 if has_limbs else np.ones(len(out))
+    out = np.sum(share[body.joints[candidates]] * body.weights[candidates], axis=1)
+    likely = np.clip(out - OUT, 0.0, None) ** 2
+    if not likely.any():  # a skeleton of one joint has no limbs
+        likely[:] = 1.0
     random = np.random.RandomState(11)
     count = min(count, int(np.count_nonzero(likely)))
     chosen = random.choice(candidates, count, replace=False, p=likely / likely.sum())

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.picture.body_buffers import BodyBuffers, merged
@@ -15,8 +16,10 @@ STEP = 0.02  # figure heights from one point of a strand to the next
 POINTS = 28  # steps of a strand
 OFF = 0.018  # figure heights from the nearest vertex: a strand that is further off has run past a tip
 TAPER = 7  # steps in which a strand ends
-SPACING = 0.048  # figure heights between where strands start
+SPACING, ON_HEAD = 0.048, 0.034  # figure heights between where strands start: with fewer a head is open
 TURN = 0.35  # how far a strand turns around its limb, per length that it runs along it
+# Where a limb's way is steeper than POLE to the skin, strands turn around its end: the whorl of the crown.
+POLE, WHORL = 0.95, 1.5
 
 Floats = NDArray[np.float32]
 
@@ -33,10 +36,15 @@ def ribbons_of(
     places, normals = body.positions[first], body.normals[first]
     along = along_limbs(skeleton, bind_positions)
     ways = np.einsum("vk,vkc->vc", body.weights[first], along[body.joints[first]])
-    ways += TURN * np.cross(normals, ways)
     ways -= normals * np.sum(ways * normals, axis=1, keepdims=True)
+    beside = np.linalg.norm(ways, axis=1, keepdims=True)
+    ways += (TURN + WHORL * np.clip(1.0 - beside / POLE, 0.0, 1.0)) * np.cross(normals, ways)
     ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-6)
-    starts, _ = merged(body.positions, body.faces, SPACING)
+    starts, close = (merged(body.positions, body.faces, spacing)[0] for spacing in (SPACING, ON_HEAD))
+    head = [
+        joint for joint in range(len(skeleton)) if Anatomy(skeleton).part_of(joint) == Anatomy(skeleton).head
+    ]
+    starts = np.union1d(starts, close[np.isin(body.joints[close, 0], head)])
     starts = np.random.RandomState(5).permutation(starts)
     run = [(body.positions[starts], _nearest(places, body.positions[starts]))]
     backwards = _walk(run[0], -ways[run[0][1]], places, normals, ways)

@@ -10,7 +10,7 @@ out vec4 colour;
 
 void main() {
     float profile = max(exp(-3.5 * across * across) - 0.03, 0.0);
-    float fading = (1.0 - age) * (1.0 - age);
+    float fading = (1.0 - age) * (1.0 - age) * smoothstep(0.0, 0.06, age);  // else it begins with a blunt end
     float fast = smoothstep(0.25, 2.2, speed);
     vec3 light = mix(old_colour, fresh_colour, fading * fading);
     colour = vec4(brightness * (0.35 + 0.65 * chance) * profile * fading * fast * light, 1.0);
