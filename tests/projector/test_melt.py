@@ -12,6 +12,7 @@ from appliance.body.bake import sunk
 from appliance.body.body_mesh import body_mesh
 from appliance.body.rest_pose import anatomy_of
 from appliance.pose.recording import Recording
+from appliance.projector.picture import drawing
 from appliance.projector.picture.drawing import source
 from appliance.projector.picture.melting import BONES, Melting
 from appliance.projector.picture.poses import poses_of
@@ -99,6 +100,22 @@ def test_no_part_of_it_is_cut_off(
         monkeypatch.setattr(Scene, "box", lambda *_args, **_keys: WHOLE)
         for before, moment in zip(cut, moments, strict=True):
             assert np.abs(before.astype(int) - draw_still(gl, made, moment, "x", SIZE)).max() <= 2
+
+
+@pytest.mark.parametrize("style", ("plaster", "ink"))
+def test_a_molten_figure_has_fewer_triangles_and_looks_the_same(
+    style: str, dance: Recording, gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From where all of it is on the smooth surface; its details would only cost time."""
+    with renderer(gl, dance.skeleton, {"x": melted(style, drawing.MOLTEN)}) as made:
+        seen, triangles = [], []
+        for begins in (9.0, drawing.MOLTEN):
+            monkeypatch.setattr(drawing, "MOLTEN", begins)
+            with gl.query(primitives=True) as counted:
+                seen.append(draw_still(gl, made, moment_of(dance, AT_S), "x", SIZE))
+            triangles.append(counted.primitives)
+    assert triangles[1] < 0.75 * triangles[0]
+    assert difference(*seen)[0] < 0.5 * MEAN_LIMIT
 
 
 def test_its_surface_swims_while_the_dancer_stands_still(dance: Recording, gl: moderngl.Context) -> None:

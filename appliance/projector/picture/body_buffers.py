@@ -1,4 +1,4 @@
-"""The body's surface on the GPU: fine for the eye, coarse for shadows."""
+"""The body's surface on the GPU: fine for the eye, coarse for shadows, in between for a molten figure."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ from appliance.body.bake import bake, cells
 from appliance.body.skinning import BodyMesh
 from appliance.projector.picture.vertices import layout, packed
 
-COARSE = 0.02  # share of the figure's height: vertices closer than this are merged for shadows
+# Shares of the figure's height: vertices closer than this are merged for shadows, and for a molten figure.
+COARSE, MOLTEN = 0.02, 0.007
 
 Floats = NDArray[np.float32]
+Content = tuple[list[tuple[Any, ...]], moderngl.Buffer]
 PARTS = ("position", "normal", "sunk", "calm", "joints", "weights")
 
 
 class BodyBuffers:
-    """The surface in figure heights, rest pose; content(coarse) is what a vertex array is made of.
+    """The surface in figure heights, rest pose; content and molten are what vertex arrays are made of.
 
     positions, normals: (V, 3); joints, weights: (V, 4); faces: (F, 3). Light, molten details and the drawing
     order are the show's; they are computed here, in a third of a second, where it has no surface.
     """
 
-    def __init__(self, ctx: moderngl.Context, mesh: BodyMesh) -> None:
+    def __init__(self, ctx: moderngl.Context, mesh: BodyMesh, melts: bool = False) -> None:
         self.positions = (mesh.vertices / mesh.height).astype(np.float32)
         self.normals, self.joints, self.weights = mesh.normals, mesh.joints, mesh.weights
         self.faces = mesh.faces
@@ -38,14 +40,20 @@ class BodyBuffers:
         drawn = mesh.faces[baked.order]
         self._fine = _uploaded(ctx, parts, np.arange(len(self.positions)), drawn)
         self._coarse = _uploaded(ctx, parts, *merged(self.positions, drawn, COARSE))
+        self._molten = _uploaded(ctx, parts, *merged(self.positions, drawn, MOLTEN)) if melts else ()
 
-    def content(self, coarse: bool) -> tuple[list[tuple[Any, ...]], moderngl.Buffer]:
+    def content(self, coarse: bool) -> Content:
         """The vertices with their layout, and the indices."""
         vertices, indices = self._coarse if coarse else self._fine
         return [(vertices, *self._layout)], indices
 
+    @property
+    def molten(self) -> Content | None:
+        """The same for a figure whose details have melted, in a show where some look melts."""
+        return ([(self._molten[0], *self._layout)], self._molten[1]) if self._molten else None
+
     def release(self) -> None:
-        for buffer in (*self._fine, *self._coarse):
+        for buffer in (*self._fine, *self._coarse, *self._molten):
             buffer.release()
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
+MOLTEN = 0.55  # `melt` from which on all of a body is on its molten surface, as melt.glsl says
 _SHADERS = Path(__file__).parents[1] / "shaders"
 _HEAD = "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
 _SAMPLER_2D = 0x8B5E  # OpenGL's name for the type of a texture in a shader
@@ -18,8 +19,8 @@ class Drawing:
     """One shader program and the vertices that it draws.
 
     vertex and fragment name files in the shaders' folder, without .vert.glsl and .frag.glsl; content and
-    index are a vertex array's; parts are switched on in both. Without content it draws the three corners of a
-    triangle over the picture.
+    index are a vertex array's, molten those that take their place where a figure has melted; parts are
+    switched on in both. Without content it draws the three corners of a triangle over the picture.
     """
 
     def __init__(
@@ -30,6 +31,7 @@ class Drawing:
         content: Iterable[tuple[Any, ...]] = (),
         index: moderngl.Buffer | None = None,
         parts: Sequence[str] = (),
+        molten: tuple[Iterable[tuple[Any, ...]], moderngl.Buffer] | None = None,
     ) -> None:
         content = list(content)
         self._count = index.size // 4 if index else 3
@@ -38,6 +40,10 @@ class Drawing:
             vertex_shader=head + source(f"{vertex}.vert"), fragment_shader=head + source(f"{fragment}.frag")
         )
         self._array = ctx.vertex_array(self._program, content, index, skip_errors=True)
+        self._molten = self._array, self._count
+        if molten is not None:
+            array = ctx.vertex_array(self._program, list(molten[0]), molten[1], skip_errors=True)
+            self._molten = array, molten[1].size // 4
         members = {name: self._program[name] for name in self._program}
         self._uniforms = {
             name: member for name, member in members.items() if isinstance(member, moderngl.Uniform)
@@ -59,7 +65,8 @@ class Drawing:
         for unit, name in enumerate(self._textures):
             inputs[name].use(unit)
         self._send(inputs)
-        self._array.render(mode, vertices or self._count, instances=instances)
+        array, count = self._molten if inputs.get("melt", 0.0) >= MOLTEN else (self._array, self._count)
+        array.render(mode, vertices or count, instances=instances)
 
     def _send(self, inputs: dict[str, Any]) -> None:
         """The uniforms that have changed."""
@@ -73,6 +80,8 @@ class Drawing:
             self._sent[name] = value
 
     def release(self) -> None:
+        if self._molten[0] is not self._array:
+            self._molten[0].release()
         self._array.release()
         self._program.release()
 

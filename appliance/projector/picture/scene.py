@@ -21,7 +21,7 @@ from appliance.outputs.coupling import coupled, led_by
 from appliance.outputs.joint_frame import Floats
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.picture.body_buffers import BodyBuffers
+from appliance.projector.picture.body_buffers import BodyBuffers, Content
 from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.image_file import read_image, texture_of
@@ -163,7 +163,7 @@ class Easel:
         self.height = mesh.height
         self.sole = float(mesh.bind_positions[:, 1].min() - mesh.vertices[:, 1].min())
         self.bind_positions = mesh.bind_positions / mesh.height
-        self.body = BodyBuffers(ctx, mesh)
+        self.body = BodyBuffers(ctx, mesh, melts)
         self._figures = [_FigureTextures(ctx, mesh, len(skeleton))]
         self._mesh, self._shown = mesh, 1
         self._coupled = HoldTexture(ctx, len(skeleton))
@@ -355,15 +355,17 @@ class Easel:
         content: Sequence[tuple[Any, ...]] = (),
         index: moderngl.Buffer | None = None,
         parts: Sequence[str] = (),
+        molten: Content | None = None,
     ) -> Drawing:
         """A shader program with what it draws, as Drawing takes them; released with the easel."""
         parts = (*parts, "MELT") if self._melting else parts
-        self._drawings.append(Drawing(self.ctx, vertex, fragment, content, index, parts))
+        self._drawings.append(Drawing(self.ctx, vertex, fragment, content, index, parts, molten))
         return self._drawings[-1]
 
     def surface(self, vertex: str, fragment: str, coarse: bool = False, parts: Sequence[str] = ()) -> Drawing:
         """The body's surface, drawn by these shaders."""
-        return self.drawing(vertex, fragment, *self.body.content(coarse), parts)
+        molten = None if coarse else self.body.molten
+        return self.drawing(vertex, fragment, *self.body.content(coarse), parts, molten)
 
     def blur(self, blur: Drawing, picture: Target, other: Target, step_uv: tuple[float, float]) -> None:
         """Soften a picture across, into another canvas of its size, and upwards, back into its own."""

@@ -41,7 +41,7 @@ void melt_body(inout vec3 place, inout vec3 normal, int row) {
     float flow = mix(MELT_FLOW.x, MELT_FLOW.y, melt);
     vec4 near;
     for (int i = 0; i < melt_steps; i++) {
-        near = mass(flown, flow);
+        near = mass(vec3(flown.x, max(flown.y, MELT_FOOT.y * melt), flown.z), flow);  // it narrows no more to the floor
         float off = near.w - MELT_FOOT.x * melt * exp(-max(flown.y, 0.0) / MELT_FOOT.y);
         flown -= clamp(off / max(dot(near.xyz, near.xyz), 0.3), -0.15, 0.15) * near.xyz;
     }
@@ -54,7 +54,7 @@ void melt_body(inout vec3 place, inout vec3 normal, int row) {
     float size = melt * MELT_WAVE;
     place += size * (waves.x + waves.y + waves.z) * normal + apart;
     normal = normalize(normal - size * (gradient - dot(gradient, normal) * normal));
-    place.y = max(place.y, 0.004 * melt);
+    place.y = 0.5 * (place.y + sqrt(place.y * place.y + 0.0004 * melt));  // the floor, met in a curve
 }
 #else
 const float melt = 0.0;

@@ -40,7 +40,7 @@ void main() {
     float facing = clamp(dot(n, to_eye), 0.0, 1.0);
     vec3 albedo = mix(figure_colour, held_colour, mark) * (0.90 + 0.24 * rough.g);
     float key = min(shaded, 1.0) * clamp(0.35 + 0.65 * dot(n, lamp) / max(straight, 0.2), 0.4, 1.3);
-    float cavity = mix(1.0, open * open, 0.9);
+    float cavity = mix(1.0, open * open, 0.9), grounded = mix(1.0, smoothstep(-0.03, 0.16, place.y), 0.75 * melt);
     float sky = 0.5 + 0.5 * n.y;
     vec3 bounce = light_colour * 0.16 * (1.0 - sky) * exp(-2.5 * place.y);
     vec3 ambient = (mix(vec3(0.006), accent_colour * 0.028, sky) + bounce) * cavity;
@@ -52,5 +52,5 @@ void main() {
     float aimed = mix(1.4, 3.1, smoothstep(0.35, 0.95, place.y));  // at the head: a stop more than on the legs
     vec3 light = albedo * (light_colour * (key * aimed * mix(1.0, open, 0.35)) + glance + ambient + rim) + light_colour * sheen;
     light += held_colour * mark * (0.16 + 0.30 * facing) * cavity;
-    colour = vec4(dithered(toned(exposure * light), gl_FragCoord.xy), 1.0);
+    colour = vec4(dithered(toned(exposure * grounded * light), gl_FragCoord.xy), 1.0);
 }
