@@ -67,7 +67,7 @@ def test_the_face_sinks_before_the_body_swells(dance: Recording) -> None:
     )
     face = np.linalg.norm(places - eyes / mesh.height, axis=1) < 0.05
     nose = face & (places[:, 2] > places[face, 2].max() - 0.004)
-    assert nose.sum() > 5 and length[nose].min() > 0.006
+    assert nose.sum() > 5 and length[nose].min() > 0.0045
     limb = np.isin(mesh.joints[:, 0], [dance.skeleton.index(name) for name in ("lThigh", "abdomen")])
     assert limb.sum() > 1000 and (length[limb] == 0.0).mean() > 0.95
     before, after = (
