@@ -115,6 +115,7 @@ def test_the_expressions_of_a_workflow_name_what_there_is() -> None:
             assert re.fullmatch(known, expression), expression
 
 
+@pytest.mark.programs
 def test_the_small_steps_of_a_release_do_what_they_say(tmp_path: Path) -> None:
     """Tag and key; the large ones are make's."""
     jobs = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())["jobs"]

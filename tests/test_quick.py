@@ -33,7 +33,7 @@ def test_every_line_names_what_is_there() -> None:
     assert len(set(LINES)) == len(LINES)
     assert [line for line in LINES if line not in LISTED and not line.startswith("--ignore=")] == [
         "-m",
-        "not realtime and not boot",
+        "not realtime and not programs and not boot",
     ]
 
 

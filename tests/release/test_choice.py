@@ -331,6 +331,7 @@ def test_a_file_that_goes_on_for_ever_is_left_early(venue: Venue) -> None:
     assert not list((venue.places.data / "shows").iterdir())
 
 
+@pytest.mark.programs
 def test_memory_is_never_filled_by_a_show(venue: Venue) -> None:
     """The place, the journal and the choice itself have to find room there."""
     run, shm = venue.places.run, ["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs"]
