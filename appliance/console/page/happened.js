@@ -85,7 +85,7 @@ function faults() {
     if (!touches) found.push(one);
   });
   for (const one of found) {
-    const counts = WRONG.filter((what) => one[what]).map((what) => `${words(`legend_${what}`)}: ${number(one[what])}`);
+    const counts = WRONG.filter((what) => one[what]).map((what) => counted(`legend_${what}`, one[what]));
     one.said = [counts.join(", "), `${words("legend_slowest")} ${number(one.slowest, 1)} ms`];
   }
   return found;
@@ -113,6 +113,8 @@ function pick(part) {
   showEntries();
   draw();
 }
+
+const counted = (key, count) => words("happened_count", { kind: words(key), count: number(count) });
 
 const isPicked = ({ at }) => picked === null || (at >= picked[0] && at <= picked[1]);
 
@@ -161,7 +163,7 @@ function group({ begun, members }, place) {
   whole.open = place === 0 || picked !== null || kind === "fault";
   head.append(clock(begun), ...KINDS.flatMap((what) => {
     const count = document.createElement(what === "fault" ? "b" : "span"), many = members.filter((one) => one.kind === what).length;
-    count.textContent = `${words(`happened_kind_${what}`)}: ${number(many)}`;
+    count.textContent = counted(`happened_kind_${what}`, many);
     return many ? [" · ", count] : [];
   }));
   list.append(...members.map(entry));
