@@ -9,7 +9,7 @@ export function nameJoints({ joints, parts: spoken }) {
   joints.forEach((name, joint) => parts.set(name, spoken[joint]));
 }
 
-// What holds a joint: a sensor by its name, others by a word.
+// The source that holds a joint: a sensor by its name, others by a word.
 export const sourceName = (source) => hasWords(`source_of_${source}`) ? words(`source_of_${source}`) : source;
 
 // left shoulder, right index finger 2

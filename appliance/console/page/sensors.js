@@ -88,7 +88,7 @@ function fill(card, sensor, joints, words) {
   ], words);
 }
 
-// What is not known is left out.
+// Facts that are not known are left out.
 const fillList = (list, facts, words) => list.replaceChildren(...facts.filter(([, said]) => said).map(([key, said]) => fact(words(key), said)));
 
 const setText = (element, text) => { if (element.textContent !== text) element.textContent = text; };
