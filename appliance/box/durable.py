@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from appliance.pose.whole_file import beside, sync, written_whole
+from appliance.pose.whole_file import sync, written_whole
 
 _LOCK_RETRY_S = 0.02
 
@@ -39,8 +39,16 @@ def write_whole(path: Path, content: bytes, private: bool = False) -> None:
 @contextlib.contextmanager
 def replacing(path: Path, private: bool = False) -> Iterator[BinaryIO]:
     """The same for content that is written piece by piece; after any error `path` is as it was."""
-    with written_whole(path) as part, new_file(part, path if private else None) as stream:
+    with written_whole(path, beside(path)) as part, new_file(part, path if private else None) as stream:
         yield stream
+
+
+def beside(path: Path) -> Path:
+    """Where the new content of `path` is written before it takes its place.
+
+    It has another ending: where a power cut leaves it, it is none of the files that a folder is searched for.
+    """
+    return path.with_name(f".{path.name}.new")
 
 
 def write_beside(path: Path, content: bytes, private: bool = False) -> Path:

@@ -11,19 +11,15 @@ from pathlib import Path
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
 
 
-def beside(path: Path) -> Path:
-    """Where the new content of a file is written before it takes its place."""
-    return path.with_name(f".{path.stem}.part{path.suffix}")
-
-
 @contextlib.contextmanager
-def written_whole(path: Path) -> Iterator[Path]:
-    """The file to write in place of `path`, beside it and with its ending; at the end it is renamed, and both
-    content and name are on the disk.
+def written_whole(path: Path, part: Path | None = None) -> Iterator[Path]:
+    """The file to write in place of `path`, beside it; at the end it is renamed. Content and name are on the
+    disk then.
 
-    After any error, and after Ctrl-C, `path` is as it was. Raises OSError.
+    part: that file; by default it has the ending of `path`, by which libraries choose a format. After any
+    error, and after Ctrl-C, `path` is as it was. Raises OSError.
     """
-    part = beside(path)
+    part = part or path.with_name(f".{path.stem}.part{path.suffix}")
     part.unlink(missing_ok=True)  # an earlier try left it
     try:
         yield part

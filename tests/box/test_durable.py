@@ -7,8 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.durable import new_file, private_folder, put_in_place, replacing, write_beside, write_whole
-from appliance.pose.whole_file import beside
+from appliance.box.durable import (
+    beside,
+    new_file,
+    private_folder,
+    put_in_place,
+    replacing,
+    write_beside,
+    write_whole,
+)
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path: Path) -> None:
@@ -28,6 +35,13 @@ def test_a_private_file_is_its_owners_alone(tmp_path: Path, private: bool) -> No
     finally:
         os.umask(before)
     assert (tmp_path / "file").stat().st_mode & 0o777 == (0o600 if private else 0o666)
+
+
+def test_a_file_that_a_power_cut_left_beside_is_none_of_its_kind(tmp_path: Path) -> None:
+    """A folder of motions is searched for *.material: half a motion is not to be called."""
+    write_beside(tmp_path / "anna.material", b"half of it")
+    assert list(tmp_path.iterdir()) == [beside(tmp_path / "anna.material")]
+    assert not list(tmp_path.glob("*.material"))
 
 
 def test_the_folders_above_a_private_one_are_private_too(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.durable import alone_in
+from appliance.box.durable import alone_in, beside
 from appliance.cli import candidate
 from appliance.cli import preflight as commands
 from appliance.cli.preflight import candidate_problems, late_candidate_problems, preflight
@@ -23,7 +23,6 @@ from appliance.dancer.phrase_cache import FOLDER, SUFFIX
 from appliance.keeper.mirror import Mirror
 from appliance.keeper.mirror_process import MirrorProcess
 from appliance.outputs.shared_frame import FrameWriter
-from appliance.pose.whole_file import beside
 from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, Pair
 from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
 from appliance.show.box import load_box
