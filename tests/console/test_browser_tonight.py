@@ -189,6 +189,30 @@ def test_panic_is_in_reach_while_the_pin_is_asked_for(tab: Tab, venue: tuple[Box
     wait_until(lambda: declared(box).going and not declared(box).panic)
 
 
+# From now on the page hears that show control was silent when it was asked last.
+SILENT = """async () => {
+  const { Box } = await import("/box.js"), hear = Box.prototype.hear;
+  Box.prototype.hear = function (value) {
+    value.trouble = "Show control does not answer. What is in force stays in force; try again.";
+    hear.call(this, value);
+    window.heard = true;
+  };
+}"""
+
+
+def test_no_command_is_held_back_while_show_control_starts_again(tab: Tab, venue: tuple[Box, Page]) -> None:
+    """What comes meanwhile waits in its port, and is done."""
+    box, page = venue
+    unlock(tab, page)
+    press(tab, '[data-page="tonight"]')
+    tab.evaluate(SILENT)
+    await_true(tab, "window.heard === true")
+    press(tab, "#stop")
+    wait_until(lambda: not declared(box).going, "STOP was held back")
+    press(tab, "#resume")
+    wait_until(lambda: declared(box).going, "RESUME was held back")
+
+
 class Taps:
     """Presses as a person would, and counts them."""
 

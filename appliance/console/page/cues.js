@@ -3,7 +3,7 @@ import { pictureOfStyle } from "./choices.js";
 import { command } from "./device.js";
 import { offer } from "./idle.js";
 import { byId } from "./elements.js";
-import { number, translated, words } from "./words.js";
+import { number, words } from "./words.js";
 
 const FOLLOWED = ["running", "freewheeling"]; // states of a timecode that calls cues
 const BOUNCE_MS = 500; // a second GO within this time is the same press
@@ -55,7 +55,7 @@ function draw() {
   setText(byId("now-name"), current || words("cue_none"));
   setText(byId("go-name"), next < 0 ? words("cue_end") : cues[next].name);
   setText(byId("go-what"), next < 0 ? "" : changes(cues[next].name));
-  offer(byId("go"), translated(told.trouble) || (next < 0 ? words("cue_end_how") : ""));
+  offer(byId("go"), next < 0 ? words("cue_end_how") : "");
   if (list.dataset.names !== names) {
     list.dataset.names = names;
     list.replaceChildren(...cues.map((one, place) => {

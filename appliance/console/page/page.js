@@ -132,8 +132,6 @@ function tonight(value) {
   const cards = value.cards.map((one) => one.name === "none" ? { ...one, label: words("card_none") } : one);
   showChoices(byId("overlays"), byId("overlays-part"), cards, (name) => command("/card", name));
   if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
-  const trouble = translated(value.trouble);
-  for (const id of ["stop", "resume"]) offer(byId(id), trouble);
   byId("stop").setAttribute("aria-pressed", String(status?.state === "stopped"));
   byId("resume").classList.toggle("wanted", ["stopped", "panic"].includes(status?.state ?? ""));
   const over = value.fallbacks.filter((one) => !one.active);
