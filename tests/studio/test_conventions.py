@@ -148,7 +148,7 @@ def assert_the_head_follows(show: Path, joint: str) -> None:
     patch, phrase = Patch(loaded.config.lights.fixtures, show), read_bvh(loaded.phrase)
     *_, last = passes(loaded.config.lights, patch, phrase, "", 0, 100, 5)
     (beam,) = beams_of(patch, last.values)
-    place = last.dancer[phrase.skeleton.index(joint)]
+    place = last.places[phrase.skeleton.index(joint)]
     off = np.cross(place - beam.place, beam.direction)
     assert np.linalg.norm(off) < BEAM_M and 0.3 < place[1] < 2.2
 
