@@ -56,7 +56,7 @@ def test_looking_needs_no_pin_and_every_file_is_the_box_s_own(page: Page) -> Non
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
         again = page.get(path, If_None_Match=answer.headers["ETag"])
         assert (again.status, again.text) == (304, "")
-    assert whole < 120_000
+    assert whole < 125_000  # the German words are 49 kB of it
     assert page.get("/status").value["verdict"]["key"] == "stage_absent"
 
 
