@@ -117,6 +117,12 @@ class Box(Process):
         )
         return status
 
+    def end_whole(self) -> None:
+        """Kill it, and wait until its other processes have ended too, as by a power cut."""
+        everything = descendants(self.process.pid)
+        self.end(signal.SIGKILL)
+        wait_until(lambda: not any(map(is_running, everything)), "a process outlives its box")
+
     def kill(self) -> None:
         with ending_emulators(self.process.pid):
             super().kill()
@@ -164,9 +170,7 @@ def ending_emulators(box: int) -> Iterator[None]:
 
 def cut_power(box: Box, file: Path) -> Checkpoint:
     """What a power cut takes is gone: processes, the runtime folder, this boot. The place on the disk."""
-    everything = descendants(box.process.pid)
-    box.end(signal.SIGKILL)
-    wait_until(lambda: not any(map(is_running, everything)), "a process outlives its box")
+    box.end_whole()
     remove_folder(box.runtime)
     place = read_checkpoint(file)
     assert place is not None

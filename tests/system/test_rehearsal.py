@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import signal
 import time
 from contextlib import closing
 from pathlib import Path
@@ -13,7 +12,7 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.reading import read_journal
 from appliance.sensor.memory import FILE_NAME, memory_record, memory_text, read_memory
 from tests.bundles import write_show
-from tests.system.box import Box, await_end_of_keeper, playing
+from tests.system.box import Box, playing
 
 VENUE = {"realtime": {"enabled": False}, "state": "state", "journal": {"folder": "journal", "minutes": 5}}
 PROFILES = {bytes(16): bytes(22)}
@@ -38,8 +37,7 @@ def test_a_rehearsal_changes_no_file_of_the_venue_and_the_show_goes_on_afterward
         runtime = box.runtime
         box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
         box.frames(60)
-        box.end(signal.SIGKILL)
-        await_end_of_keeper(runtime)
+        box.end_whole()
         memory = memory_record(tmp_path / "state").writer(runtime)  # not on the disk yet
         memory.write(memory_text({}, PROFILES).encode())
         memory.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +16,7 @@ from hw_sim.emulator import Sent
 from hw_sim.peers import remove_folder
 from tests.bundles import FIGURE, MOVING, write_show
 from tests.hw_sim.null_modem import NullModem
-from tests.system.box import JOURNAL, Box, await_end_of_keeper, playing
+from tests.system.box import JOURNAL, Box, playing
 from tests.system.processes import PATIENCE_S, wait_until
 
 pytestmark = pytest.mark.realtime
@@ -115,8 +114,7 @@ def test_after_a_power_cut_the_neutral_pose_is_used_again(show: Path, tmp_path: 
         box.await_output("neutral pose taken")
         wearables.dance()
         wait_until((tmp_path / "sensors.memory").exists)
-        box.end(signal.SIGKILL)
-        await_end_of_keeper(tmp_path / "runtime")
+        box.end_whole()
         remove_folder(tmp_path / "runtime")
         box.kill_and_restart()
         box.await_output("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
