@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from appliance.pose.whole_file import sync, written_whole
+from appliance.pose.whole_file import sync
 
 _LOCK_RETRY_S = 0.02
 
@@ -39,8 +39,11 @@ def write_whole(path: Path, content: bytes, private: bool = False) -> None:
 @contextlib.contextmanager
 def replacing(path: Path, private: bool = False) -> Iterator[BinaryIO]:
     """The same for content that is written piece by piece; after any error `path` is as it was."""
-    with written_whole(path, beside(path)) as part, new_file(part, path if private else None) as stream:
+    part = beside(path)
+    part.unlink(missing_ok=True)  # an earlier try left it
+    with new_file(part, path if private else None) as stream:
         yield stream
+    put_in_place(part, path)
 
 
 def beside(path: Path) -> Path:

@@ -12,14 +12,13 @@ _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
 
 
 @contextlib.contextmanager
-def written_whole(path: Path, part: Path | None = None) -> Iterator[Path]:
-    """The file to write in place of `path`, beside it; at the end it is renamed. Content and name are on the
-    disk then.
+def written_whole(path: Path) -> Iterator[Path]:
+    """The file to write in place of `path`, beside it. It has the same ending: libraries choose a format by it.
 
-    part: that file; by default it has the ending of `path`, by which libraries choose a format. After any
-    error, and after Ctrl-C, `path` is as it was. Raises OSError.
+    At the end it is renamed, and both content and name are on the disk. After any error, and after Ctrl-C,
+    `path` is as it was. Raises OSError.
     """
-    part = part or path.with_name(f".{path.stem}.part{path.suffix}")
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
     part.unlink(missing_ok=True)  # an earlier try left it
     try:
         yield part
