@@ -13,7 +13,7 @@ _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
 
 @contextlib.contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """The file to write in place of `path`, beside it. It has the same ending: libraries choose a format by it.
+    """The file to write in place of `path`, beside it; its ending is the same, for libraries that go by it.
 
     At the end it is renamed, and both content and name are on the disk. After any error, and after Ctrl-C,
     `path` is as it was. Raises OSError.
