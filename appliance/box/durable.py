@@ -49,7 +49,7 @@ def replacing(path: Path, private: bool = False) -> Iterator[BinaryIO]:
 def beside(path: Path) -> Path:
     """Where the new content of `path` is written before it takes its place.
 
-    It has another ending: where a power cut leaves it, it is none of the files that a folder is searched for.
+    Its ending is another: a search for files of a kind does not find one that a power cut left half-written.
     """
     return path.with_name(f".{path.name}.new")
 

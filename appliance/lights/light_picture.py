@@ -133,6 +133,6 @@ def _chords(
 
 
 def _centres(space: Space, axis: int, count: int) -> Array:
-    """Middles of so many pixels from one wall to the other."""
+    """The middle of each of `count` pixels between two walls, metres."""
     centres: Array = space.low[axis] + (space.high[axis] - space.low[axis]) * (np.arange(count) + 0.5) / count
     return centres

@@ -33,8 +33,8 @@ class CueChase:
         self._before: tuple[float, str] | None = None
 
     def due(self, time_s: float | None, cues: Sequence[tuple[float, str]]) -> str | None:
-        """The cue to call now; None: none. time_s: of the code, which counts on at midnight while every
-        cue has its time again; None where there is none.
+        """The cue to call now; None: none. time_s: of the code, None where there is none. It counts on at
+        midnight; each cue has its time in each day.
         """
         if time_s is None:
             return None

@@ -12,7 +12,7 @@ from hw_sim.peers import HOST
 VIEWERS = 3
 _STAYS_S = 20.0
 _PAUSE_S = 1.0
-_WITHIN_S = 5.0  # a page that says nothing for so long is left, as a browser's script does
+_WITHIN_S = 5.0  # a viewer leaves a page that is silent for this long
 _PAGES = ("/", "/page.css", "/status")
 
 

@@ -61,7 +61,7 @@ class View:
         return float((0.5 + 0.5 * x / w) * self.slopes[0] / self.slopes[1]), float(0.5 + 0.5 * y / w)
 
     def over(self, place: Array, beyond: float) -> Array:
-        """The place above this one that is so many figure heights beyond the picture's upper edge."""
+        """The place straight above this one, `beyond` figure heights outside the picture's upper edge."""
         up, away = (place - self.eye) @ self.up, (self.eye - place) @ self.back
         return np.asarray(place + (away * self.slopes[1] - up + beyond) * self.up)
 
