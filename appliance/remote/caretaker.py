@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import datetime
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
 from appliance.box.record import WholeFile
+from appliance.box.roster import Roster
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import STRINGS
 from appliance.pose.foreign_file import plain_json
@@ -182,9 +183,8 @@ class Caretaker:
 
 
 def _anybody(health: Mapping[str, Any]) -> bool:
-    """Whether a sensor sends: a line of the roster has its state."""
-    lines: Iterable[Any] = health.get("sensors") or ()
-    return any("linked" in line for line in lines if isinstance(line, list))
+    """Whether a sensor sends."""
+    return any(line.state == "linked" for line in Roster.reported(health).lines)
 
 
 def _read(file: WholeFile) -> Memory:

@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from appliance.box.orders import Key, Order
+from appliance.box.roster import Roster
 from appliance.levers.addresses import ADDRESSES, ANSWERS, QUESTIONS, Receiver
 from appliance.levers.lever import Lever
 from appliance.levers.show_state import Change, ShowState
@@ -151,6 +152,7 @@ class CommandHandler:
             "strangers": strangers,
             "live": self._live.came(now),
             "gestures": reported,
+            "key_file": str(self._keys.path or ""),
         }
 
     def call_cue(self, name: str, now: float) -> None:
@@ -263,8 +265,8 @@ class CommandHandler:
     def _send_roster(self, asker: Address, now: float) -> None:
         if not self._observer.lives(now):
             raise ValueError(_NO_STAGE)
-        key_file = str(self._keys.path or "")
-        for message in roster_messages(self._observer.health(), key_file, now):
+        roster = Roster.reported(self._observer.health())
+        for message in roster_messages(roster, str(self._keys.path or ""), now):
             self._send(asker, message)
 
     def _publish_changed(self, show_state: ShowState) -> None:

@@ -1,4 +1,4 @@
-"""What `bunraku sensors` asks: show control at a real control port, and a stage double behind it."""
+"""What `bunraku sensors` sees and asks: show control at a real control port, and a stage double behind it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from pathlib import Path
 import yaml
 
 from appliance.box.orders import Order
+from appliance.cli.doctor.host_view import running_stage
 from appliance.sensor.link import SensorState
 from appliance.sensor.wire import HAS_PROFILE
+from appliance.show.box import load_box
 from appliance.stage.sensor_lines import roster_lines
 from tests.show_control.doubles import ControlInThread, StageDouble, until
 
@@ -45,6 +47,11 @@ class RunningBox:
         self.box_file.write_text(yaml.safe_dump(settings))
         self.stage.__enter__()
         until(lambda: self.control.process.handler.status(0, time.monotonic()).state == "dancing")
+        until(self._told_its_key_file)
+
+    def _told_its_key_file(self) -> bool:
+        stage = running_stage(load_box(self.box_file))
+        return stage is not None and stage.key_file is not None
 
     @property
     def orders(self) -> list[Order]:

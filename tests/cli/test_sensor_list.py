@@ -1,4 +1,4 @@
-"""`bunraku sensors` against a control port: tables, values for programs, and watching."""
+"""`bunraku sensors` in the runtime folder of a box: tables, values for programs, and watching."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+import yaml
 from rich.console import Console
 
-from appliance.cli.sensors.control_client import ControlClient, Roll
+from appliance.box.roster import RosterLine
+from appliance.cli.sensors import listing
 from appliance.cli.sensors.table import SensorTable
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.wire import IS_NDOF, SIGNAL_SHIFT
-from appliance.show_control.sensor_roster import RosterLine
 from appliance.stage.sensor_lines import roster_lines
 from tests.cli.running_box import LEFT, RunningBox
 from tests.command import Command
@@ -135,12 +136,19 @@ def test_a_box_that_is_still_starting_or_hangs_is_reported(tmp_path: Path, bunra
     box.close()
 
 
+def test_a_box_without_a_control_port_is_listed(box: RunningBox, bunraku: Command) -> None:
+    settings = yaml.safe_load(box.box_file.read_text())
+    box.box_file.write_text(yaml.safe_dump({**settings, "control": None}))
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "linked" in out and "Its firmware is older." in out
+
+
 def test_without_a_box_it_lists_the_key_file(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist", "head"])
     box_file = tmp_path / "box.yaml"
-    box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
+    box_file.write_text("sensors: {keys: sensors.keys}\nruntime: none\n")
     out, _ = bunraku("sensors", "--box", box_file)
-    assert "has no control port" in out
+    assert "No box runs here. These sensors may come in" in out
     assert re.search(r"^left-wrist  [0-9a-f]{8}", out, re.MULTILINE)
     assert load_keys(tmp_path / "sensors.keys")["head"].key.hex() not in out
     (tmp_path / "sensors.keys").chmod(0o644)
@@ -195,13 +203,12 @@ def test_an_interruption_that_python_swallows_ends_watching_too(
 ) -> None:
     asked = []
 
-    def swallow(*_: object) -> Roll:
+    def swallow(*_: object) -> None:
         asked.append(True)
         assert len(asked) == 1, "it goes on"
         with suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
-        return Roll(roster_lines([LEFT], lambda _: ""), 0.0, None)
 
-    monkeypatch.setattr(ControlClient, "roll", swallow)
+    monkeypatch.setattr(listing, "running_stage", swallow)
     monkeypatch.setattr(time, "sleep", lambda _: None)
     bunraku("sensors", "--watch", "--box", box.box_file)

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from appliance.box.roster import RosterLine
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import CUE, GOING, STRINGS
 from appliance.remote.caretaker import Caretaker, OpeningHours
@@ -29,6 +30,7 @@ WEEK = [
     {"days": ["tue", "wed", "thu", "fri"], "from": "10:00", "to": "18:00"},
     {"days": ["sat"], "from": "20:00", "to": "02:00"},
 ]
+LINKED = RosterLine(*("left-wrist", "1a2b3c4d", "linked", "", 50.0, 0.0, 0.0, 0.0, 87, 0, 0, "", "", "", ""))
 BERLIN = datetime.timezone(datetime.timedelta(hours=1))
 
 
@@ -222,17 +224,17 @@ def test_a_cue_while_nobody_is_there(tmp_path: Path) -> None:
     config = hours_of(attract={"cue": "waiting", "after_s": 90})
     house = House(tmp_path, config, "01T10:10")
     house.state = house.state.to(CUE, "duet")
-    house.sensors = [["left-wrist", "linked"]]
+    house.sensors = [LINKED]
     assert house.until("01T10:20") == []
     house.sensors = [["left-wrist", "silent"]]
     assert house.until("01T10:21") == []
     assert house.until("01T10:30") == [("/cue", "waiting")]
-    house.sensors = [["left-wrist", "linked"]]
+    house.sensors = [LINKED]
     assert house.until("01T10:31") == [("/cue", "duet")]
     house.sensors = []
     house.until("01T10:40")
     house.state = house.state.to(CUE, "solo")  # by hand
-    house.sensors = [["left-wrist", "linked"]]
+    house.sensors = [LINKED]
     assert house.until("01T10:41") == []
 
 
@@ -243,7 +245,7 @@ def test_a_cue_that_nobody_hears_is_called_again(tmp_path: Path) -> None:
     house.hears = False
     assert house.until("01T10:30") == [("/cue", "waiting")] * 10
     house.restart()
-    house.state, house.sensors = house.state.to(CUE, "waiting"), [["left-wrist", "linked"]]
+    house.state, house.sensors = house.state.to(CUE, "waiting"), [LINKED]
     assert house.until("01T10:31") == [("/cue", "duet")] * 4
     house.hears = True
     assert house.until("01T10:35") == [("/cue", "duet")]
@@ -258,7 +260,7 @@ def test_a_cue_for_nobody_is_not_called_again_once_somebody_is_there(tmp_path: P
     house = House(tmp_path, hours_of(attract={"cue": "waiting", "after_s": 90}), "01T10:10")
     house.state, house.hears = house.state.to(CUE, "duet"), False
     assert ("/cue", "waiting") in house.until("01T10:12")
-    house.sensors, house.hears = [["left-wrist", "linked"]], True
+    house.sensors, house.hears = [LINKED], True
     assert house.until("01T10:30") == [] and house.state.cue == "duet"
 
 
@@ -270,7 +272,7 @@ def test_nobody_is_missed_anew_each_day(tmp_path: Path) -> None:
     house.until("02T09:59")
     assert house.until("02T10:01") == [("/go",), ("/cue", "walk in")]
     assert house.until("02T10:03") == [("/cue", "waiting")]
-    house.sensors = [["left-wrist", "linked"]]
+    house.sensors = [LINKED]
     assert house.until("02T10:04") == [("/cue", "walk in")]
 
 
@@ -278,7 +280,7 @@ def test_the_cue_before_the_night_comes_back_where_none_opens_the_day(tmp_path: 
     house = House(tmp_path, hours_of(attract={"cue": "waiting", "after_s": 90}), "01T17:00")
     house.state = house.state.to(CUE, "duet")
     assert house.until("02T10:30") == [("/cue", "waiting"), ("/stop",), ("/go",)]
-    house.sensors = [["left-wrist", "linked"]]
+    house.sensors = [LINKED]
     assert house.until("02T10:31") == [("/cue", "duet")]
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import pytest
 
 from appliance.box.orders import Order
+from appliance.box.roster import RosterLine
 from appliance.levers.addresses import ADDRESSES
 from appliance.levers.lever import Lever
 from appliance.levers.show_state import ShowState
@@ -392,15 +393,22 @@ def test_the_roster_is_told_as_the_stage_saw_it_last(
     stage: StageDouble, asker: Asker, key_file: Path
 ) -> None:
     line = ["left-wrist", "1a2b3c4d", "linked", "10.0.0.7:2390", 50.0, 0.5, 0.25, -1.0, 87, 51, 1]
-    texts = ["1.0.0", "00112233445566778899aabbccddeeff", "taken", ""]
-    stage.tell(sensors=[line + texts], looked_at=time.monotonic() - 5.0)
+    rest = ["1.0.0", "00112233445566778899aabbccddeeff", "taken", "", 0.0, -1.0]
+    stage.tell(sensors=[line + rest, line], looked_at=time.monotonic() - 5.0)
     sensor, end = asker.ask_all("/sensors/list")
-    assert sensor == ["/sensors/sensor", *line, *texts, 0.0, -1.0]
+    assert sensor == ["/sensors/sensor", *line, *rest]  # not the line of another release
     assert end[:2] == ["/sensors/end", 1]
     assert 5.0 <= end[2] < 65.0
     assert end[3] == str(key_file)
     stage.tell(looked_at=time.monotonic() + 60.0)  # after show control, held up for a moment, read its clock
     assert asker.ask_all("/sensors/list")[-1][2] == 0.0
+
+
+def test_the_page_on_osc_has_the_type_tags_of_a_sensor() -> None:
+    tags = {str: "s", float: "f", int: "i"}
+    kinds = "".join(tags[kind] for kind in get_type_hints(RosterLine).values())
+    page = Path(__file__).resolve().parents[2] / "docs" / "osc.md"
+    assert f"| `/sensors/sensor` | `,{kinds}` |" in page.read_text("utf-8")
 
 
 def test_the_roster_of_a_box_that_is_starting_and_of_none(folder: Path, key_file: Path, asker: Asker) -> None:

@@ -17,6 +17,7 @@ from serial.tools.list_ports_common import ListPortInfo
 
 from appliance.box.fallback import Fallen
 from appliance.box.process_health import Member
+from appliance.box.roster import RosterLine
 from appliance.cli.doctor import box_state, processor, show_parts, storage, venue
 from appliance.cli.doctor.doctor_command import CHECKS, findings
 from appliance.cli.doctor.finding import for_phone
@@ -24,7 +25,6 @@ from appliance.cli.doctor.host_view import HostView, RunningStage
 from appliance.cli.doctor.sample import Sample, sample
 from appliance.release.choice import Aside, Choice
 from appliance.show.box import BoxConfig
-from appliance.show_control.sensor_roster import RosterLine
 from appliance.stage.sensor_lines import roster_lines
 from hw_sim.peers import free_ports
 from tests.bundles import write_show

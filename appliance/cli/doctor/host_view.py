@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,6 +30,14 @@ class RunningStage:
     fallbacks: tuple[tuple[str, Fallen], ...] = ()  # all processes of the box: the process, the fallback
     members: tuple[Member, ...] = ()  # the processes beside it
     show: Path | None = None  # the folder of what it dances
+
+    @property
+    def key_file(self) -> Path | None:
+        """The sensors' key file that its show control reads; None: not known."""
+        read = (
+            one.reported.get("key_file") for one in self.members if one.process == "control" and one.lives
+        )
+        return Path(found) if (found := next(read, None)) else None
 
 
 @dataclass(frozen=True)
@@ -96,7 +105,7 @@ class HostView:
 def running_stage(box: BoxConfig) -> RunningStage | None:
     """The stage of this box, if one runs; root also looks in the folder of the box's own user."""
     folder = box.runtime
-    if folder is None and (RUN / "frame").exists():
+    if folder is None and os.access(RUN / "frame", os.F_OK):  # False where RUN is closed to this user
         folder = RUN
     if folder is None:
         try:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+from appliance.box.roster import Roster, RosterLine
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
 from appliance.cli.doctor.host_view import HostView
 from appliance.cli.sensors.table import HIGH_LOSS
@@ -14,7 +14,6 @@ from appliance.sensor.wire import BATTERY_UNKNOWN
 from appliance.show.config_error import ConfigError
 from appliance.show.programs import SOURCES
 from appliance.show.show import load_show
-from appliance.show_control.sensor_roster import RosterLine
 
 _SPARE = "Or put a spare in its place: `bunraku sensors replace {name} SPARE`."
 _PROGRAM = "Start the program that sends it; for a phone, open the page there. It is under sensors: foreign."
@@ -29,7 +28,7 @@ def sensors(host: HostView) -> Iterator[Finding]:
     """Those that the show wears: by name, whether they send."""
     if host.stage is None:
         return
-    for line in _roster(host.stage.health):
+    for line in Roster.reported(host.stage.health).lines:
         if line.neutral:
             yield _sensor(line)
     for name in host.stage.health.get("not_let_in") or ():
@@ -38,12 +37,6 @@ def sensors(host: HostView) -> Iterator[Finding]:
             "The show wears it, and it has no key here: it is not let in, and its joint moves freely.",
             f"`bunraku provision --name {name}`, or `bunraku sensors rename SPARE {name}`.",
         )
-
-
-def _roster(health: dict[str, Any]) -> Iterator[RosterLine]:
-    for values in health.get("sensors") or ():
-        if len(values) == len(RosterLine._fields):
-            yield RosterLine(*values)
 
 
 def _sensor(line: RosterLine) -> Finding:

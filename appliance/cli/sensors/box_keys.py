@@ -38,7 +38,7 @@ class BoxKeys:
     keys: Path
 
     @property
-    def running(self) -> ControlClient:
+    def control(self) -> ControlClient:
         return ControlClient.of(self.box)
 
 
@@ -67,9 +67,9 @@ def send_command(box_keys: BoxKeys, address: str, name: str | None) -> None:
     Raises StageError when it is not done.
     """
     try:
-        answer = box_keys.running.ask(address, *([name] if name else []))
+        answer = box_keys.control.ask(address, *([name] if name else []))
     except NoBoxError as error:
-        raise StageError(f"{error} {_WHICH_BOX}" if box_keys.running.has_port else str(error)) from None
+        raise StageError(f"{error} {_WHICH_BOX}" if box_keys.control.has_port else str(error)) from None
     if not answer.done:
         raise StageError(answer.message)
     print(answer.message)
@@ -115,7 +115,7 @@ def reload_keys(box_keys: BoxKeys) -> tuple[bool, str]:
         try:
             return _ask_to_reload(box_keys)
         except NoBoxError as error:
-            if not box_keys.running.has_port:
+            if not box_keys.control.has_port:
                 message = "The box has no control port: the change counts when it starts again."
                 return True, message
             if running_stage(box_keys.box) is None:
@@ -130,10 +130,11 @@ def reload_keys(box_keys: BoxKeys) -> tuple[bool, str]:
 
 def _ask_to_reload(box_keys: BoxKeys) -> tuple[bool, str]:
     """The answer of a box to `reload_keys`; raises NoBoxError when none answers."""
-    roll = box_keys.running.roll()
-    if roll.key_file is not None and roll.key_file.resolve() != box_keys.keys.resolve():
-        return False, f"{other_file(roll.key_file)} and knows nothing of this change. {THAT_BOX}"
-    answer = box_keys.running.ask("/sensors/reload")
+    stage = running_stage(box_keys.box)
+    key_file = stage.key_file if stage is not None else None
+    if key_file is not None and key_file.resolve() != box_keys.keys.resolve():
+        return False, f"{other_file(key_file)} and knows nothing of this change. {THAT_BOX}"
+    answer = box_keys.control.ask("/sensors/reload")
     return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.message}"
 
 

@@ -1,27 +1,22 @@
-"""The client of a running box's control port: asks about its sensors from another process."""
+"""The client of a running box's control port: sends a command from another process."""
 
 from __future__ import annotations
 
 import contextlib
-import math
 import socket
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from appliance.show.box import BoxConfig
 from appliance.show_control.command import reply_to
 from appliance.show_control.order_dispatch import PATIENCE_S as ERRAND_S
 from appliance.show_control.packet import Message, datagram, messages_in, readable
 from appliance.show_control.port import Address
-from appliance.show_control.sensor_roster import END, SENSOR, RosterLine
 
 PATIENCE_S = 2.0  # show control answers within 0.6 s, and later while it starts
 _LARGEST_DATAGRAM = 4096
-_LINE = tuple(get_type_hints(RosterLine).values())
-_ENDING = (int, float, str)
 
 
 class NoBoxError(Exception):
@@ -34,15 +29,6 @@ class Reply:
 
     done: bool
     message: str
-
-
-@dataclass(frozen=True)
-class Roll:
-    """All sensors of the running box, how old that is (negative: it starts), and which key file it reads."""
-
-    lines: list[RosterLine]
-    age_s: float
-    key_file: Path | None
 
 
 class ControlClient:
@@ -81,20 +67,6 @@ class ControlClient:
             raise self._no_box()
         return answer
 
-    def roll(self) -> Roll:
-        """The state of all its sensors. Raises NoBoxError."""
-        lines: list[RosterLine] = []
-        with contextlib.closing(self._replies(("/sensors/list",))) as replies:
-            for about, values in replies:
-                if about == SENSOR and _is_made_of(_LINE, values):
-                    lines.append(RosterLine(*(_shown(value) for value in values)))
-                elif about == END and _is_made_of(_ENDING, values) and values[0] == len(lines):
-                    _, age_s, key_file = values
-                    return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
-                elif about == reply_to("/sensors/list") and values[:2] == ["/sensors/list", 0]:
-                    raise NoBoxError(readable(str(values[-1])))
-        raise self._no_box()
-
     def _replies(self, message: Message) -> Generator[tuple[str, list[Any]], None, None]:
         """Replies of the box until the timeout; none when no port is open there.
 
@@ -119,15 +91,3 @@ class ControlClient:
             )
         host, port = self._control
         return NoBoxError(f"No box answers on {host}:{port}.")
-
-
-def _is_made_of(kinds: Sequence[type], values: Sequence[object]) -> bool:
-    """Whether these are finite numbers and texts as a box sends them: any program may hold its port."""
-    return len(values) == len(kinds) and all(
-        isinstance(value, int | float) and math.isfinite(value) if kind is float else isinstance(value, kind)
-        for value, kind in zip(values, kinds, strict=True)
-    )
-
-
-def _shown(value: Any) -> Any:
-    return readable(value) if isinstance(value, str) else value

@@ -9,10 +9,10 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table
 from rich.text import Text
 
+from appliance.box.roster import UNKNOWN_S, RosterLine
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.state import LOW_BATTERY
 from appliance.sensor.wire import BATTERY_UNKNOWN, HAS_CRYSTAL, HAS_PROFILE, IS_NDOF, signal_dbm
-from appliance.show_control.sensor_roster import UNKNOWN_S, RosterLine
 
 HIGH_LOSS = 0.05
 HIGH_ROUND_TRIP_S = 0.1

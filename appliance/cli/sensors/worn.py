@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from appliance.box.roster import Roster
 from appliance.cli.doctor.host_view import running_stage
 from appliance.cli.sensors.box_keys import BoxKeys
-from appliance.cli.sensors.control_client import NoBoxError
 from appliance.release import choice
 from appliance.release.choice import Choice
 from appliance.sensor.keys import KeyFileError, load_keys
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
-from appliance.show_control.sensor_roster import RosterLine
 from appliance.stage.stage_error import StageError
 
 ANYWAY = "--anyway"
@@ -22,15 +21,10 @@ _NOT_RUNNING = "the box does not run now"
 def worn_sensors(box_keys: BoxKeys) -> Mapping[str, str] | None:
     """Names of the sensors of this box's show and each one's state; None where no show is known.
 
-    The running box is asked; while its show control is silent its stage's health counts, and where nothing
-    runs the show that this machine chose at power-on.
+    As the running stage sees them; where none runs or it is starting, the show chosen at power-on counts.
     """
-    try:
-        roll = box_keys.running.roll()
-        lines = roll.lines if roll.age_s >= 0 else []  # negative: it starts
-    except NoBoxError:
-        stage = running_stage(box_keys.box)
-        lines = [] if stage is None else [RosterLine(*line) for line in stage.health.get("sensors", ())]
+    stage = running_stage(box_keys.box)
+    lines = Roster.reported(stage.health).lines if stage is not None else []
     if not lines:
         return _worn_in_chosen_show(box_keys)
     return {line.name: line.state for line in lines if line.neutral}
