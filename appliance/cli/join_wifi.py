@@ -34,7 +34,7 @@ _CARD_S, _JOINED_S = 20.0, 40.0
 _RETRY_S = 0.5
 
 
-class Places(NamedTuple):
+class WifiFolders(NamedTuple):
     """arrivals: folders that may bring a file, the first that has one counts; kept: over power-off; run:
     where messages are left; profiles: NetworkManager's own folder in memory."""
 
@@ -50,11 +50,11 @@ Wait = Callable[[float], None]
 NameBox = Callable[[str], None]
 
 
-def join_wifi(places: Places, run: Run, wait: Wait, name_box: NameBox) -> int:
+def join_wifi(folders: WifiFolders, run: Run, wait: Wait, name_box: NameBox) -> int:
     """Apply the newest file; 0, or 1 with a message in the run folder."""
-    message = _applied(places, run, wait, name_box)
-    _leave(places.run / MESSAGE_FILE, message)
-    _leave(places.run / NETWORK_FILE, _own_network(places.saved / _ACCESS_POINT_PROFILE))
+    message = _applied(folders, run, wait, name_box)
+    _leave(folders.run / MESSAGE_FILE, message)
+    _leave(folders.run / NETWORK_FILE, _own_network(folders.saved / _ACCESS_POINT_PROFILE))
     if message:
         print(message, flush=True)
     return 1 if message else 0
@@ -78,10 +78,10 @@ def _own_network(path: Path) -> str:
     return "\n".join(f"{word} {unescaped(values.get(key, ''))}" for word, key in _SAID)
 
 
-def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
+def _applied(folders: WifiFolders, run: Run, wait: Wait, name_box: NameBox) -> str:
     """The fault as a message; empty if all is well or no Wi-Fi is asked for."""
-    saved = places.saved / NAME
-    read = ((path, _content(path)) for path in (*(one / NAME for one in places.arrivals), saved))
+    saved = folders.saved / NAME
+    read = ((path, _content(path)) for path in (*(one / NAME for one in folders.arrivals), saved))
     try:  # each is read once: its stick may be pulled while the network is looked for
         path, data = next(((path, data) for path, data in read if data), (saved, b""))
         if not data:
@@ -96,17 +96,17 @@ def _applied(places: Places, run: Run, wait: Wait, name_box: NameBox) -> str:
     is_new = not saved.is_file() or saved.read_bytes() != data
     try:
         if is_new:
-            write_whole(places.saved / "country", f"COUNTRY={wifi.country}\n".encode())
+            write_whole(folders.saved / "country", f"COUNTRY={wifi.country}\n".encode())
     except OSError as error:
         return (
-            f"{places.saved} cannot be written ({error.strerror}): the box is in no Wi-Fi. Look at its disk."
+            f"{folders.saved} cannot be written ({error.strerror}): the box is in no Wi-Fi. Look at its disk."
         )
-    card = _card(places.cards, wait)
+    card = _card(folders.cards, wait)
     if not card:
         return "The box has no Wi-Fi card that works. Plug an adapter in, or a network cable."
     run(("iw", "reg", "set", wifi.country))
     message = (
-        _made(places, wifi, card, is_new, run) if wifi.access_point else _joined(places, wifi, is_new, run)
+        _made(folders, wifi, card, is_new, run) if wifi.access_point else _joined(folders, wifi, is_new, run)
     )
     if is_new and not (message and wifi.access_point):
         write_whole(saved, data, private=True)
@@ -133,15 +133,15 @@ def _card(cards: Path, wait: Wait) -> str:
     return ""
 
 
-def _joined(places: Places, wifi: WifiFile, is_new: bool, run: Run) -> str:
+def _joined(folders: WifiFolders, wifi: WifiFile, is_new: bool, run: Run) -> str:
     text = profile(wifi).encode()
     if is_new:
         with contextlib.suppress(FileNotFoundError):
-            (places.saved / _ACCESS_POINT_PROFILE).unlink()
-            (places.profiles / _ACCESS_POINT_PROFILE).unlink()
-        write_whole(places.saved / PROFILE, text, private=True)
-    places.profiles.mkdir(parents=True, exist_ok=True)
-    write_whole(places.profiles / PROFILE, text, private=True)
+            (folders.saved / _ACCESS_POINT_PROFILE).unlink()
+            (folders.profiles / _ACCESS_POINT_PROFILE).unlink()
+        write_whole(folders.saved / PROFILE, text, private=True)
+    folders.profiles.mkdir(parents=True, exist_ok=True)
+    write_whole(folders.profiles / PROFILE, text, private=True)
     run(("nmcli", "connection", "reload"))
     done = run(("nmcli", "--wait", f"{_JOINED_S:.0f}", "connection", "up", "id", "wifi"))
     if done.returncode == 0:
@@ -153,10 +153,10 @@ def _joined(places: Places, wifi: WifiFile, is_new: bool, run: Run) -> str:
     )
 
 
-def _made(places: Places, wifi: WifiFile, card: str, is_new: bool, run: Run) -> str:
+def _made(folders: WifiFolders, wifi: WifiFile, card: str, is_new: bool, run: Run) -> str:
     if not is_new:
         return ""  # NetworkManager has started it
-    for folder in (places.saved, places.profiles):
+    for folder in (folders.saved, folders.profiles):
         (folder / PROFILE).unlink(missing_ok=True)
     given = {"card": card, "country": wifi.country, "name": wifi.name, "password": wifi.password}
     options = [word for option, value in given.items() for word in (f"--{option}", value)]
@@ -166,7 +166,7 @@ def _made(places: Places, wifi: WifiFile, card: str, is_new: bool, run: Run) -> 
 
 def main() -> int:
     """For the unit; the exit status."""
-    return join_wifi(Places(), finished, time.sleep, _name_box)
+    return join_wifi(WifiFolders(), finished, time.sleep, _name_box)
 
 
 def _name_box(name: str) -> None:

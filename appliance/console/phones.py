@@ -57,7 +57,7 @@ _NO_CODE = (
 )
 
 
-class _Place:
+class _PhoneSensor:
     """One sensor, and the phone that is it now. session: "" while no phone is."""
 
     def __init__(self, name: str, door: Door) -> None:
@@ -149,7 +149,7 @@ class Phones:
     ) -> None:
         door = Door(folder)
         self._guard, self._entrance, self._fallbacks = guard, entrance, fallbacks
-        self._places = {name: _Place(name, door) for name in names}
+        self._phones = {name: _PhoneSensor(name, door) for name in names}
         self._codes, self._wrong = JoinCodes(folder), WrongPins()
         with contextlib.suppress(OSError):
             self._codes.set_names(names)
@@ -168,67 +168,67 @@ class Phones:
         """Hear the stage all the time, so that a lamp changes while a phone only listens."""
         while True:
             now = time.monotonic()
-            for place in self._places.values():
-                if place.session and not self._is_allowed(place):
-                    place.session = ""  # the PIN was changed, or its device revoked
-                place.turn(now)
+            for phone in self._phones.values():
+                if phone.session and not self._is_allowed(phone):
+                    phone.session = ""  # the PIN was changed, or its device revoked
+                phone.turn(now)
             await asyncio.sleep(_TURN_S)
 
     def close(self) -> None:
-        for place in self._places.values():
-            place.sensor.close()
+        for phone in self._phones.values():
+            phone.sensor.close()
 
     async def _list(self, request: web.Request) -> web.Response:
         now = time.monotonic()
         return web.json_response(
             [
-                {"name": name, "taken": place.is_taken(now), "counts": dict(place.counts)}
-                for name, place in self._places.items()
+                {"name": name, "taken": phone.is_taken(now), "counts": dict(phone.counts)}
+                for name, phone in self._phones.items()
             ]
         )
 
     async def _new_code(self, request: web.Request) -> web.Response:
         """{"name"} of a sensor -> a code, and the squares of a QR code of its address, row by row."""
         values = await said(request)
-        place = self._place(values.get("name"))
+        phone = self._phone(values.get("name"))
         try:
-            code = self._codes.new_code(place.name, time.monotonic())
+            code = self._codes.new_code(phone.name, time.monotonic())
         except (KeyError, OSError):
             raise web.HTTPServiceUnavailable(
                 text="No code can be kept in the runtime folder. Free memory there."
             ) from None
         from appliance.console.phone_address import address_here, squares
 
-        address = address_here(request.scheme, request.host, place.name, code)
+        address = address_here(request.scheme, request.host, phone.name, code)
         return web.json_response({"address": address, "seconds": VALID_S, "squares": squares(address)})
 
     async def _join(self, request: web.Request) -> web.Response:
         """{"name", "where", "code" or "pass", "take_over"} -> {"session", "pass"}."""
         values = await said(request)
-        place, where = self._place(values.get("name")), values.get("where")
+        phone, where = self._phone(values.get("name")), values.get("where")
         if not isinstance(where, str) or where not in FRONTS:
             raise web.HTTPBadRequest(text=f"A phone is worn as one of: {', '.join(FRONTS)}.")
         now = time.monotonic()
         device = self._guard.device(request)
         token = values.get("pass")
-        is_own = isinstance(token, str) and self._codes.is_pass(place.name, token)
+        is_own = isinstance(token, str) and self._codes.is_pass(phone.name, token)
         owner = device.id if device is not None else "pass" if is_own else "code"
-        if place.is_taken(now) and owner != place.owner and values.get("take_over") is not True:
+        if phone.is_taken(now) and owner != phone.owner and values.get("take_over") is not True:
             raise web.HTTPConflict(
-                text=f"Another phone is {place.name} now. Close its page, or take its place."
+                text=f"Another phone is {phone.name} now. Close its page, or take its place."
             )
         if owner == "code":
-            token, owner = self._use_code(request, place.name, values.get("code"), now), "pass"
+            token, owner = self._use_code(request, phone.name, values.get("code"), now), "pass"
         self._know(request)
         own = token if owner == "pass" and isinstance(token, str) else ""
-        session = place.give(owner, own, FRONTS[where], now)
+        session = phone.give(owner, own, FRONTS[where], now)
         return web.json_response({"session": session, "pass": own})
 
-    def _is_allowed(self, place: _Place) -> bool:
+    def _is_allowed(self, phone: _PhoneSensor) -> bool:
         """Whether the phone that is this sensor may still be it."""
-        if place.owner == "pass":
-            return self._codes.is_pass(place.name, place.token)
-        return self._guard.remembers(place.owner)
+        if phone.owner == "pass":
+            return self._codes.is_pass(phone.name, phone.token)
+        return self._guard.remembers(phone.owner)
 
     def _use_code(self, request: web.Request, name: str, code: object, now: float) -> str:
         """The pass for a code. Raises 401 without one, 403 for a wrong one, 429 after too many of these."""
@@ -254,70 +254,70 @@ class Phones:
 
     async def _reading(self, request: web.Request) -> web.Response:
         values = await said(request)
-        place = self._of_session(values.get("session"))
-        if place is None:
+        phone = self._of_session(values.get("session"))
+        if phone is None:
             raise web.HTTPGone(text="This phone is no sensor any more: another one is, or it was away.")
         self._know(request)
-        return web.json_response(self._hear(place, values))
+        return web.json_response(self._hear(phone, values))
 
     async def _leave(self, request: web.Request) -> web.Response:
         """The page is closed: nothing more is sent, and the stage gives the joint back."""
-        place = self._of_session((await said(request)).get("session"))
-        if place is not None:
-            place.session = ""
-        return web.json_response({"done": place is not None})
+        phone = self._of_session((await said(request)).get("session"))
+        if phone is not None:
+            phone.session = ""
+        return web.json_response({"done": phone is not None})
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
         """The same by a WebSocket; answers come when something changed, and five times a second."""
-        phone = web.WebSocketResponse(
+        socket = web.WebSocketResponse(
             max_msg_size=_LONGEST_MESSAGE, compress=False, receive_timeout=_SILENT_SOCKET_S, timeout=1.0
         )
-        await phone.prepare(request)
+        await socket.prepare(request)
         newest: dict[str, Any] = {}
         answered_at = heard_at = -math.inf
         skipped = 0
         with contextlib.suppress(TimeoutError, ConnectionError):
-            async for message in phone:
+            async for message in socket:
                 now = time.monotonic()
                 if now - heard_at < _FLOOD_S and answered_at > -math.inf:
                     skipped += 1  # a flood costs no more than this
                     continue
                 heard_at = now
                 values = _object(message.data) if message.type == WSMsgType.TEXT else None
-                place = None if values is None else self._of_session(values.get("session"))
-                if values is None or place is None:
-                    await phone.close(code=1008, message=b"no sensor of this page")
+                phone = None if values is None else self._of_session(values.get("session"))
+                if values is None or phone is None:
+                    await socket.close(code=1008, message=b"no sensor of this page")
                     break
                 self._know(request, watches=True)
-                answer, skipped = self._hear(place, values, skipped), 0
+                answer, skipped = self._hear(phone, values, skipped), 0
                 if answer != newest or now - answered_at >= _ANSWER_EACH_S:
                     newest, answered_at = answer, now
-                    await phone.send_str(json.dumps(answer))
-        return phone
+                    await socket.send_str(json.dumps(answer))
+        return socket
 
-    def _hear(self, place: _Place, message: dict[str, Any], skipped: int = 0) -> dict[str, Any]:
+    def _hear(self, phone: _PhoneSensor, message: dict[str, Any], skipped: int = 0) -> dict[str, Any]:
         now = time.monotonic()
-        if why := place.hear(message, now, skipped):
+        if why := phone.hear(message, now, skipped):
             self._fallbacks.count(PHONE_REFUSED.name, now)
-            troubled = [one.name for one in self._places.values() if one.counts.keys() - {"late"}]
+            troubled = [one.name for one in self._phones.values() if one.counts.keys() - {"late"}]
             self._fallbacks.concern(PHONE_REFUSED.name, troubled)
-        return {"lamp": place.sensor.lamp, "linked": place.sensor.is_linked, "said": why}
+        return {"lamp": phone.sensor.lamp, "linked": phone.sensor.is_linked, "said": why}
 
-    def _place(self, name: object) -> _Place:
-        place = self._places.get(name) if isinstance(name, str) else None
-        if place is None:
+    def _phone(self, name: object) -> _PhoneSensor:
+        phone = self._phones.get(name) if isinstance(name, str) else None
+        if phone is None:
             raise web.HTTPNotFound(
                 text="No phone can be this sensor. The box file lists those that phones may be: "
                 "sensors: foreign."
             )
-        return place
+        return phone
 
-    def _of_session(self, session: object) -> _Place | None:
+    def _of_session(self, session: object) -> _PhoneSensor | None:
         if not isinstance(session, str) or not session:
             return None
         given = session.encode(errors="replace")
         return next(
-            (one for one in self._places.values() if secrets.compare_digest(one.session.encode(), given)),
+            (one for one in self._phones.values() if secrets.compare_digest(one.session.encode(), given)),
             None,
         )
 

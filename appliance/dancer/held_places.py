@@ -164,7 +164,7 @@ class RemotePlace(HeldPlace):
         if self._given is None:
             self.hold(place)
 
-    def release(self) -> None:
+    def let_go(self) -> None:
         """Give the joint back to the puppet."""
         self._given = None
 

@@ -12,7 +12,7 @@ import numpy as np
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
 from appliance.dancer.phrase import AT, FPS, LIFT, NUMBER, STANDING, Phrase, X, Z
-from appliance.dancer.reading_head import Reader, ReadingHead
+from appliance.dancer.playhead import Playhead, Reader
 from appliance.dancer.repertoire import Made, Repertoire
 from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.levers.sources import MAIN
@@ -308,7 +308,7 @@ class Playback:
 
     def _begin(self, position: float = 0.0, standing: tuple[float, float, float] | None = None) -> None:
         """Stand at a frame of the phrase, with a full window; `standing`: there on the stage."""
-        self._head = ReadingHead(self._excerpt, position, self._excerpt.poses[int(position)].copy())
+        self._head = Playhead(self._excerpt, position, self._excerpt.poses[int(position)].copy())
         if standing is not None:
             self._reader.read(self._head, self._entering_track)
             x, z = self._entering_track[[X, Z]].tolist()
@@ -344,7 +344,7 @@ class Playback:
     def _cross_over(self, loop: Loop, position: float, fade: int) -> None:
         """Start a crossfade of `fade` ticks to another position of a loop, placed where the figure stands."""
         leaving = self._head
-        entering = ReadingHead(loop, position, leaving.pose.copy())
+        entering = Playhead(loop, position, leaving.pose.copy())
         entering.placement = Placement.bringing(entering.standing, leaving.standing)
         self._head, self._crossfade = entering, Crossfade(leaving, fade)
         self._on_the_way, self._entered_at = self._window, position
@@ -359,7 +359,7 @@ def _checked_rate(rate: float) -> float:
 class Crossfade:
     """leaving: the head that is left; None: there is no crossfade."""
 
-    def __init__(self, leaving: ReadingHead | None = None, fade: int = 0) -> None:
+    def __init__(self, leaving: Playhead | None = None, fade: int = 0) -> None:
         """fade: ticks; 0: the leaving head is gone at once."""
         self.leaving = leaving if fade else None
         self._tick, self._length = 0.0, fade + 1.0
@@ -387,7 +387,7 @@ class Crossfade:
         return [self._tick, self._length]
 
     @staticmethod
-    def restored(leaving: ReadingHead | None, times: list[float]) -> Crossfade:
+    def restored(leaving: Playhead | None, times: list[float]) -> Crossfade:
         """Go on as another one stood."""
         crossfade = Crossfade()
         crossfade.leaving, (crossfade._tick, crossfade._length) = leaving, times

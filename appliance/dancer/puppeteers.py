@@ -323,7 +323,7 @@ class Remote(Puppeteer):
         if self._held is None:
             self.hold(orientation)
 
-    def release(self) -> None:
+    def let_go(self) -> None:
         """Give the joint back to the puppet."""
         self._held = None
 

@@ -12,7 +12,7 @@ import numpy as np
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
 from appliance.dancer.phrase import FPS, NUMBER, SHARED, Phrase, PhraseError
-from appliance.dancer.reading_head import ReadingHead
+from appliance.dancer.playhead import Playhead
 from appliance.levers.sources import GRANULAR, IMPROVISE, MAIN, PATH
 from appliance.pose.recording import Recording
 from appliance.show.config_error import did_you_mean
@@ -124,8 +124,8 @@ class Repertoire:
         phrase, own = self._phrases[name]
         return own if is_own else phrase.cut(start_s, start_s + length / FPS)
 
-    def head_state(self, head: ReadingHead) -> dict[str, Any]:
-        """A reading head as plain values and copies of arrays."""
+    def head_state(self, head: Playhead) -> dict[str, Any]:
+        """A playhead as plain values and copies of arrays."""
         place = head.placement
         return {
             "loop": self.named(head.loop),
@@ -134,10 +134,10 @@ class Repertoire:
             "placement": [float(place.yaw), float(place.x), float(place.z)],
         }
 
-    def head(self, state: dict[str, Any]) -> ReadingHead:
-        """The reading head of a `head_state`. Raises as `loop` does."""
+    def head(self, state: dict[str, Any]) -> Playhead:
+        """The playhead of a `head_state`. Raises as `loop` does."""
         pose = np.array(state["pose"], dtype=np.float32)
-        return ReadingHead(self.loop(state["loop"]), state["position"], pose, Placement(*state["placement"]))
+        return Playhead(self.loop(state["loop"]), state["position"], pose, Placement(*state["placement"]))
 
 
 def _unmade(recipe: str) -> Loop:

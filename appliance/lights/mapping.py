@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from appliance.lights.colour import between, mixed
 from appliance.lights.dance import Dances
-from appliance.lights.patch import Patch, Places, Values
+from appliance.lights.patch import Indices, Patch, Values
 from appliance.pose.ease import ease
 from appliance.show.light_rules import AIM, COLOUR, MappingConfig, RuleConfig
 
@@ -92,7 +92,7 @@ class _Rule:
     """A rule that drives slots by a number."""
 
     def __init__(self, config: RuleConfig, patch: Patch, driven: Mask) -> None:
-        self.slots: Places = patch.select(config.fixtures, config.drives)
+        self.slots: Indices = patch.select(config.fixtures, config.drives)
         self._config = config
         self._components = patch.components[self.slots] if config.drives == COLOUR else None
         self._colours = np.array(config.colours or [(1.0, 1.0, 1.0)])

@@ -17,7 +17,7 @@ from appliance.show.lights import FixtureConfig
 from appliance.show.venue_lights import UNIVERSE_CHANNELS
 
 Values = NDArray[np.float64]
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
 
 class Patch:
@@ -33,14 +33,14 @@ class Patch:
         for place, slot in enumerate(self.slots):
             self._own[slot.fixture.name].append(place)
         self.defaults: Values = np.array([self._default(slot) for slot in self.slots], float)
-        self.components: Places = np.array([slot.component for slot in self.slots], np.intp)
+        self.components: Indices = np.array([slot.component for slot in self.slots], np.intp)
         self.snaps: NDArray[np.bool_] = np.array([slot.config.snap for slot in self.slots], bool)
         self.dims: NDArray[np.bool_] = np.array([self._dims(slot) for slot in self.slots], bool)
         self.scaled, self.scales = self._stand_ins()
         self.heads: Heads = heads_of(self.slots)
         self._prepare_channels()
 
-    def select(self, names: Sequence[str], attribute: str) -> Places:
+    def select(self, names: Sequence[str], attribute: str) -> Indices:
         """Slots of an attribute on these fixtures ([]: on all); `red` also means `red 1`, `red 2`, ..."""
         found = []
         for name in names or self._own:
@@ -116,7 +116,7 @@ class Patch:
     def _has_dimmer(self, fixture: FixtureConfig) -> bool:
         return any(self.slots[place].name == DIMMER for place in self._own[fixture.name])
 
-    def _stand_ins(self) -> tuple[Places, Places]:
+    def _stand_ins(self) -> tuple[Indices, Indices]:
         """Colour slots that stand in for a missing dimmer, and the slot of that dimmer for each."""
         pairs = [
             (place, dimmer)

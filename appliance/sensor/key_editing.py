@@ -140,7 +140,7 @@ def editing(path: Path) -> Iterator[KeyEditing]:
         yield change
 
 
-class _Place(NamedTuple):
+class _EntrySpan(NamedTuple):
     """Span of an entry in the text: its name from `begin` to `name_end`, all of it to `end`."""
 
     begin: int
@@ -148,11 +148,11 @@ class _Place(NamedTuple):
     end: int
 
 
-def _places(text: str) -> dict[str, _Place]:
+def _entry_spans(text: str) -> dict[str, _EntrySpan]:
     root = composed(text)
     assert isinstance(root, yaml.MappingNode)  # it was read before, and has sensors
     return {
-        name.value: _Place(name.start_mark.index, name.end_mark.index, _end(value))
+        name.value: _EntrySpan(name.start_mark.index, name.end_mark.index, _end(value))
         for name, value in root.value
     }
 
@@ -165,8 +165,8 @@ def _end(node: yaml.Node) -> int:
 
 
 def _replaced(text: str, sensor: SensorKey) -> str:
-    place = _places(text)[sensor.name]
-    return text[: place.begin] + entry(sensor).rstrip("\n") + text[place.end :]
+    span = _entry_spans(text)[sensor.name]
+    return text[: span.begin] + entry(sensor).rstrip("\n") + text[span.end :]
 
 
 def _added(text: str, sensor: SensorKey) -> str:
@@ -175,13 +175,13 @@ def _added(text: str, sensor: SensorKey) -> str:
 
 def _removed(text: str, name: str) -> str:
     """Without the lines of this entry and the comment behind it."""
-    place = _places(text)[name]
-    begin, end = text.rfind("\n", 0, place.begin) + 1, text.find("\n", place.end)
+    span = _entry_spans(text)[name]
+    begin, end = text.rfind("\n", 0, span.begin) + 1, text.find("\n", span.end)
     return text[:begin] + (text[end + 1 :] if end >= 0 else "")
 
 
 def _renamed(text: str, names: Mapping[str, str]) -> str:
-    places = {name: place for name, place in _places(text).items() if name in names}
-    for name, place in sorted(places.items(), key=lambda item: item[1], reverse=True):
-        text = text[: place.begin] + json.dumps(names[name]) + text[place.name_end :]
+    spans = {name: span for name, span in _entry_spans(text).items() if name in names}
+    for name, span in sorted(spans.items(), key=lambda item: item[1], reverse=True):
+        text = text[: span.begin] + json.dumps(names[name]) + text[span.name_end :]
     return text

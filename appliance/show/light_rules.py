@@ -12,7 +12,7 @@ from appliance.show.fixture_profile import DIMMER
 from appliance.show.section import Axis, Joint, Section, key, refusal
 from appliance.show.venue_lights import Metres
 
-Pair = Annotated[tuple[float, float], Field(strict=False)]
+TwoNumbers = Annotated[tuple[float, float], Field(strict=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Colour = Annotated[tuple[Share, Share, Share], Field(strict=False)]
 Feature = Literal["qom", "weight_effort", "time_effort", "flow_effort", "space_effort"]
@@ -80,7 +80,7 @@ class RuleConfig(Section):
         "aim (pan and tilt follow the joint), colour, dimmer, or any attribute of the profile.",
         length=(1, 64),
     )
-    range: Pair | None = key(
+    range: TwoNumbers | None = key(
         "The readings that count as 0 and 1. Defaults: speed 0 to 2, height 0 to 2, across and "
         "depth -2 to 2, turn -180 to 180, lean 0 to 90, answer 0 to 25; qom 0 to 2, weight_effort 0 to 4, "
         "time_effort 0 to 20, flow_effort 0 to 1000, space_effort 1 to 4; of a hand, in radians, qom 0 to 7, "
@@ -91,10 +91,10 @@ class RuleConfig(Section):
         "Response from 0 to 1: s is gentle at both ends, gamma is slow at first.", "linear"
     )
     gamma: float = key("Exponent of the curve gamma.", 2.2, within=(0.1, 10))
-    points: list[Pair] = key(
+    points: list[TwoNumbers] = key(
         "Breakpoints [in, out] of the curve points, each 0 to 1, in ascending order.", [], length=(0, 32)
     )
-    output: Pair = key(
+    output: TwoNumbers = key(
         "The output at 0 and at 1, as fractions of the attribute's range; [1, 0] inverts it.", (0.0, 1.0)
     )
     value: Share = key("For steady: its value, 0 to 1.", 1.0)

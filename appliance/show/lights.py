@@ -19,7 +19,7 @@ from appliance.show.fixture_profile import (
     load_profile,
     profile_refusal,
 )
-from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, Pair, RuleConfig
+from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, RuleConfig, TwoNumbers
 from appliance.show.section import Section, key, part, refusal, refuse_repeats
 from appliance.show.venue_lights import (
     MAX_FIXTURES,
@@ -52,10 +52,10 @@ class FixtureConfig(Section):
         "Its rotation from there, in degrees: yaw about the vertical, pitch about x, roll about z.",
         (0.0, 0.0, 0.0),
     )
-    pan_limits: Pair | None = key(
+    pan_limits: TwoNumbers | None = key(
         "Pan stays between these degrees from its middle; default: its range.", None
     )
-    tilt_limits: Pair | None = key(
+    tilt_limits: TwoNumbers | None = key(
         "Tilt stays between these degrees from its middle; default: its range.", None
     )
     invert_pan: bool = key("Pan is inverted here.", False)

@@ -239,7 +239,7 @@ def _lead(order: Order, parts: StageParts) -> None:
         )
     if order.name == "release":
         for puppeteer in led:
-            puppeteer.release()
+            puppeteer.let_go()
         return
     wanted = RemotePlace if order.name == "place" else Remote
     led = [one for one in led if isinstance(one, wanted)]

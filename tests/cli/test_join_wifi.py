@@ -11,7 +11,7 @@ import pytest
 
 from appliance.cli import join_wifi as join_wifi_module
 from appliance.cli.console import card_lines
-from appliance.cli.join_wifi import MESSAGE_FILE, NETWORK_FILE, Places, join_wifi
+from appliance.cli.join_wifi import MESSAGE_FILE, NETWORK_FILE, WifiFolders, join_wifi
 from appliance.pose.foreign_file import content
 from appliance.release.wifi import NAME, PROFILE
 from appliance.show import yaml_file
@@ -36,7 +36,7 @@ class Box:
     def __post_init__(self) -> None:
         for name in ("stick", "boot", "kept", "run", "cards/wlan7/phy80211"):
             (self.folder / name).mkdir(parents=True)
-        self.places = Places(
+        self.folders = WifiFolders(
             (self.folder / "stick", self.folder / "boot"),
             self.folder / "kept",
             self.folder / "run",
@@ -46,7 +46,7 @@ class Box:
 
     def power_on(self) -> int:
         self.ran.clear()
-        return join_wifi(self.places, self._run, self._wait, self._name)
+        return join_wifi(self.folders, self._run, self._wait, self._name)
 
     @property
     def output(self) -> str:

@@ -296,7 +296,7 @@ def test_a_remote_hand_takes_and_releases() -> None:
     assert quaternion.angle_between(remote.pull(1.2).orientation, expected) < 1e-3
     remote.hold(RIGHT)
     assert quaternion.angle_between(remote.pull(1.22).orientation, np.array(RIGHT)) < 1e-3
-    remote.release()
+    remote.let_go()
     course = weights(remote, 1.24, 2.4)
     assert course[24] == pytest.approx(0.5, abs=0.05)
     assert course[-1] == 0.0
@@ -312,7 +312,7 @@ def test_a_hand_by_osc_holds_where_its_joint_is_unless_it_was_told_before() -> N
     remote.hold(RIGHT)
     remote.hold_here(LEFT)
     assert quaternion.angle_between(remote.pull(1.02).orientation, np.array(RIGHT)) < 1e-3
-    remote.release()
+    remote.let_go()
     assert weights(remote, 1.04, 3.0)[-1] == 0.0
 
 

@@ -81,7 +81,7 @@ def test_a_place_is_taken_from_where_the_joint_is_and_given_back(skeleton: Skele
     assert places[-1] == pytest.approx(THERE, abs=1e-3)
     assert weights[round(TAKE_S / TICK_S)] == pytest.approx(1.0, abs=0.01)
     assert np.diff(weights).max() < 0.07
-    hand.release()
+    hand.let_go()
     places, weights = course(hand, GIVE_BACK_S + 0.1, 2.0)
     assert np.abs(np.diff(weights)).max() < 0.04
     assert weights[-1] == 0.0
@@ -263,7 +263,7 @@ def danced(swaying: Recording, released_at: int) -> tuple[np.ndarray, np.ndarray
         at = tick % len(swaying)
         pose, root = swaying.poses[at].astype(np.float32), swaying.roots[at].astype(np.float32)
         if tick == released_at:
-            hand.release()
+            hand.let_go()
         hands.pull(tick * TICK_S, WINDOW[:, :2], root + grounding.shift, grounding.figure.positions)
         assert not hands.place_weights.any()  # the network has nothing to do with it
         grounding.draw_hips(*hands.hips_drawn)

@@ -18,7 +18,7 @@ from appliance.dancer.material.material_file import Material, read_material, rec
 from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import Phrase
-from appliance.dancer.reading_head import TURN_HOME
+from appliance.dancer.playhead import TURN_HOME
 from appliance.pose import quaternion
 from tests.bundles import FIGURE, MOVING, swaying_phrase
 from tests.sources import write_motion_network

@@ -163,7 +163,7 @@ def test_a_phrase_that_does_not_fit_is_refused(playback: Playback, swaying: Reco
 
 
 def test_a_switch_allocates_nothing_of_size(playback: Playback, walking: Recording) -> None:
-    """The loop of a phrase is some hundred kilobytes; a reading head is one pose."""
+    """The loop of a phrase is some hundred kilobytes; a playhead is one pose."""
     played(playback, 20)
     tracemalloc.start()
     for name in ("walk", "open", "main"):

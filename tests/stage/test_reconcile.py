@@ -35,6 +35,7 @@ from appliance.stage.sharing import facts_of
 from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from tests.bundles import FIGURE, write_show
+from tests.logged import said
 from tests.stage.declared import Commanded, Declared, enabled, follow
 from tests.stage.shows import BOX, NOW
 
@@ -74,7 +75,7 @@ def test_a_part_is_applied_once_so_that_what_came_after_it_stays(
     command("/hold", 1.0, text="Chest")
     chest = parts.led.hands.puppeteers[1]
     assert isinstance(chest, Remote)
-    chest.release()
+    chest.let_go()
     command("/hold", 0.0, text="lShldr")
     assert chest._held is None  # an order gave it back since
 
@@ -153,7 +154,7 @@ def test_with_nothing_declared_for_this_show_it_begins_as_it_does(
 
 @pytest.fixture
 def tick(parts: StageParts) -> Tick:
-    return Tick(parts, SensorFit(parts, SensorMemory(None, print), print), 1.0)
+    return Tick(parts, SensorFit(parts, SensorMemory(None)), 1.0)
 
 
 def danced(tick: Tick, ticks: int, begin: int = 0) -> np.ndarray:
@@ -345,8 +346,8 @@ def test_the_stage_begins_with_the_show_state_of_its_folder(show: Show, box: Box
         with closing(ShowStateWriter(box.runtime)) as writer:
             declared = ShowState(show="A test")
             writer.write(declared.to(CUE, cue, NOW).to(PHRASE, phrase, NOW) if cue else declared)
-        said: list[str] = []
-        stage = Stage(show, box, said.append)
+        said.clear()
+        stage = Stage(show, box)
         with closing(stage):
             stage.dance(0.1, lambda: False)
             assert (stage.reconciler.cue, stage.parts.led.motion.phrase) == (cue, phrase)
@@ -356,7 +357,7 @@ def test_the_stage_begins_with_the_show_state_of_its_folder(show: Show, box: Box
 def test_the_dance_follows_within_a_tick_reports_it_and_notes_it_before(show: Show, box: BoxConfig) -> None:
     with (
         closing(ShowStateWriter(box.runtime)) as writer,
-        closing(Stage(show, box, print)) as stage,
+        closing(Stage(show, box)) as stage,
         closing(CheckpointReader(box.runtime)) as checkpoint,
         closing(FrameReader(box.runtime)) as frames,
     ):
@@ -382,7 +383,7 @@ def test_the_dance_follows_within_a_tick_reports_it_and_notes_it_before(show: Sh
 
 
 def test_an_unchanged_show_state_leaves_nothing_to_the_collector(show: Show, box: BoxConfig) -> None:
-    with closing(ShowStateWriter(box.runtime)) as writer, closing(Stage(show, box, print)) as stage:
+    with closing(ShowStateWriter(box.runtime)) as writer, closing(Stage(show, box)) as stage:
         writer.write(ShowState(show="A test").to(RATE, 1.0, NOW))
         stage.reconciler.pending(NOW)
         gc.collect()

@@ -16,7 +16,7 @@ from appliance.dancer.material.improvising import BEFORE, MOVE, Numbers
 from appliance.dancer.material.motion_network import Poses
 from appliance.dancer.material.steps import HOP, MIDDLE, WINDOW, Coder, Steps, steps_of
 from appliance.dancer.phrase import FPS, SHARED, X, Z
-from appliance.dancer.reading_head import Reader, ReadingHead
+from appliance.dancer.playhead import Playhead, Reader
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
@@ -32,7 +32,7 @@ _LAST_PART = 0.8  # fraction of an improvisation after which its closing frame i
 def prompt_of(loop: Loop, frame: float, skeleton: Skeleton, coder: Coder, places: list[int]) -> str:
     """The prompt for an improvisation that begins at a frame of a loop, which goes on round its end."""
     first = frame - BEGINS
-    head = ReadingHead(loop, first + loop.period if first < 0 else first, loop.poses[0].copy())
+    head = Playhead(loop, first + loop.period if first < 0 else first, loop.poses[0].copy())
     poses, track = np.empty((FRAMES, *loop.poses.shape[1:]), np.float32), loop.track[0].copy()
     roots, reader = np.empty((FRAMES, 3)), Reader(len(skeleton))
     for row in range(FRAMES):

@@ -1,4 +1,4 @@
-"""Reading head: a position in a loop, its place on the stage, and how poses are read there."""
+"""Playhead: a position in a loop, its place on the stage, and how poses are read there."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _AT_HOME = math.radians(0.1)
 
 
 @dataclass
-class ReadingHead:
+class Playhead:
     """A position in a loop (frames and fractions), its place on the stage, and the pose (J, 4) read last,
     whose signs the next one follows.
     """
@@ -68,7 +68,7 @@ class Reader:
         self._sampled = np.empty((joints, 4), dtype=np.float32)
         self._signs = np.empty((joints, 1), dtype=np.float32)
 
-    def read(self, head: ReadingHead, track: FloatArray) -> None:
+    def read(self, head: Playhead, track: FloatArray) -> None:
         """Write head.pose (J, 4) and the track (C,) at the head's position, placed on the stage."""
         loop, placement, pose = head.loop, head.placement, self._sampled
         index = int(head.position)
