@@ -1,11 +1,13 @@
-"""A child process ends when its parent ends, however that happens."""
+"""A child process ends when its parent ends, however that happens; a fork that does one thing."""
 
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import signal
 import sys
+from collections.abc import Callable
 
 PARENT = "BUNRAKU_PARENT"  # in the environment: the process to end with
 REPORTED = "BUNRAKU_REPORTED"  # in the environment: the exit status of the try before, which has said why
@@ -30,3 +32,25 @@ def end_with(parent: int, by: signal.Signals) -> None:
 def was_reported(status: int) -> bool:
     """Whether the try before this one ended with the same status, and said why."""
     return os.environ.get(REPORTED) == str(status)
+
+
+def forked(do: Callable[[], object]) -> int:
+    """Run a function in a fork of this process, which is killed when this one ends; returns its number.
+
+    Its status is 0 unless the function raised: that is printed. Raises OSError where there is no fork.
+    """
+    parent = os.getpid()
+    if child := os.fork():
+        return child
+    status = 1
+    try:
+        gc.freeze()  # unused objects of the parent would close descriptors that are others by then
+        end_with(parent, signal.SIGKILL)
+        do()
+        status = 0
+    except Exception:
+        import traceback
+
+        traceback.print_exc()
+    finally:
+        os._exit(status)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from appliance.box.child import finished
 from appliance.cli.options import ChosenFile, ThisBoxFile, command_group
 from appliance.options.idle_options import refuse_idle
 from appliance.release.installed_box import box_here
@@ -190,9 +190,7 @@ def _writable(stick: Path) -> Iterator[None]:
         raise JournalError(
             f"No stick is at {stick}. Plug in one whose file system has the label BUNRAKU, or name a folder."
         )
-    done = subprocess.run(
-        ("mount", "-o", "remount,rw", str(stick)), capture_output=True, text=True, check=False
-    )
+    done = finished(("mount", "-o", "remount,rw", str(stick)))
     if done.returncode:
         said = done.stderr.strip().rpartition(":")[2].strip() or f"mount: status {done.returncode}"
         raise JournalError(
@@ -202,7 +200,7 @@ def _writable(stick: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        subprocess.run(("mount", "-o", "remount,ro", str(stick)), capture_output=True, check=False)
+        finished(("mount", "-o", "remount,ro", str(stick)))
 
 
 def _progress(written: int, size: int) -> None:

@@ -10,7 +10,7 @@ import signal
 import time
 from collections.abc import Callable
 
-from appliance.box.parent_death import end_with
+from appliance.box.parent_death import forked
 
 CHECK_S = 30.0  # for a show: some seconds on a slow box
 # The limit counts allocated memory: the default show with all its networks allocates 560 MB and uses 130. It
@@ -28,10 +28,7 @@ def run_with_timeout(seconds: float, do: Callable[[], bytes]) -> bytes:
     A process that hangs in the kernel, on a dead stick for example, cannot be killed and is left behind.
     """
     reading, writing = os.pipe()
-    parent = os.getpid()
-    child = os.fork()
-    if child == 0:
-        _answer(writing, do, parent)
+    child = forked(lambda: _answer(writing, do))
     with contextlib.suppress(OSError):
         os.setpgid(child, child)  # the child does the same, perhaps too late
     os.close(writing)
@@ -56,21 +53,11 @@ def limit_memory() -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
-def _answer(writing: int, do: Callable[[], bytes], parent: int) -> None:
-    """In the fork; does not return."""
-    status = 1
-    try:
-        os.setpgid(0, 0)  # its own children are killed with it
-        end_with(parent, signal.SIGKILL)
-        with os.fdopen(writing, "wb") as stream:
-            stream.write(b"!" + do())
-        status = 0
-    except BaseException:
-        import traceback
-
-        traceback.print_exc()
-    finally:
-        os._exit(status)
+def _answer(writing: int, do: Callable[[], bytes]) -> None:
+    """In the fork."""
+    os.setpgid(0, 0)  # its own children are killed with it
+    with os.fdopen(writing, "wb") as stream:
+        stream.write(b"!" + do())
 
 
 def _answered(reading: int, until: float, seconds: float) -> bytes:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import os
 import sys
 from collections.abc import Mapping
 from typing import Any
 
 from aiohttp import web
+
+from appliance.box.child import environment
 
 LARGEST = 8 << 20  # bytes of an answer
 _awaited: set[asyncio.Task[int]] = set()  # the ends of children; a task that nothing refers to may vanish
@@ -23,7 +24,7 @@ async def answer_of(function: str, patience_s: float, **keywords: Any) -> bytes:
     """
     command = sys.executable, "-m", "appliance.cli.page_calls", function
     said = json.dumps(keywords).encode()
-    env = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    env = environment(OPENBLAS_NUM_THREADS="1")
     try:
         status, answer, troubles = await output_of(*command, patience_s=patience_s, said=said, env=env)
     except TimeoutError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,8 @@ import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestClient, TestServer
 
+from appliance.box.parent_death import PARENT
+from appliance.console import child
 from appliance.console import help as help_requests
 from appliance.console import update as update_requests
 from appliance.console.box_view import BoxView
@@ -75,3 +78,15 @@ def test_a_stick_that_is_dying_does_not_hold_up_the_page(
 
     asyncio.run(main())
     assert was_free == [True], "the page stood still until the stick answered"
+
+
+def test_what_reads_for_the_page_ends_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[dict[str, str]] = []
+
+    async def noted(*command: str, env: dict[str, str], **_: Any) -> tuple[int, bytes, bytes]:
+        started.append(env)
+        return 0, b"{}", b""
+
+    monkeypatch.setattr(child, "output_of", noted)
+    asyncio.run(child.answer_of("about", 1.0))
+    assert started[0][PARENT] == str(os.getpid())
