@@ -10,12 +10,17 @@ from pathlib import Path
 import pytest
 
 from appliance.sensor.keys import KeyFileError, SensorKey, create_keys, load_keys
-from appliance.sensor.provisioning.provisioning import Provisioned, ProvisioningError, Settings, provision
+from appliance.sensor.provisioning.provisioning import (
+    Provisioned,
+    ProvisioningError,
+    WearableSettings,
+    provision,
+)
 from appliance.sensor.provisioning.wearable_console import ConsoleError, WearableConsole
 from tests.sensor.fake_console import FakeWearable, Memory
 
 pytestmark = pytest.mark.usefixtures("short_settling")
-SETTINGS = Settings("left-wrist", "stage net", "curtain up 9", 9751, "ndof", (0x21, 0x02))
+SETTINGS = WearableSettings("left-wrist", "stage net", "curtain up 9", 9751, "ndof", (0x21, 0x02))
 
 
 @pytest.fixture
@@ -26,7 +31,7 @@ def path(tmp_path: Path) -> Path:
 def provisioned(
     fake: FakeWearable,
     path: Path,
-    settings: Settings = SETTINGS,
+    settings: WearableSettings = SETTINGS,
     takes_over: bool = False,
     worn: Sequence[str] = (),
 ) -> tuple[Provisioned, list[str]]:
@@ -41,7 +46,7 @@ def provisioned(
 def refused(
     fake: FakeWearable,
     path: Path,
-    settings: Settings = SETTINGS,
+    settings: WearableSettings = SETTINGS,
     takes_over: bool = False,
     worn: Sequence[str] = (),
 ) -> str:
@@ -76,14 +81,14 @@ def test_both_sides_have_the_same_key_and_the_wearable_all_settings(path: Path) 
 @pytest.mark.parametrize(("crystal", "reported"), [(True, "yes"), (False, "no"), (None, "yes")])
 def test_a_crystal_is_set_only_when_asked_for(path: Path, crystal: bool | None, reported: str) -> None:
     with FakeWearable(Memory(crystal="yes")) as fake:
-        provisioned(fake, path, Settings("head", crystal=crystal))
+        provisioned(fake, path, WearableSettings("head", crystal=crystal))
     assert fake.saved.crystal == reported
     assert any(line.startswith("set crystal") for line in fake.heard) == (crystal is not None)
 
 
 def test_by_cable_alone_it_forgets_a_network_and_keeps_the_rest(path: Path) -> None:
     with FakeWearable(Memory("x", "none", b"", "old net", "old password", 1, "ndof", "21 02")) as fake:
-        provisioned(fake, path, Settings("head"))
+        provisioned(fake, path, WearableSettings("head"))
     assert (fake.saved.network, fake.saved.password) == ("", "")
     assert (fake.saved.fusion, fake.saved.axes) == ("ndof", "21 02")
 
@@ -101,8 +106,8 @@ def test_the_same_wearable_again_gets_a_new_key_under_its_old_id(path: Path) -> 
 
 def test_a_sensor_whose_name_is_a_word_of_the_console_is_known_again(path: Path) -> None:
     with FakeWearable() as fake:
-        provisioned(fake, path, Settings("device"))
-        done, _ = provisioned(fake, path, Settings("device"))
+        provisioned(fake, path, WearableSettings("device"))
+        done, _ = provisioned(fake, path, WearableSettings("device"))
     assert done.replaced
 
 
@@ -136,7 +141,9 @@ def test_a_wearable_of_the_show_does_not_leave_its_joint_to_replace_another(path
         reported = refused(fake, path, takes_over=True, worn=["right-ankle"])
         assert "This wearable is right-ankle, a sensor of this show" in reported
         assert fake.saved.key == b""
-        done, _ = provisioned(fake, path, Settings("right-ankle"), worn=["right-ankle"])  # its own name
+        done, _ = provisioned(
+            fake, path, WearableSettings("right-ankle"), worn=["right-ankle"]
+        )  # its own name
     assert load_keys(path)["right-ankle"] == done.sensor
 
 
@@ -282,7 +289,7 @@ def test_settings_that_cannot_be_are_refused_before_anything_is_asked(
 ) -> None:
     given = {"name": "a", "network": "net", "password": "password", **wrong}
     with pytest.raises(ProvisioningError, match=message) as caught:
-        Settings(**given)  # type: ignore[arg-type]
+        WearableSettings(**given)  # type: ignore[arg-type]
     assert "with\nline end" not in str(caught.value)
 
 

@@ -23,7 +23,7 @@ from appliance.cli.sensors.worn import worn_sensors
 from appliance.sensor.provisioning.provisioning import (
     DEFAULT_PORT,
     Provisioned,
-    Settings,
+    WearableSettings,
     provision,
 )
 from appliance.sensor.provisioning.serial_ports import found_ports, only_wearable
@@ -57,7 +57,9 @@ def provision_sensor(
 
     require_folder(box_keys.keys)
     try:
-        settings = Settings(name, network or "", "", _udp_port(box_keys), fusion, _axes(axes), crystal)
+        settings = WearableSettings(
+            name, network or "", "", _udp_port(box_keys), fusion, _axes(axes), crystal
+        )
         is_asked = network is not None and password_file is None and sys.stdin.isatty()
         if not is_asked:
             settings = replace(settings, password=_read_password(network, password_file))
@@ -136,7 +138,7 @@ def _axes(text: str | None) -> tuple[int, int] | None:
 
 
 def _hints(
-    box_keys: BoxKeys, done: Provisioned, settings: Settings, device: str, was_worn: bool
+    box_keys: BoxKeys, done: Provisioned, settings: WearableSettings, device: str, was_worn: bool
 ) -> list[str]:
     """The next steps, and box file settings that would keep the wearable out."""
     name, sensors = done.sensor.name, box_keys.box.sensors

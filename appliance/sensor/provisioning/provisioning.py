@@ -32,7 +32,7 @@ class ProvisioningError(CorrectableError):
 
 
 @dataclass(frozen=True)
-class Settings:
+class WearableSettings:
     """A wearable's new settings. Empty `network`: cable only. None: unchanged."""
 
     name: str
@@ -62,7 +62,7 @@ class Provisioned:
 def provision(
     console: WearableConsole,
     path: Path,
-    settings: Settings,
+    settings: WearableSettings,
     say: Callable[[str, str], None],
     takes_over: bool = False,
     worn: Container[str] = (),
@@ -158,7 +158,7 @@ def _new_key(name: str, change: KeyEditing, takes_over: bool) -> SensorKey:
     return SensorKey(name, change.keys[name].device_id if has_place else new.device_id, new.key)
 
 
-def _draft(console: WearableConsole, sensor: SensorKey, settings: Settings) -> None:
+def _draft(console: WearableConsole, sensor: SensorKey, settings: WearableSettings) -> None:
     """Everything to the wearable's draft, which counts for nothing until it is saved."""
     try:
         console.ask(f"set name {sensor.name}")
@@ -210,7 +210,7 @@ def _save(console: WearableConsole, sensor: SensorKey, path: Path) -> None:
         raise ProvisioningError(f"The wearable lost its key while it was saved. {unsure}")
 
 
-def _way(settings: Settings) -> str:
+def _way(settings: WearableSettings) -> str:
     return f"network '{settings.network}', port {settings.port}" if settings.network else "by cable alone"
 
 
