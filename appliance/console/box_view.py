@@ -6,7 +6,7 @@ import json
 import time
 from typing import Any
 
-from appliance.box.roster import RosterLine
+from appliance.box.roster import Roster, RosterLine
 from appliance.box.show_state import ShowStateReader
 from appliance.console.desk import NO_COMMANDS, SILENT, Desk
 from appliance.console.seen_stage import SeenStage
@@ -32,7 +32,6 @@ from appliance.show_control.status_messages import hands_of, names_of, status
 _NO_BATTERY = 255
 _KNOBS = (STIFFNESS, STORM, FEEDBACK)  # knobs of the springs
 _SAME_STAGE_S = 5.0  # a stage that seems to have started this much later is another one
-_FIELDS = len(RosterLine._fields)
 
 
 class BoxView:
@@ -47,6 +46,7 @@ class BoxView:
         self._desk, self._stage, self._seen = desk, stage, seen
         self._batteries: dict[str, int] = {}
         self._late: tuple[int, int] | None = None
+        self._saw_late = False
         self._since = self._started = time.monotonic()  # the other clock may be set meanwhile
         self.value: dict[str, Any] = {}
         self.text = "{}"
@@ -64,14 +64,14 @@ class BoxView:
         counted = int(reported.get("refused", 0)), int(reported.get("strangers", 0))
         known = status(state, seen, *counted, now, str(reported.get("live", ""))) if control else None
         frames = self._stage.state(now)
-        lines = seen.health().get("sensors", ()) if self._stage.lives else ()
-        sensors = [self._sensor(RosterLine(*line)) for line in lines if len(line) == _FIELDS]
+        roster = Roster.reported(seen.health() if self._stage.lives else {})
+        sensors = [self._sensor(line) for line in roster.lines]
         fallbacks = [{"process": process, **one._asdict()} for process, one in seen.fallbacks(now)]
         self._note_late(known, now)
         since = _unix(self._since, now)
         held = self._stage.held() if frames == "fresh" else ()
         hands = [one._asdict() | {"is_held": one.joint in held} for one in hands_of(seen)] if known else []
-        judged: Verdict = verdict(frames, known, sensors, fallbacks, since, trouble)
+        judged: Verdict = verdict(frames, known, sensors, fallbacks, since, trouble, self._saw_late)
         return {
             "time": time.time(),
             "trouble": trouble,
@@ -136,10 +136,11 @@ class BoxView:
             return
         late, started = (status.late, status.skipped), now - status.uptime_s
         if self._late is None or started > self._started + _SAME_STAGE_S:
+            self._saw_late = self._late is not None
             self._started = started
             self._since = started if late == (0, 0) else now
         elif late != self._late:
-            self._since = now
+            self._since, self._saw_late = now, True
         self._late = late
 
 

@@ -28,8 +28,12 @@ def verdict(
     fallbacks: Sequence[dict[str, Any]],
     since: float,
     trouble: str,
+    saw_late: bool = True,
 ) -> Verdict:
-    """The verdict on the box at this moment; `since`: no tick was late after it, Unix seconds."""
+    """The verdict on the box at this moment; `since`: no tick was late after it, Unix seconds.
+
+    saw_late: the last late tick came at `since`. A page that has just started knows only of none since.
+    """
     if frames != "fresh":
         return Verdict("fault", "stage_absent" if frames == "absent" else "stage_hung", {})
     if trouble or status is None:
@@ -48,7 +52,7 @@ def verdict(
     if status.level <= 0.0:
         return Verdict("held", "dark", counts)
     late = status.late + status.skipped
-    if late and time.time() - since < _RECENT_S:
+    if late and saw_late and time.time() - since < _RECENT_S:
         return Verdict("warning", "late", {"late": late, "since": since})
     key = "well" if worn else "well_alone"
     return Verdict("well", key, {**counts, "rate": round(status.rate_hz, 1), "since": since})

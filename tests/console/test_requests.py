@@ -355,6 +355,24 @@ def test_a_clock_that_is_set_back_keeps_no_warning(
     assert verdict("fresh", status, [], [], view._value(began + 62.0)["since"], "").key == "well_alone"
 
 
+def test_a_page_that_starts_again_does_not_date_late_ticks_that_it_has_not_seen(
+    tmp_path: Path, view: BoxView
+) -> None:
+    """The journal has their time; the page says only that none came after its own start."""
+    control = ControlInThread(tmp_path)
+    until(lambda: (view.refresh(), view.value["status"])[1] is not None)
+    status = Status(state="dancing", rate_hz=50.0, level=1.0, late=2, uptime_s=600.0)
+    began = time.monotonic()
+    fresh = BoxView(view._desk, view._stage, view._seen, view._show_state)
+    fresh._note_late(status, began)
+    assert not fresh._saw_late
+    fresh._note_late(status._replace(late=3, uptime_s=601.0), began + 1.0)
+    assert fresh._saw_late
+    for saw_late, key in ((False, "well_alone"), (True, "late")):
+        assert verdict("fresh", status, [], [], time.time(), "", saw_late).key == key
+    control.close()
+
+
 def test_without_show_control_the_page_says_so(tmp_path: Path, view: BoxView) -> None:
     view.refresh()
     assert (view.value["trouble"], view.value["status"], view.value["hands"]) == (SILENT, None, [])
