@@ -1,11 +1,14 @@
-"""Where the projector leaves a picture of the wall, and how old it may be: the page reads it."""
+"""Where the projector leaves a picture of the wall, how old it may be, and how the page asks for more."""
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 WALL = "wall.jpg"  # in the runtime folder, in memory
 EVERY_S = 10.0
+ASKED = "wall.asked"  # touched by a page that somebody looks at
+SOON_S = 2.0  # then
 LARGEST = 200_000  # bytes
 
 
@@ -18,3 +21,17 @@ def wall_picture(folder: Path, now: float) -> bytes:
     except OSError:
         return b""
     return content if len(content) <= LARGEST and abs(now - written) <= 3 * EVERY_S else b""
+
+
+def ask_for_wall(folder: Path) -> None:
+    """For the next ten seconds pictures come every two."""
+    with contextlib.suppress(OSError):
+        (folder / ASKED).touch()
+
+
+def is_wall_asked_for(folder: Path, now: float) -> bool:
+    """Whether somebody looks. now: Unix seconds."""
+    try:
+        return abs(now - (folder / ASKED).stat().st_mtime) <= EVERY_S
+    except OSError:
+        return False

@@ -15,7 +15,7 @@ from typing import Any
 from aiohttp import web
 
 from appliance.box.durable import private_folder, write_whole
-from appliance.box.wall_file import wall_picture
+from appliance.box.wall_file import ask_for_wall, wall_picture
 from appliance.console.box_view import BoxView
 from appliance.console.stage_view import StageView
 from appliance.outputs.frame_layout import BROWSER_HEAD, GHOST
@@ -40,6 +40,7 @@ class Night:
             web.get("/api/night", self._list),
             web.get("/api/night/{at}.svg", self._serve),
             web.get("/api/now.svg", self._now),
+            web.get("/api/wall.jpg", self._newest),
         ]
 
     async def watch(self) -> None:
@@ -95,6 +96,14 @@ class Night:
 
     async def _now(self, request: web.Request) -> web.Response:
         return _svg(self.picture(time.time()).encode())
+
+    async def _newest(self, request: web.Request) -> web.Response:
+        """The wall; a page that asks again and again has a new picture every two seconds."""
+        ask_for_wall(self._runtime)
+        picture = wall_picture(self._runtime, time.time())
+        if not picture:
+            raise web.HTTPNotFound(text="There is no such picture.")
+        return web.Response(body=picture, content_type="image/jpeg")
 
 
 def _svg(body: bytes) -> web.Response:

@@ -1,15 +1,16 @@
-"""The wall as it is now, for somebody far away: a small picture in the runtime folder, every ten seconds."""
+"""The wall as it is now, for the page: a small picture every ten seconds, or every two if it asks."""
 
 from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 from PIL import Image
 
-from appliance.box.wall_file import EVERY_S, WALL
+from appliance.box.wall_file import EVERY_S, SOON_S, WALL, is_wall_asked_for
 
 WIDTH = 480  # pixels at least, where the wall has as many; less than twice as many
 _QUALITY = 70  # JPEG quality: 8 to 25 kB a picture
@@ -20,13 +21,16 @@ class SeenWall:
     """Writes the picture from its own thread: a picture costs the projector one read of the screen."""
 
     def __init__(self, folder: Path) -> None:
-        self._path = folder / WALL
-        self._next_at = 0.0
+        self._folder, self._path = folder, folder / WALL
+        self._soon_at = self._next_at = 0.0
         self._writing: threading.Thread | None = None
 
     def offer(self, now: float, size: tuple[int, int], read: Callable[[], bytes]) -> None:
         """Take this picture, if it is time to. read: its RGBA bytes, bottom row first."""
-        if now < self._next_at or (self._writing is not None and self._writing.is_alive()):
+        if now < self._soon_at or (self._writing is not None and self._writing.is_alive()):
+            return
+        self._soon_at = now + SOON_S
+        if now < self._next_at and not is_wall_asked_for(self._folder, time.time()):
             return
         self._next_at = now + EVERY_S
         self._writing = threading.Thread(target=self._write, args=(read(), size), daemon=True)

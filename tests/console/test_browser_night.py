@@ -7,7 +7,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Browser
 
-from appliance.box.wall_file import WALL
+from appliance.box.wall_file import ASKED, WALL
 from tests.console.page import Page
 
 
@@ -16,6 +16,8 @@ def test_the_wall_is_seen_from_far_away(own_page: Page, browser: Browser, tmp_pa
     runtime = own_page.box_file.parent / "runtime"
     Image.new("RGB", (480, 270), (200, 40, 10)).save(runtime / WALL)
     tab = browser.new_page(viewport={"width": 640, "height": 420})
+    answer = tab.goto(f"{own_page.origin}/api/wall.jpg")
+    assert answer is not None and answer.status == 200 and (runtime / ASKED).exists(), "it asks"
     tab.goto(f"{own_page.origin}/api/now.svg")
     for where in ("by itself", "in the page"):
         if where == "in the page":
