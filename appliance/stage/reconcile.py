@@ -44,7 +44,7 @@ class Reconciler:
         """
         self.parts = parts
         self.generation, self.cue, self.message = 0, "", ""
-        self.rate = self._usual_rate = parts.led.motion.rate
+        self.rate = self._usual_rate = parts.rate
         self._show, self._reader = show, reader
         self._is_first = parts.led.springs is not None or parts.continuing is not None
         self._gate = True
@@ -86,7 +86,7 @@ class Reconciler:
         live, declared = self.parts.led.live, self._declared
         wanted = declared.value if declared else self.source
         melt_s = declared.seconds if declared else MELT_S
-        self.wanted = "" if wanted in self.parts.led.motion.phrases else wanted
+        self.wanted = "" if wanted in self.parts.phrases else wanted
         if wanted == LIVE and live is not None and not (orders or live.is_chosen):
             # After a restart: checkpoints know phrases only.
             orders.append(order_of(PHRASE, declared) if declared else Order(PHRASE.name, (), LIVE))
@@ -97,7 +97,7 @@ class Reconciler:
             if (order := made.order(source, fade_s, now)) is not None:
                 orders.append(order)
         rate = self.rate if self._going or not show_state.stands(now) else 0.0
-        if rate != self.parts.led.motion.rate:
+        if rate != self.parts.rate:
             orders.append(Order("rate", (rate,)))
         return orders
 
@@ -121,7 +121,7 @@ class Reconciler:
 
     def _is_made(self, name: str) -> bool:
         """Whether the generator makes it: a source, or a motion that was kept."""
-        return bool(self._made) and name != LIVE and name not in self.parts.led.motion.phrases
+        return bool(self._made) and name != LIVE and name not in self.parts.phrases
 
     def danced_before(self, *numbers: int) -> list[Material | None]:
         """The motions that the puppets danced before a restart, by number; None: a phrase, or it is not there
@@ -140,7 +140,7 @@ class Reconciler:
         """Before the first tick: begin with what is declared, without fades; a sentence about it, or ""."""
         messages: list[str] = []
         for order in self.pending(now):
-            if order.name == "phrase" and order.text in self.parts.led.motion.phrases:
+            if order.name == "phrase" and order.text in self.parts.phrases:
                 self.parts.led.motion.start_with(order.text)
                 continue
             messages.append(obey(without_fade(order), self.parts)[1])

@@ -96,6 +96,21 @@ class StageParts:
         """The springs of all puppets that have some among their hands."""
         return [one.springs for one in self.puppets if one.springs is not None]
 
+    @property
+    def has_live(self) -> bool:
+        """Whether the show has a live dancer: then each puppet may dance after it."""
+        return self.live_figure is not None
+
+    @property
+    def rate(self) -> float:
+        """Of playback: one for all puppets."""
+        return self.puppets[0].motion.rate
+
+    @property
+    def phrases(self) -> tuple[str, ...]:
+        """Names of the show's phrases, which each puppet may play."""
+        return self.puppets[0].motion.phrases
+
     def run_with(self, measured: Admission) -> None:
         """Let each puppet run with as many of its iterations as fit."""
         for one in self.puppets:
@@ -112,7 +127,7 @@ class StageParts:
 
     def hear_live(self) -> LivePose | None:
         """The pose of a live dancer that has come since the last tick, once it is believed."""
-        heard = None if self.led.live is None or self.live_inbox is None else self.live_inbox.read()
+        heard = self.live_inbox.read() if self.live_inbox is not None and self.has_live else None
         if heard is None:
             return None
         pose = np.frombuffer(heard.rotations, np.float32).reshape(-1, 4)
@@ -137,10 +152,9 @@ class StageParts:
 
     def show_live(self, now: float, out: FloatArray) -> None:
         """Write where a live dancer's joints are, (J, 3) metres; zeros: nobody is there."""
-        if self.live_figure is None or self.led.live is None:
+        if self.live_figure is None or (live := self.puppets[0].live) is None:
             return
-        seen = self.led.live.look(now)
-        if seen is None:
+        if (seen := live.look(now)) is None:
             out[:] = 0.0
             return
         self.live_figure.set_pose(*seen)
