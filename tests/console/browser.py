@@ -37,10 +37,15 @@ def opened_context(browser: Browser, **options: Any) -> BrowserContext:
     return made
 
 
-def press(tab: Tab, where: str) -> None:
-    """By finger on a phone, by mouse on a laptop."""
+def press(tab: Tab, where: str) -> bool:
+    """By finger on a phone, by mouse on a laptop; whether *More* had to be opened for it first."""
     is_phone = tab.evaluate("matchMedia('(pointer: coarse)').matches")
-    (tab.tap if is_phone else tab.click)(where)
+    act = tab.tap if is_phone else tab.click
+    is_behind = "[data-page" in where and tab.locator(where).is_hidden() and tab.locator("#more").is_visible()
+    if is_behind:
+        act("#more")
+    act(where)
+    return is_behind
 
 
 def speak(tab: Tab, language: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import time
 from pathlib import Path
@@ -39,7 +40,10 @@ LEAST_CONTRAST = 4.5  # WCAG 2.2, 1.4.3
 @ON_BOTH
 def test_panic_asks_for_the_pin_once_and_is_then_done(tab: Tab, venue: tuple[Box, Page]) -> None:
     box, page = venue
-    expect(tab.locator("#panic-does")).to_have_text("asks for the PIN")
+    lock = "getComputedStyle(document.querySelector('#panic b'), '::before').content"
+    expect(tab.locator("#panic-does")).to_have_text("black at once, safe light")
+    expect(tab.locator("#panic")).to_have_attribute("aria-description", "It asks for the PIN first.")
+    assert tab.evaluate(lock) != "none", "without the PIN it has a lock"
     press(tab, "#panic")
     expect(tab.locator("#pin")).to_be_visible()
     expect(tab.locator("#pin-said")).to_have_text("PANIC follows as soon as the PIN is entered.")
@@ -55,7 +59,8 @@ def test_panic_asks_for_the_pin_once_and_is_then_done(tab: Tab, venue: tuple[Box
     assert declared(box).panic
     press(tab, "#resume")
     expect(tab.locator("#panic")).to_have_attribute("aria-pressed", "false")
-    expect(tab.locator("#panic-does")).to_have_text("dark, lights safe")
+    expect(tab.locator("#panic-does")).to_have_text("black at once, safe light")
+    assert tab.evaluate(lock) == "none" and tab.get_attribute("#panic", "aria-description") is None
     assert not declared(box).panic
     tab.reload()
     await_box(tab)
@@ -125,7 +130,7 @@ def test_a_thumb_that_scrolls_over_panic_does_nothing(browser: Browser, venue: t
     tab.goto(page.origin)
     await_box(tab)
     unlock(tab, page)
-    tab.tap('[data-page="tonight"]')
+    press(tab, '[data-page="tonight"]')
     place = tab.locator("#panic").bounding_box()
     assert place is not None and place["width"] >= 150 and place["height"] >= 64
     x, y = place["x"] + 60, place["y"] + 60
@@ -212,7 +217,7 @@ def test_it_speaks_german_to_a_german_phone(browser: Browser, venue: tuple[Box, 
     expect(tab.locator("html")).to_have_attribute("lang", "de")
     for said, german in ANSWERS:
         assert tab.evaluate(TRANSLATED, said) == german
-    tab.tap('[data-page="device"]')
+    press(tab, '[data-page="device"]')
     tab.tap("#languages >> text=English")
     expect(tab.locator("#panic b")).to_have_text("PANIC")
     context.close()
@@ -253,9 +258,11 @@ def test_every_control_has_a_name_and_can_be_read(tab: Tab) -> None:
         assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), f"{page} scrolls sideways"
 
 
-# Of each tab: where it is, how high it is, how large its letters are, and whether they fit.
-TABS = """() => [...document.querySelectorAll('nav button:not([hidden])')].map((one) => [one.offsetTop,
-  one.offsetHeight, parseFloat(getComputedStyle(one).fontSize), one.scrollWidth <= one.clientWidth])"""
+# Of each tab in view: its page, where it is, how high it is, how large its letters are, whether they fit.
+TABS = """() => [...document.querySelectorAll('nav button')].filter((one) => one.offsetParent !== null)
+  .map((one) => [one.dataset.page ?? one.id, one.offsetTop, one.offsetHeight,
+    parseFloat(getComputedStyle(one).fontSize), one.scrollWidth <= one.clientWidth])"""
+NEEDED = ["tonight", "dance", "sensors", "picture"]  # during a show
 LEAST_TOUCH_PX, LEAST_LETTERS_PX = 44, 13
 
 
@@ -263,14 +270,44 @@ LEAST_TOUCH_PX, LEAST_LETTERS_PX = 44, 13
 @pytest.mark.parametrize("language", ["en", "de", "fr"])
 def test_the_tabs_are_one_row_that_can_be_read_and_touched(tab: Tab, language: str) -> None:
     speak(tab, language)
+    row = tab.evaluate(TABS)
+    assert [page for page, *_ in row][:4] == NEEDED
+    assert len({top for _, top, *_ in row}) == 1
+    is_phone = tab.locator("#more").is_visible()
+    if is_phone:
+        assert len(row) == 5
+        press(tab, "#more")
     found = tab.evaluate(TABS)
-    assert len({top for top, *_ in found}) == 1
+    assert len(found) == 9 + is_phone
     assert all(
-        high >= LEAST_TOUCH_PX and letters >= LEAST_LETTERS_PX and fits for _, high, letters, fits in found
+        high >= LEAST_TOUCH_PX and letters >= LEAST_LETTERS_PX and fits for _, _, high, letters, fits in found
     )
     press(tab, '[data-page="device"]')
-    last, across = tab.locator('[data-page="device"]').bounding_box(), tab.evaluate("innerWidth")
-    assert last is not None and last["x"] >= 0 and last["x"] + last["width"] <= across
+    last, across = tab.locator('[data-page="device"]'), tab.evaluate("innerWidth")
+    expect(last).to_have_attribute("aria-current", "page")
+    assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert tab.evaluate(TABS) == row, "no tab has moved"
+    assert (place := tab.locator("#more" if is_phone else '[data-page="device"]').bounding_box()) is not None
+    assert place["x"] >= 0 and place["x"] + place["width"] <= across
+
+
+def test_the_keyboard_opens_the_other_pages_and_comes_back(tab: Tab) -> None:
+    """Screen readers hear which page is open, also while its tab is behind *More*."""
+    more, pages = tab.locator("#more"), tab.locator("#more-pages")
+    expect(pages).to_be_hidden()
+    more.press("Enter")
+    expect(more).to_have_attribute("aria-expanded", "true")
+    tab.keyboard.press("Tab")
+    assert tab.evaluate("document.activeElement.dataset.page") == "happened"
+    tab.keyboard.press("Escape")
+    expect(pages).to_be_hidden()
+    expect(more).to_be_focused()
+    press(tab, '[data-page="box"]')
+    expect(pages).to_be_hidden()
+    expect(more).to_have_attribute("aria-current", "true")
+    expect(more).to_have_text(re.compile("More.*Box"))
+    press(tab, '[data-page="tonight"]')
+    assert more.get_attribute("aria-current") is None
 
 
 @ON_A_LAPTOP

@@ -26,7 +26,7 @@ def night() -> dict[str, Any]:
         [100.0, "order", "look lines"],
         [1500.0, "said", SILENT],
         [1501.0, "said", SILENT],
-        [2000.0, "order", "master 0.4 (refused)"],
+        [2000.0, "order", "master 0.4 3.0 (refused)"],
     ]
     facts = {"number": 1, "begun": BEGUN, "show": "One hand", "seconds": SECONDS, "bin_s": SECONDS / BINS}
     return {**facts, **counts, "slowest_ms": slowest, "events": events}
@@ -40,7 +40,8 @@ def test_the_list_has_the_newest_first_marks_what_is_severe_and_is_filtered(tab:
     expect(kinds.locator("b")).to_have_text(["4", "1", "2", "1"])
     kinds_in_order = ["order", "said", "fault", "order"]
     assert [one.get_attribute("data-kind") for one in rows.all()] == kinds_in_order
-    expect(tab.locator("#happened-events li.refused")).to_contain_text("master 0.4 (refused)")
+    expect(tab.locator("#happened-events li.refused")).to_contain_text("Master: 40 % · 3 s (refused)")
+    expect(rows.last).to_contain_text("Look: lines")
     press(tab, "#happened-kinds [data-kind=fault]")
     expect(rows).to_have_count(1)
     expect(rows).to_contain_text("late: 5, skipped: 1slowest tick 44.0 ms")

@@ -39,7 +39,7 @@ def test_without_any_other_network_every_page_opens_and_the_figure_dances(tmp_pa
                 tab.goto(f"http:{own}")
                 await_box(tab)
                 observe(tab)
-                pages = tab.locator("[data-page]:visible")
+                pages = tab.locator("[data-page]:not([hidden])")
                 names = [str(one.get_attribute("data-page")) for one in pages.all()]
                 assert len(names) >= 8
                 for name in (*names, "dance"):

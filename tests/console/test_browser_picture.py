@@ -17,7 +17,7 @@ from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 from appliance.levers.table import LOOK
 from appliance.show.look import STYLES
 from tests.bundles import write_show
-from tests.console.browser import ON_BOTH, await_true, declared, press, unlocked_tab
+from tests.console.browser import ON_BOTH, await_box, await_true, declared, press, unlocked_tab
 from tests.console.page import Page, box_with_page
 from tests.system.box import Box
 from tests.system.lit import DIMMER, PAR, RIG, Node, artnet, node
@@ -126,6 +126,25 @@ def test_a_look_is_chosen_by_its_picture(context: BrowserContext, hall: tuple[Bo
     press(tab, f"#looks >> text={STYLES[1]}")
     wait_until(lambda: declared(box)[LOOK].value == STYLES[1], lambda: tab.inner_text("#said"))
     expect(tab.locator(f'#looks button:has-text("{STYLES[1]}")')).to_have_attribute("aria-pressed", "true")
+
+
+@ON_BOTH
+def test_the_wall_is_seen_above_the_looks(
+    context: BrowserContext, hall: tuple[Box, Page, Node], wall: Projection
+) -> None:
+    """As the projector shows it, with newer pictures while somebody looks; without the PIN too."""
+    tab = context.new_page()
+    asked: set[str] = set()
+    is_wall = re.compile(r"wall\.jpg")
+    tab.on("response", lambda one: asked.add(one.url) if one.ok and is_wall.search(one.url) else None)
+    tab.goto(hall[1].origin)
+    await_box(tab)
+    press(tab, '[data-page="picture"]')
+    await_true(tab, "document.querySelector('#wall-now').naturalWidth > 0")
+    wait_until(lambda: tab.wait_for_timeout(200) or len(asked) > 2, "no newer picture comes")
+    seen, looks = tab.locator("#wall-part").bounding_box(), tab.locator("#looks").bounding_box()
+    assert seen is not None and looks is not None
+    assert seen["y"] < looks["y"] + 1, "above, or on a laptop next to them"
 
 
 @ON_BOTH

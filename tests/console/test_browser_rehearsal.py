@@ -96,6 +96,6 @@ def test_each_part_of_a_rehearsal_is_a_tap_away_with_the_figure_in_view(tab: Tab
         button.tap()
         expect(opened).to_have_count(1)
         expect(opened).to_have_attribute("data-part", button.get_attribute("data-opens") or "")
-        for part in (tab.locator("#figure"), opened.locator("h2").first):
+        for part in (tab.locator("#figure"), opened):
             place = part.bounding_box()
             assert place is not None and 80 < place["y"] < 640, "between the sentence on top and the buttons"

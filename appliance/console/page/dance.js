@@ -7,6 +7,8 @@ const GRID_M = 3;
 const NEAR_M = 4.5, BACK = 1.8; // the eye from one dancer; and for each metre that several are from their middle
 const GHOST = 2, GHOST_M = 1.0; // a flag of a frame: stage_view.py; how far beside the puppet the phrase is drawn
 const HELD = 0.01; // less is not seen
+const FILLS = 0.84, MIDDLE = 0.46, ABOVE_M = 0.12, WIDE_M = 1.5; // how much of the height a body takes, and where its middle is; above its highest joint; how wide one is
+const RISES = 0.2, SETTLES = 0.01; // how fast the picture makes room for raised arms, and takes it back, frame by frame
 const INK = { body: [238, 226, 206], hand: [255, 138, 92], ghost: [98, 118, 142], floor: "#2a2f36", shadow: "#000000" };
 
 export class Dance {
@@ -20,6 +22,8 @@ export class Dance {
     this.zoom = 1;
     this.centre = null;
     this.away = null;
+    this.tall = null;
+    this.spread = 0;
     this.show = null;
     this.frame = null;
     this.generation = -1;
@@ -105,12 +109,17 @@ export class Dance {
   turn(yaw, pitch) {
     this.yaw += yaw;
     this.pitch = Math.min(1.4, Math.max(-0.2, this.pitch + pitch));
-    this.redraw();
+    this.seen();
   }
 
   // From a side, at the size of the start.
   look(yaw, pitch) {
     [this.yaw, this.pitch, this.zoom] = [yaw, pitch, 1];
+    this.seen();
+  }
+
+  seen() {
+    this.canvas.dispatchEvent(new Event("turned"));
     this.redraw();
   }
 
@@ -141,6 +150,10 @@ export class Dance {
     const away = NEAR_M + BACK * apart;
     this.away ??= away;
     this.away += share * (away - this.away);
+    const top = ABOVE_M + Math.max(...frame.figures.flatMap(({ positions }) => [...positions.filter((_, place) => place % 3 === 1)]));
+    this.tall ??= top;
+    this.tall += (share && (top > this.tall ? RISES : SETTLES)) * (top - this.tall);
+    this.spread = apart;
     const eye = this.eye(wide, high);
     this.drawFloor(ink, eye, ratio);
     const bones = [...frame.figures, ...ghost ? [ghost] : []].flatMap((figure) => this.bones(figure));
@@ -186,12 +199,12 @@ export class Dance {
     if (this.caption.textContent !== sentence) this.caption.textContent = sentence;
   }
 
-  // From metres to pixels, with the distance from the eye: 4.5 m away from one dancer, 1 m above the floor.
+  // From metres to pixels, with the distance from the eye: so near that the tallest body fills the height, or all of them the width.
   eye(wide, high) {
     const [sy, cy, sp, cp] = [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(this.pitch), Math.cos(this.pitch)];
-    const size = 1.75 * Math.min(wide * 1.15, high) * this.zoom, [x0, z0] = this.centre;
+    const size = this.away * Math.min(FILLS * high / this.tall, wide / (WIDE_M + 2 * this.spread)) * this.zoom, [x0, z0] = this.centre;
     return ([x, y, z]) => {
-      const side = cy * (x - x0) - sy * (z - z0), near = sy * (x - x0) + cy * (z - z0), up = y - 0.95;
+      const side = cy * (x - x0) - sy * (z - z0), near = sy * (x - x0) + cy * (z - z0), up = y - MIDDLE * this.tall;
       const away = Math.max(0.4, this.away - (cp * near + sp * up)), scale = size / away;
       return { x: wide / 2 + scale * side, y: high / 2 - scale * (cp * up - sp * near), away, scale };
     };

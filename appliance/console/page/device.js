@@ -1,6 +1,6 @@
 // This device: the PIN, what is asked of the box with it, and the devices that it knows.
 import { request } from "./box.js";
-import { byId } from "./elements.js";
+import { byId, every } from "./elements.js";
 import { twice } from "./hold.js";
 import { date, language, translated } from "./words.js";
 
@@ -130,6 +130,7 @@ function deviceName() {
 async function render(isKnown) {
   known = isKnown;
   document.body.dataset.known = known ? "yes" : "no";
+  for (const one of every("[data-locks]")) one.ariaDescription = known ? null : words("asks_pin"); // its lock is a picture
   byId("known").textContent = words(known ? "known" : "unknown");
   byId("own-name").textContent = deviceName();
   byId("own-since").textContent = "";

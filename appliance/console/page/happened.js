@@ -11,6 +11,8 @@ const GROUPS_S = [60, 300, 900, 3600], MOST_GROUPS = 12;
 const KINDS = ["fault", "order", "said"], WRONG = ["late", "skipped", "failed"];
 const TAPPED = 1 / 12, LEAST_TAPPED_S = 60; // how much of a run a tap on its axis picks
 
+const ORDERS = { look: "look_now", cue: "cue_now", phrase: "phrase_now", master: "master" }; // commands with words of the page
+
 let runs = [], run = null, second = 0, again = null, dance = null;
 let entries = [], kind = null, picked = null; // picked: [from, to] seconds of the run
 
@@ -173,7 +175,7 @@ function group({ begun, members }, place) {
 
 function entry({ at, kind: what, said: sentences, times }) {
   const item = document.createElement("li"), button = document.createElement("button"), name = document.createElement("small");
-  const text = document.createElement("span"), rest = document.createElement("span"), [first, ...others] = sentences.map(translated);
+  const text = document.createElement("span"), rest = document.createElement("span"), [first, ...others] = sentences.map(what === "order" ? commanded : translated);
   button.type = "button";
   button.textContent = exact(run.begun + at);
   button.addEventListener("click", () => {
@@ -187,6 +189,16 @@ function entry({ at, kind: what, said: sentences, times }) {
   text.append(times > 1 ? `${first} ×${times}` : first, rest);
   item.append(button, name, text);
   return item;
+}
+
+// Such as "Look: veil" and "Master: 80 % · 3 s"; other commands as the journal has them.
+function commanded(sentence) {
+  const [, name, rest] = /^(\w+) (.+)$/.exec(sentence) ?? [], key = ORDERS[name];
+  if (!key) return translated(sentence);
+  const level = name === "master" ? rest.replace(/^([\d.]+)(?: ([\d.]+))?/, (_, share, fade) => {
+    return [`${number(100 * share)} %`, fade && `${number(Number(fade), fade % 1 ? 1 : 0)} s`].filter(Boolean).join(" · ");
+  }) : rest;
+  return words("happened_count", { kind: words(key), count: level });
 }
 
 function point(at) {
@@ -214,7 +226,7 @@ async function danceAgain() {
   byId("again").scrollIntoView({ block: "center" });
   dance ??= new Dance(byId("again"), byId("again-held"), Object.assign(new EventTarget(), { framesWanted: true }), words);
   dance.show = facts;
-  dance.centre = dance.away = null;
+  dance.centre = dance.away = dance.tall = null;
   const begun = performance.now();
   const next = () => {
     const shown = Math.floor((performance.now() - begun) / (1000 * facts.every_s)) % frames.length;

@@ -32,13 +32,12 @@ const STILL_PX = 14; // a thumb that scrolls moves farther between touch and rel
 function show(page) {
   const known = byId(page) && document.querySelector(`[data-page="${page}"]`) ? page : "tonight";
   for (const section of every("main > section")) section.hidden = section.id !== known;
-  for (const button of every("nav button")) {
+  for (const button of every("nav [data-page]")) {
     if (button.dataset.page === known) button.setAttribute("aria-current", "page");
     else button.removeAttribute("aria-current");
   }
   document.body.dataset.shown = known;
-  const tabs = first("nav"), tab = first(`[data-page="${known}"]`);
-  tabs.scrollLeft = tab.offsetLeft - (tabs.clientWidth - tab.offsetWidth) / 2;
+  showMore(known);
   if (location.hash !== `#${known}`) history.replaceState(null, "", `#${known}`);
   scrollTo(0, 0);
   if (known === "happened") readHappened();
@@ -54,6 +53,19 @@ function show(page) {
   if (known !== "rehearsal") leaveRehearsal();
   showFrames();
 }
+
+// On a phone the pages that no show needs are behind one tab, which names the one that is open.
+function showMore(page) {
+  const tab = byId("more-pages").querySelector(`[data-page="${page}"]`);
+  setText(byId("more-now"), tab?.textContent ?? "");
+  if (tab) byId("more").setAttribute("aria-current", "true");
+  else byId("more").removeAttribute("aria-current");
+  openMore(false);
+}
+
+function openMore(isOpen) { byId("more").setAttribute("aria-expanded", String(isOpen)); }
+
+const isMoreOpen = () => byId("more").getAttribute("aria-expanded") === "true";
 
 // On a laptop the dance is beside the cues; a phone spares its battery.
 function showFrames() {
@@ -143,15 +155,14 @@ function tonight(value) {
   byId("fallbacks-now").replaceChildren(...active.map(fallbackItem));
 }
 
-// BLACKOUT and PANIC say what a tap does now on this device, and in force how it ends.
+// BLACKOUT and PANIC say what a tap does, and in force how it ends. That the PIN comes first is their lock.
 function safety() {
-  const { value } = box, status = value?.status, isKnown = document.body.dataset.known === "yes";
+  const { value } = box, status = value?.status;
   for (const act of ["blackout", "panic"]) {
-    const isOn = Boolean(status?.[act]), does = isOn ? `${act}_on` : isKnown ? `${act}_does` : "asks_pin";
+    const isOn = Boolean(status?.[act]);
     byId(act).setAttribute("aria-pressed", String(isOn));
-    setText(byId(`${act}-does`), words(value && box.isSilent ? "no_link" : does));
+    setText(byId(`${act}-does`), words(value && box.isSilent ? "no_link" : `${act}_${isOn ? "on" : "does"}`));
   }
-  byId("go").firstChild.dataset.pin = isKnown ? "" : ` · ${words("asks_pin")}`;
 }
 
 // While nothing is wrong: which joint is held by what, whether it is at this moment, and how full a battery is.
@@ -227,14 +238,23 @@ initVenue();
 initHelp();
 initUpdate();
 initRehearsal(me, box);
-for (const button of every("nav button")) button.addEventListener("click", () => show(button.dataset.page));
+for (const button of every("nav [data-page]")) button.addEventListener("click", () => show(button.dataset.page));
+byId("more").addEventListener("click", () => openMore(!isMoreOpen()));
+addEventListener("click", (event) => { if (event.target instanceof Node && !first("nav").contains(event.target)) openMore(false); });
+first("nav").addEventListener("keydown", (event) => {
+  if (event.key !== "Escape" || !isMoreOpen()) return;
+  openMore(false);
+  byId("more").focus();
+});
 for (const id of ["show-dance", "show-ghost"]) byId(id).addEventListener("change", () => show("dance"));
 byId("show-dance").addEventListener("change", (event) => offer(byId("show-ghost").parentElement, event.target.checked ? "" : words("dance_off")));
 addEventListener("hashchange", () => show(location.hash.slice(1)));
 for (const button of every("#views button")) {
   const [yaw, pitch] = button.dataset.view.split(" ").map(Number);
   button.addEventListener("click", () => dance.look(yaw, pitch));
+  byId("stage").addEventListener("turned", () => button.setAttribute("aria-pressed", String(dance.yaw === yaw && dance.pitch === pitch)));
 }
+dance.look(0, 0.12); // as the audience sees it
 press(byId("go"), goOn);
 byId("resume").addEventListener("click", () => command("/go"));
 byId("stop").addEventListener("click", () => command("/stop"));

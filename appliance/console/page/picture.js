@@ -11,8 +11,10 @@ const OWN_MS = 2500; // the projector tells once a second: until then this page'
 const before = []; // for undo: the corners and the mesh, or the pull of one of its points, before each change made here
 const MESH = 5; // points across and down
 const INNER = [...Array(MESH * MESH).keys()].filter((place) => ![0, MESH - 1, MESH * (MESH - 1), MESH * MESH - 1].includes(place));
+const LOOK_AGAIN_MS = 1800; // at the next word of the box: every two seconds
 const PARTS = ["looks", "wall", "rig"];
 let part = "looks"; // as it was chosen here; one that the box does not have gives way to the first that it has
+let lookedAt = -LOOK_AGAIN_MS;
 let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]), pulls = [];
 
 // A handle: its place, how it is drawn under a finger, and the order for a step.
@@ -47,6 +49,9 @@ export function initPicture() {
   }
   held(byId("corners-reset"), () => change("/projector/corners/reset", [], CORNERS), (sentence) => say(sentence));
   byId("corners-undo").addEventListener("click", undo);
+  for (const [event, sight] of [["load", "visible"], ["error", "hidden"]]) {
+    byId("wall-now").addEventListener(event, () => { byId("wall-now").style.visibility = sight; });
+  }
   const brightness = byId("brightness");
   brightness.addEventListener("input", tellBrightness);
   brightness.addEventListener("change", () => {
@@ -83,8 +88,11 @@ export function showPicture(value) {
   const projects = runs("projector");
   const has = { looks: value.looks.length > 0, wall: projects, rig: runs("lights") };
   for (const name of PARTS) first(`[data-part="${name}"]`).hidden = !has[name];
-  first('[data-page="picture"]').hidden = !PARTS.some((name) => has[name]);
+  const isThere = PARTS.some((name) => has[name]);
+  byId("picture-none").hidden = isThere;
+  byId("picture-parts").hidden = !isThere;
   showParts();
+  lookAtWall(projects);
   wall = value.wall;
   if (!wall?.corners || performance.now() < ownUntil) return;
   if (document.activeElement !== byId("brightness")) byId("brightness").value = Math.round(100 * wall.brightness);
@@ -94,6 +102,14 @@ export function showPicture(value) {
   for (const [id, [, said]] of Object.entries(BLEND)) if (wall.overlap) byId(id).textContent = said(wall[id]);
   pulls = wall.warp ?? [];
   put(wall.corners);
+}
+
+// The newest picture that the projector left of the wall, while somebody looks.
+function lookAtWall(projects) {
+  byId("wall-part").hidden = !projects;
+  if (!projects || byId("wall-now").offsetParent === null || performance.now() - lookedAt < LOOK_AGAIN_MS) return;
+  lookedAt = performance.now();
+  byId("wall-now").src = `/api/wall.jpg?${Math.round(lookedAt)}`;
 }
 
 function showParts() {

@@ -14,6 +14,7 @@ let goes = false, isShown = false, timer = 0, next = 0, measured = null, proof =
 
 export function initProve() {
   twice(byId("prove-begin"), measure, "sure_stop", () => goes);
+  byId("prove-seconds").addEventListener("change", sayBegin);
   byId("prove-doctor").addEventListener("click", () => begin("doctor"));
   byId("prove-end").addEventListener("click", () => ask("/api/prove/end", {}));
   byId("prove-print").addEventListener("click", () => print());
@@ -26,11 +27,17 @@ export async function showProve() {
   if (answer.status !== 200) return showSentence(translated(answer.message) || words("no_page"));
   list(answer.value.proofs);
   goes = answer.value.show_goes;
-  byId("prove-begin").textContent = words(goes ? "prove_stop_begin" : "prove_begin");
+  sayBegin();
   running(answer.value.runs);
   showSentence(answer.value.runs === null && answer.value.show_goes ? words("prove_show_goes") : "");
   if (answer.value.runs !== null) follow(answer.value.runs);
   return undefined;
+}
+
+// For how long is in the words of the button.
+function sayBegin() {
+  const time = byId("prove-seconds").selectedOptions[0].textContent.split(/[:,]/)[0].trim();
+  byId("prove-begin").textContent = words(goes ? "prove_stop_begin" : "prove_begin", { time });
 }
 
 export function leaveProve() {
@@ -45,7 +52,7 @@ async function measure() {
     await new Promise((done) => setTimeout(done, LOOK_MS));
     goes = (await request("/api/prove")).value?.show_goes ?? true;
   }
-  byId("prove-begin").textContent = words("prove_begin");
+  sayBegin();
   await begin("latency");
 }
 
@@ -147,6 +154,7 @@ async function open(id) {
   byId("prove-document").hidden = false;
   byId("prove-verdict").textContent = verdictOf(proof);
   byId("prove-verdict").className = proof.holds ? "well" : "fault";
+  byId("prove-next").textContent = words(proof.holds ? "prove_next_well" : `prove_next_${proof.kind}`);
   byId("prove-lines").replaceChildren(...(proof.kind === "latency" ? wrongFirst(proof.limits).map(limitItem) : proof.findings.map(findingItem)));
   drawCertificate(byId("prove-sheet"), proof);
   byId("prove-json").href = `/api/prove/${id}`;

@@ -39,6 +39,7 @@ function made(name, words) {
   joint.className = "joint";
   complaint.className = "complaint";
   row.className = "row";
+  row.dataset.locks = "";
   rare.className = "row changes";
   for (const [key, address] of [["find", "/sensors/strobe"], ["neutral", "/sensors/neutral"], ["heading", "/sensors/heading"]]) {
     const button = document.createElement("button");

@@ -12,6 +12,7 @@ export async function loadWords(languages) {
   patterns = language === "en" ? [] : compiled(await table(`sentences/${language}`));
   document.documentElement.lang = language;
   for (const element of every("[data-words]")) element.textContent = words(element.dataset.words);
+  for (const element of every("[data-alt]")) element.setAttribute("alt", words(element.dataset.alt));
   for (const element of every("[data-label]")) element.setAttribute("aria-label", words(element.dataset.label));
 }
 
