@@ -19,7 +19,7 @@ from rich.console import Console
 
 from appliance.box.roster import RosterLine
 from appliance.cli.sensors import listing
-from appliance.cli.sensors.table import SensorTable
+from appliance.cli.sensors.table import SensorTable, duration
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.wire import IS_NDOF, SIGNAL_SHIFT
 from appliance.stage.sensor_lines import roster_lines
@@ -61,6 +61,7 @@ def test_a_drift_taken_out_and_the_time_that_a_battery_lasts_are_shown() -> None
     console.print(SensorTable([line]))
     shown = console.export_text()
     assert "-23°" in shown and "12 %, 45 min" in shown
+    assert [duration(seconds) for seconds in (42.0, 90.0, 9000.0)] == ["42 s", "2 min", "2.5 h"]
 
 
 def test_the_page_on_sensors_has_the_columns_that_are_printed() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from appliance.box.roster import Roster, RosterLine
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
 from appliance.cli.doctor.host_view import HostView
-from appliance.cli.sensors.table import HIGH_LOSS
+from appliance.cli.sensors.table import HIGH_LOSS, duration
 from appliance.sensor.state import LOW_BATTERY
 from appliance.sensor.wire import BATTERY_UNKNOWN
 from appliance.show.config_error import ConfigError
@@ -43,7 +43,7 @@ def _sensor(line: RosterLine) -> Finding:
     what = f"sensor {line.name}"
     if line.state in _STATES:
         message, cure = _STATES[line.state]
-        ago = f", last heard {_duration(line.age_s)} ago" if line.age_s >= 0 else ""
+        ago = f", last heard {duration(line.age_s)} ago" if line.age_s >= 0 else ""
         if line.way in SOURCES:
             cure = _PROGRAM
         else:
@@ -52,7 +52,7 @@ def _sensor(line: RosterLine) -> Finding:
     known = line.battery != BATTERY_UNKNOWN
     battery = f"its battery is at {line.battery} %" if known else "its battery is not known"
     if known and line.battery_left_s >= 0:
-        battery += f" and lasts about {_duration(line.battery_left_s)} yet"
+        battery += f" and lasts about {duration(line.battery_left_s)} yet"
     message = f"It sends {line.rate_hz:.0f} readings a second; {100 * line.loss:.1f} % are lost; {battery}."
     if line.complaint:
         return better(what, f"{message} {line.complaint}", "See to that before the doors open.")
@@ -61,12 +61,6 @@ def _sensor(line: RosterLine) -> Finding:
     if line.loss > HIGH_LOSS:
         return better(what, message, "Another channel of the Wi-Fi, or the router nearer to the stage.")
     return ok(what, message)
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 def receivers(host: HostView) -> Iterator[Finding]:

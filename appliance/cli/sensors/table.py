@@ -158,9 +158,10 @@ def _battery(line: RosterLine) -> Text:
 
 
 def duration(seconds: float) -> str:
-    """Time that is left, in minutes, or in hours and a half."""
-    minutes = seconds / 60.0
-    return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"
+    """For people, in the unit in which it is at least one and a half."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def _corrected(line: RosterLine) -> Text:
