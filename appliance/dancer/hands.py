@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.dancer.extrapolation import Extrapolation
-from appliance.dancer.held_places import HeldPlace, in_figure
+from appliance.dancer.held_positions import HeldPosition, in_figure
 from appliance.dancer.loop import Placement
 from appliance.dancer.puppeteers import Kept, Puppeteer
 from appliance.dancer.slerp import FloatArray
@@ -26,10 +26,10 @@ class Hands:
 
     targets: one orientation for each pose of the window, the present one first. The motion of a hand is
     extrapolated over the window; a kept joint has the orientations of the phrase's own window.
-    places (M, 3), place_weights (M,): joints that are held by place, metres in the figure's frame
-    (held_places.in_figure). The root is the origin there: a hand on it moves the figure's path (hips_drawn)
-    and has no weight. by_place: whether each puppeteer gives a place. Two of them may hold one joint, one in
-    each way. holds (M,): how firmly each joint is held, in either way.
+    places (M, 3), place_weights (M,): joints that are held by position, metres in the figure's frame
+    (held_positions.in_figure). The root is the origin there: a hand on it moves the figure's path
+    (hips_drawn) and has no weight. by_place: whether each puppeteer gives a position. Two of them may hold
+    one joint, one in each way. holds (M,): how firmly each joint is held, in either way.
     """
 
     SNAPSHOT = (
@@ -53,18 +53,18 @@ class Hands:
         taken: list[tuple[int, bool]] = []  # joints, and whether by place
         places: list[int] = []
         self._turned: list[tuple[slice, Puppeteer]] = []  # with the rows of each, in what follows
-        self._placed: list[HeldPlace] = []
+        self._placed: list[HeldPosition] = []
         for puppeteer in puppeteers:
             held = puppeteer.joints if isinstance(puppeteer, Springs) else (puppeteer.joint,)
             for joint in held:
-                way = _place(joint, joints), isinstance(puppeteer, HeldPlace)
+                way = _place(joint, joints), isinstance(puppeteer, HeldPosition)
                 if way in taken:
                     raise HandError(
                         f"Two hands hold '{joint}'. Give each joint to one hand, or to one by orientation "
                         "and one by position."
                     )
                 taken.append(way)
-            if isinstance(puppeteer, HeldPlace):
+            if isinstance(puppeteer, HeldPosition):
                 self._placed.append(puppeteer)
             else:
                 self._turned.append((slice(len(places), len(places) + len(held)), puppeteer))
@@ -77,7 +77,7 @@ class Hands:
         self._placed_at: NDArray[np.intp] = np.array(
             [_place(one.joint, joints) for one in self._placed], dtype=np.intp
         )
-        self.by_place = tuple(isinstance(one, HeldPlace) for one in self.puppeteers)
+        self.by_place = tuple(isinstance(one, HeldPosition) for one in self.puppeteers)
         self._points = np.zeros((len(self._placed), 3), dtype=np.float32)
         self.places = np.zeros((len(joints), 3), dtype=np.float32)
         self.place_weights = np.zeros(len(joints), dtype=np.float32)
@@ -127,7 +127,7 @@ class Hands:
         """Where the last pull drew the root: x and z on the puppet's own floor (metres), and the weight."""
         if self._hips is None:
             return 0.0, 0.0, 0.0
-        x, _, z = self._hips.place()
+        x, _, z = self._hips.position()
         return x, z, self._hips.held_weight
 
     def _pull_places(self, now: float, window: FloatArray, path: list[float], positions: FloatArray) -> None:
@@ -139,7 +139,7 @@ class Hands:
                 given = x, given[1], z
             puppeteer.stand(positions[puppeteer.number].tolist(), root, given)
             weight = puppeteer.pull(now).weight
-            self._points[row] = puppeteer.place(self._ahead_s)
+            self._points[row] = puppeteer.position(self._ahead_s)
             if puppeteer is not self._hips:
                 self.place_weights[self._placed_at[row]] = weight
             else:

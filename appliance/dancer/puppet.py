@@ -76,7 +76,7 @@ class Puppet:
     """One of a network's puppets: its row of what the network takes and gives, as views.
 
     window, targets (T, M, 4); mask, weights (M,); noise (Z,), added to the latent; places (M, 3): metres in
-    the figure's frame (held_places.in_figure), and by how much one pass goes there, place_weights (M,).
+    the figure's frame (held_positions.in_figure), and by how much one pass goes there, place_weights (M,).
     poses (T, M, 4): what the last dance gave, unit quaternions unless is_broken.
     """
 

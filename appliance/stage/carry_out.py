@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from appliance.box.orders import Order
-from appliance.dancer.held_places import RemotePlace
+from appliance.dancer.held_positions import RemotePosition
 from appliance.dancer.puppeteers import Remote
 from appliance.dancer.springs import Springs
 from appliance.levers.lever import Lever
@@ -156,7 +156,7 @@ def _enable(order: Order, parts: StageParts) -> None:
             puppeteer.enabled = holds
             if puppeteer.enabled and isinstance(puppeteer, Remote):
                 puppeteer.hold_here(_orientation(puppeteer.joint, parts).tolist())
-            if puppeteer.enabled and isinstance(puppeteer, RemotePlace):
+            if puppeteer.enabled and isinstance(puppeteer, RemotePosition):
                 puppeteer.hold_here(parts.led.frame.positions[puppeteer.number].tolist())
 
 
@@ -231,7 +231,7 @@ def _springs(parts: StageParts) -> Springs:
 def _lead(order: Order, parts: StageParts) -> None:
     """Give a joint that is held by OSC its orientation or place, or back: of each puppet with such a hand."""
     puppeteers = [one for puppet in parts.puppets for one in puppet.hands.puppeteers]
-    led = [one for one in puppeteers if isinstance(one, Remote | RemotePlace) and one.joint == order.text]
+    led = [one for one in puppeteers if isinstance(one, Remote | RemotePosition) and one.joint == order.text]
     if not led:
         raise ValueError(
             f"No hand of this show holds '{order.text}' by OSC. "
@@ -241,7 +241,7 @@ def _lead(order: Order, parts: StageParts) -> None:
         for puppeteer in led:
             puppeteer.let_go()
         return
-    wanted = RemotePlace if order.name == "place" else Remote
+    wanted = RemotePosition if order.name == "place" else Remote
     led = [one for one in led if isinstance(one, wanted)]
     if not led:
         given, address, cure = (
@@ -251,7 +251,7 @@ def _lead(order: Order, parts: StageParts) -> None:
         )
         raise ValueError(f"The hand on '{order.text}' takes {given}: send /mocap/setjoint{address}{cure}.")
     for puppeteer in led:
-        if isinstance(puppeteer, RemotePlace):
+        if isinstance(puppeteer, RemotePosition):
             puppeteer.hold(order.values[:3], *order.values[3:])
         else:
             x, y, z, angle = order.values

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from appliance.dancer.grounding import Grounding
-from appliance.dancer.held_places import FixedPlace, HeldPlace, RemotePlace
+from appliance.dancer.held_positions import FixedPosition, HeldPosition, RemotePosition
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.puppet import Puppet
 from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
@@ -37,7 +37,7 @@ def puppeteers_of(
             except ValueError as error:
                 raise StageError(f"{show.file.path}: {error}") from error
     for one in others:
-        if isinstance(one, HeldPlace) and not one.is_root:
+        if isinstance(one, HeldPosition) and not one.is_root:
             phrases = [motion.loop_of(name).poses for name in motion.phrases]
             one.habitual = reach_in(phrases, show.skeleton, one.number)
     for place, hand in enumerate(hands):
@@ -48,8 +48,8 @@ def puppeteers_of(
 def _puppeteer(hand: HandConfig, skeleton: Skeleton) -> Puppeteer:
     if hand.by == "position":
         if hand.fixed is not None and hand.fixed.position is not None:
-            return FixedPlace(hand.joint, skeleton, hand.fixed.position, hand.weight)
-        return RemotePlace(hand.joint, skeleton, hand.weight)
+            return FixedPosition(hand.joint, skeleton, hand.fixed.position, hand.weight)
+        return RemotePosition(hand.joint, skeleton, hand.weight)
     if hand.sensor is not None:
         mounting = mounting_of(hand)
         return WornSensor(hand.joint, hand.weight, joint_from_reading(mounting.assumed_pose, mounting))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from appliance.box.orders import Order
-from appliance.dancer.held_places import HeldPlace, RemotePlace, in_room
+from appliance.dancer.held_positions import HeldPosition, RemotePosition, in_room
 from appliance.dancer.puppet import weights_of_one_pass
 from appliance.pose import quaternion
 from appliance.recorder.reading import read_journal
@@ -95,7 +95,7 @@ def test_a_place_that_this_dancer_never_goes_to_is_brought_within_its_reach(nigh
     away = given(night) - np.array((0.4, 1.0, -0.5))
     assert np.linalg.norm(away) > 0.1
     hand = night.parts.led.hands.puppeteers[0]
-    assert isinstance(hand, HeldPlace) and hand.habitual is not None
+    assert isinstance(hand, HeldPosition) and hand.habitual is not None
     row = night.parts.led.puppet.places[MOVING.index(ARM)]
     assert hand.habitual.bounded(row) == pytest.approx(row, abs=1e-5)
 
@@ -176,9 +176,9 @@ def parts(tmp_path: Path) -> Iterator[StageParts]:
     parts.close()
 
 
-def hand_of(parts: StageParts) -> RemotePlace:
+def hand_of(parts: StageParts) -> RemotePosition:
     hand = parts.led.hands.puppeteers[0]
-    assert isinstance(hand, RemotePlace)
+    assert isinstance(hand, RemotePosition)
     return hand
 
 
@@ -206,7 +206,7 @@ def test_what_a_hand_does_not_give_is_refused_in_words(parts: StageParts) -> Non
             "takes an orientation: send /mocap/setjointrot, or write by:",
         ),
         (Order("place", (0.0, 1.0, 0.0), "hip"), "No hand of this show holds 'hip'"),
-        (Order("place", (0.0, 1e4, 0.0), "lShldr"), "no place"),
+        (Order("place", (0.0, 1e4, 0.0), "lShldr"), "no position"),
     ]:
         done, said = obey(order, parts)
         assert not done and message in said

@@ -1,4 +1,4 @@
-"""Held places: puppeteers that give a joint a place in the room instead of an orientation (fixed, OSC)."""
+"""Held positions: puppeteers that give a joint a position instead of an orientation (fixed, OSC)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ORIGIN: Point = (0.0, 0.0, 0.0)
 
 
 class Limits(NamedTuple):
-    """How a place follows what it is told: speed, acceleration, and the lag behind a steady hand."""
+    """How a position follows what it is told: speed, acceleration, and the lag behind a steady hand."""
 
     m_s: float
     m_s2: float
@@ -37,18 +37,18 @@ LIMBS = Limits(3.0, 60.0, 0.05)  # the hands of the recorded dancers reach 3 to 
 HIPS = Limits(1.0, 5.0, 0.2)  # the feet have to come along
 
 
-def in_figure(places: Array, root: Array, facing: Array) -> Array:
+def in_figure(positions: Array, root: Array, facing: Array) -> Array:
     """Places (..., 3) of the room in the frame of the figure, metres.
 
     root (3,): of the figure in the room; facing (4,): its heading, a turn about +Y. In the figure's frame the
     root joint is the origin and faces +Z, as the network sees it.
     """
-    return quaternion.rotate(quaternion.inverse(facing), places - root)
+    return quaternion.rotate(quaternion.inverse(facing), positions - root)
 
 
-def in_room(places: Array, root: Array, facing: Array) -> Array:
+def in_room(positions: Array, root: Array, facing: Array) -> Array:
     """The inverse of in_figure."""
-    return quaternion.rotate(facing, places) + root
+    return quaternion.rotate(facing, positions) + root
 
 
 def reach_of(skeleton: Skeleton, joint: int) -> float:
@@ -62,11 +62,11 @@ def reach_of(skeleton: Skeleton, joint: int) -> float:
     return REACH * float(sum(np.linalg.norm(skeleton.offsets[one]) for one in chain))
 
 
-class HeldPlace(Puppeteer):
-    """Holds one joint at a place. Its weight grows and fades as that of every hand.
+class HeldPosition(Puppeteer):
+    """Holds one joint at a position. Its weight grows and fades as that of every hand.
 
-    The place starts where the joint is when the hand takes it, and follows what it is told within Limits: a
-    place that jumps moves the figure no faster than a dancer does. It stays above the floor and within
+    The position starts where the joint is when the hand takes it, and follows what it is told within Limits:
+    one that jumps moves the figure no faster than a dancer does. It stays above the floor and within
     `reach` of the root. habitual: where this dancer's joint goes at all, if known.
     """
 
@@ -85,12 +85,12 @@ class HeldPlace(Puppeteer):
 
     @property
     def is_root(self) -> bool:
-        """Whether it holds the hips: their place moves the whole figure."""
+        """Whether it holds the hips: their position moves the whole figure."""
         return self.number == 0
 
     @property
     def given(self) -> Point | None:
-        """The place given last, metres in the room; None: none."""
+        """The position given last, metres in the room; None: none."""
         return self._given
 
     def stand(self, here: Sequence[float], root: Sequence[float], given: Point | None) -> None:
@@ -100,7 +100,7 @@ class HeldPlace(Puppeteer):
         self._here, self._root = _three(here), _three(root)
         self._aim = self._place if given is None else given
 
-    def place(self, ahead_s: float = 0.0) -> Point:
+    def position(self, ahead_s: float = 0.0) -> Point:
         """Where the last pull held the joint, or will hold it ahead_s later; in the frame of `stand`."""
         x, y, z = (at + ahead_s * speed for at, speed in zip(self._place, self._speed, strict=True))
         return self._bounded((x, y, z))
@@ -109,7 +109,7 @@ class HeldPlace(Puppeteer):
         return self._given is not None
 
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
-        """Move the place towards what it was told; the orientation stays."""
+        """Move the position towards what it was told; the orientation stays."""
         if not self.is_holding:
             self._place, self._speed = self._here, _ORIGIN
         if not elapsed:
@@ -126,25 +126,27 @@ class HeldPlace(Puppeteer):
         self._speed = add(self._speed, change)
         self._place = add(self._place, scale(self._speed, elapsed))
 
-    def _bounded(self, place: Point) -> Point:
+    def _bounded(self, position: Point) -> Point:
         """Above the floor, and within reach of the root."""
-        x, y, z = place
+        x, y, z = position
         way = minus((x, max(0.0, y), z), self._root)
         far = math.hypot(*way)
         return add(self._root, scale(way, min(1.0, self.reach / far))) if far > 0.0 else self._root
 
 
-class FixedPlace(HeldPlace):
-    """Holds its joint at one place for good."""
+class FixedPosition(HeldPosition):
+    """Holds its joint at one position for good."""
 
-    def __init__(self, joint: str, skeleton: Skeleton, place: Sequence[float], weight: float = 1.0) -> None:
-        """place: x, y, z in the room, metres. Raises ValueError."""
+    def __init__(
+        self, joint: str, skeleton: Skeleton, position: Sequence[float], weight: float = 1.0
+    ) -> None:
+        """position: x, y, z in the room, metres. Raises ValueError."""
         super().__init__(joint, skeleton, weight)
-        self._given = checked_place(place)
+        self._given = checked_position(position)
 
 
-class RemotePlace(HeldPlace):
-    """A joint whose place remote control gives (OSC, a finger on the page, a tracker); free until then."""
+class RemotePosition(HeldPosition):
+    """A joint whose position remote control gives (OSC, a finger on the page, a tracker); free until then."""
 
     SNAPSHOT = ("_left_s",)
 
@@ -152,17 +154,17 @@ class RemotePlace(HeldPlace):
         super().__init__(joint, skeleton, weight)
         self._left_s = math.inf
 
-    def hold(self, place: Sequence[float], for_s: float = math.inf) -> None:
-        """Hold the joint at x, y, z in the room, metres; released where for_s pass without a new place.
+    def hold(self, position: Sequence[float], for_s: float = math.inf) -> None:
+        """Hold the joint at x, y, z in the room, metres; let go where for_s pass without a new position.
 
         Raises ValueError.
         """
-        self._given, self._left_s = checked_place(place), for_s
+        self._given, self._left_s = checked_position(position), for_s
 
-    def hold_here(self, place: Sequence[float]) -> None:
-        """Hold the joint where it is, unless a place was set before."""
+    def hold_here(self, position: Sequence[float]) -> None:
+        """Hold the joint where it is, unless a position was set before."""
         if self._given is None:
-            self.hold(place)
+            self.hold(position)
 
     def let_go(self) -> None:
         """Give the joint back to the puppet."""
@@ -175,12 +177,12 @@ class RemotePlace(HeldPlace):
         super()._point(orientation, now, elapsed)
 
 
-def checked_place(place: Sequence[float]) -> Point:
+def checked_position(position: Sequence[float]) -> Point:
     """Three finite numbers, metres. Raises ValueError."""
-    numbers = [float(value) for value in place]
+    numbers = [float(value) for value in position]
     if len(numbers) != 3 or not all(abs(value) <= FARTHEST_M for value in numbers):
         raise ValueError(
-            f"{numbers} is no place: three numbers x, y, z in metres are needed, at most {FARTHEST_M:g} each."
+            f"{numbers} is no position: three numbers in metres are needed, at most {FARTHEST_M:g} each."
         )
     return _three(numbers)
 

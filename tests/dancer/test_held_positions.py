@@ -11,14 +11,14 @@ import pytest
 from appliance.box.snapshot import packed, restore
 from appliance.dancer.grounding import Grounding, survey
 from appliance.dancer.hands import HandError, Hands
-from appliance.dancer.held_places import (
+from appliance.dancer.held_positions import (
     HIPS,
     HIPS_REACH_M,
     LIMBS,
     REACH,
-    FixedPlace,
-    HeldPlace,
-    RemotePlace,
+    FixedPosition,
+    HeldPosition,
+    RemotePosition,
     in_figure,
     in_room,
     reach_of,
@@ -40,14 +40,14 @@ THERE = (0.3, 1.2, 0.25)  # within the reach of a shoulder
 
 
 def course(
-    hand: HeldPlace, seconds: float, start_s: float = 0.0, here: Sequence[float] = HERE
+    hand: HeldPosition, seconds: float, start_s: float = 0.0, here: Sequence[float] = HERE
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places (N, 3) and weights (N,) tick by tick, the root standing still."""
     places, weights = [], []
     for tick in range(round(start_s / TICK_S), round((start_s + seconds) / TICK_S)):
         hand.stand(here, ROOT, hand.given)
         weights.append(hand.pull(tick * TICK_S).weight)
-        places.append(hand.place())
+        places.append(hand.position())
     return np.array(places), np.array(weights)
 
 
@@ -71,7 +71,7 @@ def test_the_figures_frame_is_where_the_network_sees_the_joints(skeleton: Skelet
 
 
 def test_a_place_is_taken_from_where_the_joint_is_and_given_back(skeleton: Skeleton) -> None:
-    hand = RemotePlace("lShldr", skeleton)
+    hand = RemotePosition("lShldr", skeleton)
     places, weights = course(hand, 0.5)
     assert weights.max() == 0.0
     assert places == pytest.approx(np.tile(HERE, (len(places), 1)))
@@ -92,7 +92,7 @@ def test_a_place_is_taken_from_where_the_joint_is_and_given_back(skeleton: Skele
 def test_a_place_that_jumps_is_followed_as_fast_as_a_dancer_moves(
     skeleton: Skeleton, joint: str, limits: tuple[float, float, float]
 ) -> None:
-    hand = RemotePlace(joint, skeleton)
+    hand = RemotePosition(joint, skeleton)
     hand.hold(HERE)
     course(hand, 1.0)
     hand.hold((-0.4, 1.0, 0.2))
@@ -106,7 +106,7 @@ def test_a_place_that_jumps_is_followed_as_fast_as_a_dancer_moves(
 
 
 def test_a_hand_that_moves_evenly_is_followed_with_a_constant_lag(skeleton: Skeleton) -> None:
-    hand = RemotePlace("lShldr", skeleton)
+    hand = RemotePosition("lShldr", skeleton)
     wanted = [(0.1 + 0.3 * math.sin(3.0 * tick * TICK_S), 1.1, 0.2) for tick in range(200)]
     found = []
     for tick, place in enumerate(wanted):
@@ -118,38 +118,38 @@ def test_a_hand_that_moves_evenly_is_followed_with_a_constant_lag(skeleton: Skel
 
 
 def test_the_place_ahead_is_where_it_will_be(skeleton: Skeleton) -> None:
-    hand = RemotePlace("lShldr", skeleton)
+    hand = RemotePosition("lShldr", skeleton)
     for tick in range(100):
         hand.hold((0.005 * tick - 0.2, 1.2, 0.2))
         course(hand, TICK_S, tick * TICK_S)
-    ahead = hand.place(2 * TICK_S)
-    assert ahead[0] - hand.place()[0] == pytest.approx(0.01, abs=1e-3)
+    ahead = hand.position(2 * TICK_S)
+    assert ahead[0] - hand.position()[0] == pytest.approx(0.01, abs=1e-3)
 
 
 def test_a_place_out_of_reach_is_brought_within_it(skeleton: Skeleton) -> None:
     joint = skeleton.index("lShldr")
     reach = reach_of(skeleton, joint)
     assert reach == pytest.approx(REACH * (0.4 + math.hypot(0.2, 0.1)))
-    hand = RemotePlace("lShldr", skeleton)
+    hand = RemotePosition("lShldr", skeleton)
     hand.hold((30.0, 2.0, 0.0))
     places, _ = course(hand, 2.0)
     way = places[-1] - np.array(ROOT)
     assert np.linalg.norm(way) == pytest.approx(reach, abs=1e-3)
     assert way / np.linalg.norm(way) == pytest.approx([1.0, 0.0, 0.0], abs=0.05)
-    hand = RemotePlace("lFoot", skeleton)
+    hand = RemotePosition("lFoot", skeleton)
     hand.hold((0.1, -0.5, 0.0))
     assert course(hand, 2.0, here=(0.1, 0.05, 0.0))[0][-1][1] >= 0.0  # not through the floor
 
 
 def test_the_hips_stay_near_their_path(skeleton: Skeleton) -> None:
-    hand = RemotePlace("hip", skeleton)
+    hand = RemotePosition("hip", skeleton)
     hand.hold((5.0, STANDING_HIP_M, 0.0))
     places, _ = course(hand, 4.0, here=ROOT)
     assert places[-1][0] == pytest.approx(HIPS_REACH_M, abs=1e-3)
 
 
 def test_a_place_for_a_while_is_given_back_unless_it_comes_again(skeleton: Skeleton) -> None:
-    hand = RemotePlace("lShldr", skeleton)
+    hand = RemotePosition("lShldr", skeleton)
     for tick in range(50):
         hand.hold(THERE, for_s=0.5)
         _, weights = course(hand, TICK_S, tick * TICK_S)
@@ -161,7 +161,7 @@ def test_a_place_for_a_while_is_given_back_unless_it_comes_again(skeleton: Skele
 
 
 def test_a_hand_by_place_holds_where_its_joint_is_unless_it_was_told_before(skeleton: Skeleton) -> None:
-    hand = RemotePlace("lShldr", skeleton)
+    hand = RemotePosition("lShldr", skeleton)
     hand.hold_here(HERE)
     assert hand.given == HERE
     hand.hold(THERE)
@@ -171,10 +171,10 @@ def test_a_hand_by_place_holds_where_its_joint_is_unless_it_was_told_before(skel
 
 @pytest.mark.parametrize("place", [(0, 0), (0, 0, math.nan), (0, math.inf, 0), (0, 1e3, 0)])
 def test_what_is_no_place_is_refused(skeleton: Skeleton, place: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match="no place"):
-        FixedPlace("lShldr", skeleton, place)
-    with pytest.raises(ValueError, match="no place"):
-        RemotePlace("lShldr", skeleton).hold(place)
+    with pytest.raises(ValueError, match="no position"):
+        FixedPosition("lShldr", skeleton, place)
+    with pytest.raises(ValueError, match="no position"):
+        RemotePosition("lShldr", skeleton).hold(place)
 
 
 def positions_of(skeleton: Skeleton) -> np.ndarray:
@@ -184,7 +184,7 @@ def positions_of(skeleton: Skeleton) -> np.ndarray:
 
 def test_hands_of_both_kinds_hold_one_figure(skeleton: Skeleton) -> None:
     fixed = FixedOrientation("chest", RIGHT)
-    hands = Hands([fixed, FixedPlace("lShldr", skeleton, THERE, 0.5)], JOINTS)
+    hands = Hands([fixed, FixedPosition("lShldr", skeleton, THERE, 0.5)], JOINTS)
     root, positions = np.array(ROOT, np.float32), positions_of(skeleton)
     for tick in range(100):
         hands.pull(tick * TICK_S, WINDOW, root, positions)
@@ -197,11 +197,11 @@ def test_hands_of_both_kinds_hold_one_figure(skeleton: Skeleton) -> None:
     assert hands.targets[:, 2] == pytest.approx(np.tile([1, 0, 0, 0], (8, 1)))
     assert (hands.places.dtype, hands.place_weights.dtype) == (np.float32, np.float32)
     with pytest.raises(HandError, match="Two hands hold 'lShldr'"):
-        Hands([FixedPlace("lShldr", skeleton, THERE), RemotePlace("lShldr", skeleton)], JOINTS)
+        Hands([FixedPosition("lShldr", skeleton, THERE), RemotePosition("lShldr", skeleton)], JOINTS)
 
 
 def test_a_joint_is_held_by_orientation_and_by_place_at_once(skeleton: Skeleton) -> None:
-    turned, placed = FixedOrientation("lShldr", RIGHT, 0.8), FixedPlace("lShldr", skeleton, THERE, 0.5)
+    turned, placed = FixedOrientation("lShldr", RIGHT, 0.8), FixedPosition("lShldr", skeleton, THERE, 0.5)
     hands = Hands([turned, placed], JOINTS)
     root, positions = np.array(ROOT, np.float32), positions_of(skeleton)
     for tick in range(100):
@@ -217,7 +217,7 @@ def test_a_joint_is_held_by_orientation_and_by_place_at_once(skeleton: Skeleton)
 def test_where_the_puppet_stands_and_faces_is_taken_from_its_places(skeleton: Skeleton) -> None:
     placement = Placement(0.8, 2.0, -1.0)
     x, z = placement.point(THERE[0], THERE[2])
-    hands = Hands([FixedPlace("lShldr", skeleton, (x, THERE[1], z))], JOINTS, placement=placement)
+    hands = Hands([FixedPosition("lShldr", skeleton, (x, THERE[1], z))], JOINTS, placement=placement)
     facing = quaternion.from_axis_angle([0, 1, 0], 0.6)
     window = WINDOW.copy()
     window[:, 0] = facing
@@ -231,9 +231,11 @@ def test_where_the_puppet_stands_and_faces_is_taken_from_its_places(skeleton: Sk
 def test_hands_by_place_go_on_from_their_state(skeleton: Skeleton) -> None:
     root, positions = np.array(ROOT, np.float32), positions_of(skeleton)
 
-    def made() -> tuple[Hands, RemotePlace]:
-        remote = RemotePlace("lShldr", skeleton)
-        return Hands([remote, FixedOrientation("chest", RIGHT), RemotePlace("hip", skeleton)], JOINTS), remote
+    def made() -> tuple[Hands, RemotePosition]:
+        remote = RemotePosition("lShldr", skeleton)
+        return Hands(
+            [remote, FixedOrientation("chest", RIGHT), RemotePosition("hip", skeleton)], JOINTS
+        ), remote
 
     hands, remote = made()
     remote.hold(THERE, for_s=0.3)
@@ -253,7 +255,7 @@ def test_hands_by_place_go_on_from_their_state(skeleton: Skeleton) -> None:
 def danced(swaying: Recording, released_at: int) -> tuple[np.ndarray, np.ndarray]:
     """Roots (N, 3) and poses (N, J, 4), grounded, with the hips held from the start until a tick."""
     skeleton, floor = swaying.skeleton, survey(swaying)
-    grounding, hand = Grounding(skeleton, floor), RemotePlace("hip", skeleton)
+    grounding, hand = Grounding(skeleton, floor), RemotePosition("hip", skeleton)
     hands = Hands([hand], ("hip", "chest"))
     if released_at:
         hand.hold((0.5, STANDING_HIP_M, 0.1))
