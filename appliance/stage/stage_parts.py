@@ -103,7 +103,7 @@ class StageParts:
 
     @property
     def rate(self) -> float:
-        """Of playback: one for all puppets."""
+        """The pace of playback, one for all puppets."""
         return self.puppets[0].motion.rate
 
     @property
