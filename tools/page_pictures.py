@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,7 +33,7 @@ _FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 _CAPTIONS = {"dance": "#held", "rehearsal": "#figure-said"}  # they say when a frame is drawn
 _COLOURS = 96  # a third of the bytes, and nothing that is seen
 _WELL_WITHIN_MS = 60_000
-_FADED_MS, _PROVEN_WITHIN_MS, _DRAWN_WITHIN_MS = 4_000, 120_000, 120_000
+_DRAWN_WITHIN_MS = 120_000
 _EVENING = 1_767_816_900.0  # 20:15 of an evening
 _INSTALLED = {"host": "bunraku", "box_file": "/etc/bunraku/box.yaml", "addresses": [["eth0", "192.168.0.10"]]}
 _DANCED_S = 45 * 60.0  # the show has danced this long
@@ -88,7 +88,7 @@ def _calm(tab: Page, now: float) -> None:
     def journal(route: Route) -> None:
         answer = route.fetch()
         if answer.status == 200:
-            runs = [_calm_run(run, now) for run in answer.json()]
+            runs = [run_of_the_evening(run, now) for run in answer.json()]
             return route.fulfill(response=answer, json=runs)
         return route.fulfill(response=answer)
 
@@ -101,7 +101,7 @@ def _calm(tab: Page, now: float) -> None:
     tab.route("**/api/happened", journal)
 
 
-def _calm_run(run: dict[str, Any], now: float) -> dict[str, Any]:
+def run_of_the_evening(run: dict[str, Any], now: float) -> dict[str, Any]:
     """A run of the journal as an evening leaves it: looks, a silent sensor, two late ticks."""
     counts: dict[str, list[int]] = {name: [0] * _BINS for name in ("late", "skipped", "failed")}
     slowest = [round(3.0 + place % 3 * 0.4, 1) for place in range(_BINS)]
@@ -121,14 +121,9 @@ def take_pictures(
     browser: Browser,
     address: str,
     folder: Path,
-    pin: str = "",
     well_within_ms: int = _WELL_WITHIN_MS,
-    pages: Sequence[str] = PAGES,
 ) -> list[Path]:
-    """A PNG of each page as a phone shows it. pin: with it latency is measured first, for a picture of that.
-
-    well_within_ms: a box that is not well by then is pictured as it is.
-    """
+    """A PNG of each page as a phone shows it. A box that is not well by then is pictured as it is."""
     folder.mkdir(parents=True, exist_ok=True)
     taken = []
     tab = browser.new_page(viewport={"width": 390, "height": 844}, locale="en-GB", timezone_id="Etc/UTC")
@@ -137,9 +132,7 @@ def take_pictures(
     tab.goto(address)
     tab.wait_for_selector("#figures dt", state="attached")
     _await_well(tab, well_within_ms)
-    if pin:
-        _prove(tab, pin)
-    for page in pages:
+    for page in PAGES:
         _open(tab, page)
         if page in _CAPTIONS:
             tab.wait_for_selector(f'{_CAPTIONS[page]}:text-matches("Held|No hand")')  # a frame is drawn
@@ -180,28 +173,6 @@ def _quantized(path: Path) -> None:
     Image.open(path).convert("RGB").quantize(_COLOURS, method=method, kmeans=1).save(path, optimize=True)
 
 
-def _prove(tab: Page, pin: str) -> None:
-    """Stop the show, measure for a moment, go on. Raises RuntimeError where the box refuses."""
-    _open(tab, "device")
-    tab.click("#give-pin")
-    tab.fill("#pin-input", pin)
-    tab.click("#pin-send")
-    tab.wait_for_selector("body[data-known=yes]")
-    _open(tab, "prove")
-    tab.wait_for_selector("#prove-begin:has-text('Stop the show and measure')")
-    tab.select_option("#prove-seconds", "30")
-    tab.click("#prove-begin")
-    tab.click("#prove-begin")  # sure
-    try:
-        tab.wait_for_selector("#prove-document", timeout=_PROVEN_WITHIN_MS)
-    except TimeoutError as error:
-        raise RuntimeError(f"{tab.inner_text('#prove-said')} {tab.inner_text('#said')}") from error
-    _open(tab, "tonight")
-    tab.click("#resume")
-    _await_well(tab)
-    tab.wait_for_timeout(_FADED_MS)
-
-
 def _await_well(tab: Page, within_ms: int = _WELL_WITHIN_MS) -> None:
     """A busy machine may not be well at all; then the pictures say so."""
     with contextlib.suppress(TimeoutError):
@@ -209,45 +180,38 @@ def _await_well(tab: Page, within_ms: int = _WELL_WITHIN_MS) -> None:
 
 
 @contextlib.contextmanager
-def _dancing(measures: bool) -> Iterator[tuple[str, str]]:
-    """Address and PIN of the page of a box that dances the show that comes with it, for no receiver."""
+def _dancing() -> Iterator[str]:
+    """Address of the page of a box that dances the show that comes with it, for no receiver."""
     with tempfile.TemporaryDirectory() as scratch:
         box = Path(scratch) / "box.yaml"
         box.write_text("outputs: {osc: []}\nconsole: {port: 0}\ncontrol: {port: 0}\nruntime: run\n" + PHONE)
         bunraku = [sys.executable, "-m", "appliance.cli"]
         command = [*bunraku, "play", "--emulate", "--box", str(box), "--journal", f"{scratch}/night"]
+        shown = [*bunraku, "project", "--box", str(box), "--offscreen", "192x108"]
         with (
             subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process,
-            contextlib.ExitStack() as beside,
+            subprocess.Popen(shown, stdout=subprocess.DEVNULL) as projector,
         ):
-            if not measures:  # a projector without a graphics card would be measured too
-                shown = [*bunraku, "project", "--box", str(box), "--offscreen", "192x108"]
-                projector = subprocess.Popen(shown, stdout=subprocess.DEVNULL)
-                beside.enter_context(projector)
-                beside.callback(projector.terminate)
             try:
                 said = iter(process.stdout or ())
-                said_at = (re.search(r"page: (http\S+), PIN (\d+)", line) for line in said)
-                address, pin = next(found.groups() for found in said_at if found)
+                said_at = (re.search(r"page: (http\S+), PIN", line) for line in said)
+                address = next(found[1] for found in said_at if found)
                 time.sleep(_LINKED_S)
-                yield address, pin
+                yield address
             finally:
+                projector.terminate()
                 process.terminate()
 
 
 def main(
     address: Annotated[str | None, typer.Option(help="Of a page; left out: a box is started.")] = None,
     out: Annotated[Path, typer.Option(help="The folder.")] = _FOLDER,
-    measure: Annotated[
-        bool, typer.Option(help="Only page-prove.png, which measures: on a quiet machine.")
-    ] = False,
 ) -> None:
     """Take the pictures of docs/page.md."""
-    box = contextlib.nullcontext((address, "")) if address else _dancing(measure)
-    with box as (found, pin), sync_playwright() as playwright:
+    box = contextlib.nullcontext(address) if address else _dancing()
+    with box as found, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        pages = [page for page in PAGES if (page == "prove") == measure]
-        for path in take_pictures(browser, found, out, pin if measure else "", pages=pages):
+        for path in take_pictures(browser, found, out):
             print(path)
         print(take_phone(browser, found, out))
         browser.close()

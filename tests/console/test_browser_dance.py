@@ -36,6 +36,9 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     expect(tab.locator("#held")).to_contain_text("Held:")
     await_true(tab, "seen.held.length === 1 && seen.held[0][0] === 'lShldr' && seen.held[0][1] <= 1")
     assert tab.evaluate("seen.puppets") == 2
+    front, above = (tab.locator(f"#views >> text={name}") for name in ("Front", "Above"))
+    expect(front).to_have_attribute("aria-pressed", "true")
+    wait_until(lambda: 0.7 < tab.evaluate(FILLED) < 1, lambda: f"filled: {tab.evaluate(FILLED)}")
     before = tab.locator("#stage").screenshot()
 
     def seen_and_sent() -> tuple[int, Any, Any] | None:
@@ -63,12 +66,21 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     drawn = "document.querySelector('#stage').toDataURL()"
     before = tab.evaluate(drawn)
     press(tab, "#views >> text=Above")
+    expect(above).to_have_attribute("aria-pressed", "true")
+    expect(front).to_have_attribute("aria-pressed", "false")
     wait_until(lambda: tab.evaluate(drawn) != before, "it is seen from elsewhere")
     tab.locator("#show-dance").check()
     await_true(tab, f"seen.frames > {count}")
     reader.close()
 
 
+# How much of the height of the stage bodies take: they are brighter than the floor.
+FILLED = """() => {
+  const stage = document.querySelector("#stage"), { width, height } = stage;
+  const { data } = stage.getContext("2d").getImageData(0, 0, width, height), rows = [];
+  for (let at = 0; at < data.length; at += 4) if (data[at] > 130) rows.push(Math.floor(at / 4 / width));
+  return (rows.at(-1) - rows[0]) / height;
+}"""
 # Of the display, which the page asks for from now on.
 PICTURES_COUNTED = """() => {
   const ask = requestAnimationFrame;
