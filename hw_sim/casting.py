@@ -28,32 +28,29 @@ class MotionKind(StrEnum):
     trace = "trace"
 
 
-def choose_keys(
-    path: Path, names: Sequence[str], count: int | None, say: Callable[[str], None]
-) -> list[SensorKey]:
-    """The keys of the emulated sensors: the named ones, the first `count`, or all.
+def choose_keys(path: Path, names: Sequence[str], count: int | None) -> tuple[list[SensorKey], list[str]]:
+    """The keys of the emulated sensors: the named ones, the first `count`, or all; and remarks for the user.
 
-    Writes a new key file if there is none, and reports it. Raises ValueError, KeyFileError, OSError.
+    Writes a new key file if there is none. Raises ValueError, KeyFileError, OSError.
     """
     if names and count is not None:
         raise ValueError("give either --sensor or --count")
     if len(set(names)) < len(names) or len(names) > MOST_SENSORS:
         raise ValueError(f"--sensor takes one to {MOST_SENSORS} different sensors")
+    remarks: list[str] = []
     if not path.exists():
         new = names or [DEFAULT_SENSOR, *(f"sensor-{number}" for number in range(2, (count or 1) + 1))]
         create_keys(path, new)
-        say(f"Wrote {path} with fresh keys for {', '.join(new)}. The box must read the same file.")
+        remarks.append(f"Wrote {path} with fresh keys for {', '.join(new)}. The box must read the same file.")
     keys = load_keys(path)
-    warning = exposure(path)
-    if warning:
-        say(warning)
+    remarks += filter(None, [exposure(path)])
     for name in names:
         if name not in keys:
             raise ValueError(f"{path}: {unknown_sensor(name, keys)}")
     wanted = count or min(max(len(keys), 1), MOST_SENSORS)
     if not names and len(keys) < wanted:
         raise ValueError(f"{path} has {sensors(len(keys))}, not {wanted}. Add some, or give another --keys")
-    return [keys[name] for name in names or list(keys)[:wanted]]
+    return [keys[name] for name in names or list(keys)[:wanted]], remarks
 
 
 def cast_sensors(

@@ -153,9 +153,9 @@ def emulate(
         kinds = dict(wanted)
         if MotionKind.trace not in (motion, *kinds.values()):
             refuse_idle(context, ("trace", "joint"), "without the motion 'trace'")
-        chosen = choose_keys(
-            keys, [name for name, _ in wanted], count, lambda message: typer.echo(message, err=True)
-        )
+        chosen, remarks = choose_keys(keys, [name for name, _ in wanted], count)
+        for remark in remarks:
+            typer.echo(remark, err=True)
         if tap and firmware:
             raise ValueError("--tap is not for --firmware, whose sensors feel a finger on their case")
         if serial is not None and len(chosen) > 1:

@@ -19,6 +19,7 @@ from xdist.scheduler import LoadFileScheduling
 import hw_sim.peers
 from tests.boot import figures_report
 from tests.command import Command
+from tests.logged import said
 
 ROOT = Path(__file__).resolve().parents[1]
 # The longest files start first when files run in parallel: started last, one would run alone.
@@ -112,6 +113,11 @@ def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest
 def pytest_collection_finish() -> None:
     gc.freeze()
     gc.enable()
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_said() -> None:
+    said.clear()
 
 
 @pytest.fixture(scope="session")

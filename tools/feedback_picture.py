@@ -54,7 +54,7 @@ def _danced(gain: float) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
     instrument = Instrument(show.skeleton, show.config.strings or StringsConfig(), SoundConfig())
     instrument.level = 1.0
     parts.led.iterations = Iterations(10, 9, 10)
-    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), TICK_S)
+    tick = Tick(parts, SensorFit(parts, SensorMemory(None)), TICK_S)
     way, heard = [], []
     for number in range(round(SECONDS / TICK_S)):
         if number == round(KICK_S / TICK_S):

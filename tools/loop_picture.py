@@ -77,7 +77,7 @@ def _dance() -> tuple[Recording, Recording]:
     parts = assemble(show, BOX)
     (hand,) = parts.worn[SENSOR]
     hand.wear(np.eye(4, dtype=np.float32))  # readings are the joint's own orientations
-    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), TICK_S)
+    tick = Tick(parts, SensorFit(parts, SensorMemory(None)), TICK_S)
     still = np.tile(quaternion.IDENTITY.astype(float), (len(show.skeleton), 1))
     other = show.skeleton.index(JOINT.replace("l", "r", 1))
     still[other] = quaternion.from_axis_angle(np.array([0.0, 0.0, 1.0]), math.radians(-HANG))

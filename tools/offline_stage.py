@@ -32,7 +32,7 @@ class OfflineStage:
         self.parts = assemble(load_show(bundle), _NO_PORTS)
         for one in self.parts.puppets:
             one.iterations = Iterations(*iterations, 10)
-        self._wearing = SensorFit(self.parts, SensorMemory(None, _nobody), _nobody)
+        self._wearing = SensorFit(self.parts, SensorMemory(None))
         self._tick, self._slot = Tick(self.parts, self._wearing, 1.0), Slot(-1, 0.0, 0.0)
 
     def dance(self) -> None:
@@ -58,7 +58,3 @@ def changed_show(folder: Path, changes: Mapping[str, Any]) -> Path:
     config |= {name: value for name, value in changes.items() if name != "motion"}
     (folder / "show.yaml").write_text(yaml.safe_dump(config))
     return folder
-
-
-def _nobody(message: str) -> None:
-    """Nobody listens."""

@@ -48,7 +48,7 @@ def _strip(out: Path, setting: str) -> Path:
     springs.settings, springs.enabled = {one.name: one for one in built_in()}, bool(setting)
     springs.call(setting or "loose")
     parts.led.iterations = Iterations(10, 9, 10)
-    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), TICK_S)
+    tick = Tick(parts, SensorFit(parts, SensorMemory(None)), TICK_S)
     poses, roots = [], []
     for number in range(round((BEFORE_S + SECONDS) / TICK_S)):
         slot = Slot(number, number * TICK_S, number * TICK_S, 0)

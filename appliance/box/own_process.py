@@ -1,4 +1,4 @@
-"""A process beside the stage: its place in the runtime folder, its lines for people, its signs of life."""
+"""A process beside the stage: its place in the runtime folder, its log, its signs of life."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from appliance.box.fallback import Fallback, Fallbacks
-from appliance.box.log_writer import LogWriter
+from appliance.box.log import process_log
 from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, runtime_folder
@@ -28,14 +28,14 @@ _Part = TypeVar("_Part", bound=_Closable)
 class OwnProcess:
     """A context from start to end; an end by an error counts as a death. Raises RuntimeFolderError.
 
-    stopped: whether a signal asked for the end. speaker: a terminal that blocks does not block the process.
+    stopped: whether a signal asked for the end. Its log goes to standard output, and never waits for it.
     """
 
     def __init__(self, box: BoxConfig, name: str, known: Iterable[Fallback]) -> None:
         """name: as in PROCESSES; known: the fallbacks that it may report."""
         with ExitStack() as opened:
             self.stopped = opened.enter_context(stop_signals())
-            self.speaker = opened.enter_context(closing(LogWriter()))
+            opened.enter_context(process_log())
             self.folder = runtime_folder(box)
             opened.enter_context(closing(Claim(self.folder, name)))
             self.notifier = opened.enter_context(closing(Notifier()))

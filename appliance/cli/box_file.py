@@ -151,8 +151,7 @@ def dance_again(chosen: Path, show: str) -> dict[str, Any]:
             raise StageError("This show is not kept on the box any more. Bring it on a stick.")
         choice = saved.with_newest(pair)
         choice._replace(data=places.data).write(places.data / CHOSEN)
-        said: list[str] = []
-        publish(places, Outcome(choice, True, ()), True, _AT_ONCE, said.append, restarts=False)
+        publish(places, Outcome(choice, True, ()), True, _AT_ONCE, restarts=False)
     return {"message": f"The {pair.source} dances again, and after the next power-on too.", "anew": True}
 
 
@@ -230,9 +229,8 @@ def _adopt(chosen: Path, arrival: Arrival, what: str, now: bool) -> dict[str, An
     places = _places(chosen)
     with _alone(places):
         outcome = adopt(places, [arrival], late_candidate_problems, late=True)
-        said = list(outcome.messages)
         if outcome.taken:
-            publish(places, outcome, True, _AT_ONCE if now else _LATER, said.append, restarts=False)
+            publish(places, outcome, True, _AT_ONCE if now else _LATER, restarts=False)
     if not outcome.taken and outcome.choice.refused:
         return {"problems": [{"line": 0, "message": message} for message in outcome.choice.refused]}
     if not outcome.taken:

@@ -76,9 +76,9 @@ def _danced(pair: Pair) -> tuple[float, float]:
 
     verdict = verified_parts(pair.show, pair.box)[1]
     box = load_box(pair.box)
-    parts, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None, print)
+    parts, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None)
     parts.run_with(verdict)
-    tick = Tick(parts, SensorFit(parts, memory, print), latest_start_s=TICK_S)
+    tick = Tick(parts, SensorFit(parts, memory), latest_start_s=TICK_S)
     costs_ms: list[float] = []
     for number in range(_TICKS):
         started, begun = time.monotonic(), time.thread_time()

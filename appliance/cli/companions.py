@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import signal
@@ -14,6 +15,8 @@ from dataclasses import dataclass
 from appliance.box.child import await_end, environment, start_child
 from appliance.box.notify import ALIVE, ENDING, READY, NotifyListener
 from appliance.box.parent_death import REPORTED
+
+_log = logging.getLogger(__name__)
 
 SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0
 UNAVAILABLE = 69  # sysexits.h: what it needs is not here, or not yet: a projector is switched on late
@@ -51,15 +54,13 @@ class Companions:
     The stage's first frame does not wait for them. They end by themselves when this process is killed.
     """
 
-    def __init__(
-        self, companions: Sequence[Companion], say: Callable[[str], None], may_start: Callable[[], bool]
-    ) -> None:
+    def __init__(self, companions: Sequence[Companion], may_start: Callable[[], bool]) -> None:
         self._may_start = may_start
         try:
             self._listener: NotifyListener | None = NotifyListener()
         except OSError:  # no descriptor is left: unwatched is better than not at all
             self._listener = None
-        self._running = [_Running(companion, say, self._listener) for companion in companions]
+        self._running = [_Running(companion, self._listener) for companion in companions]
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._supervise, name="companions", daemon=True)
 
@@ -110,10 +111,8 @@ class Backoff:
 class _Running:
     """A companion and its process."""
 
-    def __init__(
-        self, companion: Companion, say: Callable[[str], None], listener: NotifyListener | None
-    ) -> None:
-        self._companion, self._say, self._listener = companion, say, listener
+    def __init__(self, companion: Companion, listener: NotifyListener | None) -> None:
+        self._companion, self._listener = companion, listener
         self._silent_at = self._looked_at = self._killed_at = math.inf
         self._process: subprocess.Popen[bytes] | None = None
         self._started_at = 0.0
@@ -189,10 +188,10 @@ class _Running:
         companion = self._companion
         if companion.may_close and status == 0:
             self._is_over = True
-            self._say(f"{companion.name} was closed. The dance goes on.")
+            _log.info(f"{companion.name} was closed. The dance goes on.")
         elif status == UNAVAILABLE:
             if self._reported is None:
-                self._say(
+                _log.warning(
                     f"{companion.name} cannot run now. The dance goes on without it; it is retried "
                     f"every {RETRY_S:g} s."
                 )
@@ -210,9 +209,9 @@ class _Running:
         self._starts_at = now + self._backoff.pause_s(now - self._started_at)
         deaths = self._backoff.deaths
         if deaths <= _REPORTED:
-            self._say(f"{self._companion.name} {what}. {self._companion.meanwhile} It is restarted.")
+            _log.warning(f"{self._companion.name} {what}. {self._companion.meanwhile} It is restarted.")
         elif deaths == _REPORTED + 1:
-            self._say(
+            _log.error(
                 f"{self._companion.name} {what}, {deaths} times in a row. {self._companion.meanwhile} "
                 f"It is retried every {LONGEST_PAUSE_S:g} s. Its messages above say why."
             )

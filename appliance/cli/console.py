@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import socket
 import sys
 import textwrap
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,6 +37,8 @@ from appliance.stage.stage_error import StageError
 if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
     from appliance.show.report import ReportConfig
+
+_log = logging.getLogger(__name__)
 
 _DEVICES = "console.json"
 _PATIENCE_S = 2.0
@@ -251,11 +253,10 @@ def page_companion(
     box: BoxConfig,
     page: socket.socket,
     control: socket.socket | None,
-    say: Callable[[str], None],
     rehearsal: bool,
     journal: Path | None,
 ) -> Companion:
-    """The page's process beside the stage; says where browsers find it. Raises StageError.
+    """The page's process beside the stage; logs where browsers find it. Raises StageError.
 
     rehearsal: PIN and devices are not the venue's; they stay until the machine is off.
     """
@@ -265,15 +266,15 @@ def page_companion(
     try:
         https = box.console is not None and box.console.https
         origin = address_of(page.fileno(), https)
-        say(f"The page: {origin}, PIN {Devices(devices).pin}.")
+        _log.info(f"The page: {origin}, PIN {Devices(devices).pin}.")
     except OSError as error:
-        say(f"{devices}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
+        _log.warning(f"{devices}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
     else:
         if names := phone_names(box):
             option = "" if box.path is None else f" --box {box.path}"
-            offer_phones(runtime_folder(box), origin, names, option, say)
+            offer_phones(runtime_folder(box), origin, names, option)
             for line in out_of_phones_reach(box):
-                say(line)
+                _log.warning(line)
     return Companion(
         "The page",
         command,

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from appliance.box.log_writer import LogWriter
+from appliance.box.log import process_log
 from appliance.box.notify import Notifier
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.stop_signals import stop_signals
@@ -34,7 +34,7 @@ def keep(
     runtime = runtime_folder(config)
     with (
         stop_signals() as stopped,
-        closing(LogWriter()) as speaker,
+        process_log(),
         closing(Claim(runtime, "keeper")),
         closing(Notifier()) as notifier,
     ):
@@ -44,7 +44,7 @@ def keep(
         if chosen is not None:
             mirrored.append(MirroredProof(runtime, chosen))
         end_s = END_BESIDE_S if chosen is None else END_S
-        processes = [MirrorProcess(one, runtime, end_s, speaker.say) for one in mirrored]
+        processes = [MirrorProcess(one, runtime, end_s) for one in mirrored]
         health = KeeperHealth(runtime, config.state_folder if chosen is not None else None)
         notifier.ready("The journal and the place of the dance are kept.")
 

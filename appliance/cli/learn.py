@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import logging
 import os
 import shutil
 import subprocess
@@ -21,6 +22,7 @@ from typing import Annotated, Any
 import typer
 
 from appliance.box.child import BUNRAKU, end_child, start_child
+from appliance.box.log import process_log
 from appliance.box.parent_death import end_with_parent
 from appliance.box.realtime import give_way
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
@@ -42,6 +44,8 @@ from appliance.release.choice import box_of
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError
 from appliance.stage.stage_error import StageError
+
+_log = logging.getLogger(__name__)
 
 NICE = 19
 # Reading, export, measuring the answer and the check: they took 5 minutes on two cores that others used.
@@ -78,8 +82,10 @@ def learn(
         learning.begin(wanted)
     with contextlib.suppress(RuntimeFolderError):
         proving = Proving(runtime_folder(load_box(box)))
-        return Learner(learning, proving.show_goes, box, train or (), _print).run()
-    return Learner(learning, lambda: False, box, train or (), _print).run()
+        with process_log():
+            return Learner(learning, proving.show_goes, box, train or ()).run()
+    with process_log():
+        return Learner(learning, lambda: False, box, train or ()).run()
 
 
 def main(given: Sequence[str]) -> int:
@@ -98,7 +104,8 @@ def main(given: Sequence[str]) -> int:
         learning.end()  # a request that cannot be read: else systemd would begin it again and again
         return 0
     try:
-        return Learner(learning, Proving(runtime_folder(config)).show_goes, path).run()
+        with process_log():
+            return Learner(learning, Proving(runtime_folder(config)).show_goes, path).run()
     except Exception as error:
         from appliance.cli.app import refuse
 
@@ -138,10 +145,9 @@ class Learner:
         show_goes: Callable[[], bool],
         box: Path | None = None,
         train: Sequence[str] = (),
-        say: Callable[[str], None] = lambda message: None,
     ) -> None:
         self._learning, self._show_goes, self._box = learning, show_goes, box
-        self._train, self._say = tuple(train), say
+        self._train = tuple(train)
         self._is_stopped: Callable[[], bool] = lambda: False
         self._state: dict[str, Any] = {}
 
@@ -157,12 +163,12 @@ class Learner:
             except _StoppedError:
                 if self._learning.wanted() is None:
                     self._report(state="ended")
-                self._say(_STOPPED)
+                _log.info(_STOPPED)
                 return 2
             except (NotLearnedError, OSError) as error:
                 self._learning.end()
                 self._report(state="failed", message=str(error))
-                self._say(f"{error} The show that danced before stays.")
+                _log.error(f"{error} The show that danced before stays.")
                 return 1
             self._learning.end()
             self._report(state="learned" if result["passed"] else "worse", **result)
@@ -267,19 +273,19 @@ class Learner:
         with contextlib.suppress(OSError):
             self._learning.report(**state)
             if state["state"] != self._state.get("state") and "share" in state:
-                self._say(f"{_STATES[state['state']]} ({100 * state['share']:.0f} % trained)")
+                _log.info(f"{_STATES[state['state']]} ({100 * state['share']:.0f} % trained)")
             self._state = state
 
     def _say_result(self, result: dict[str, Any]) -> None:
         for one in result["figures"]:
             sign = "✓" if one["holds"] else "✗"
-            self._say(
+            _log.info(
                 f"{sign} {one['name']}: {one['value']} ({one['bound']}); the default show's dancer "
                 f"{one['default']}; {one['null_name']} {one['null']}"
             )
-        self._say(f"{result['verdict']} {result['message']} {result['advice']}".strip())
+        _log.info(f"{result['verdict']} {result['message']} {result['advice']}".strip())
         if result["passed"]:
-            self._say(f"Dance it: bunraku play --show {self._learning.show}")
+            _log.info(f"Dance it: bunraku play --show {self._learning.show}")
 
 
 _STATES = {

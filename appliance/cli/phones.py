@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,8 @@ from appliance.stage.stage_error import StageError
 if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
     from appliance.show.show import ShowConfig
+
+_log = logging.getLogger(__name__)
 
 _HOST, _MOST_NETWORKS = "0.0.0.0", 32
 
@@ -77,20 +80,20 @@ def with_phone(show: ShowConfig, box: BoxConfig) -> BoxConfig:
     return box.model_copy(update={"sensors": sensors, "console": console})
 
 
-def offer_phones(
-    folder: Path, origin: str, names: tuple[str, ...], box_option: str, say: Callable[[str], None]
-) -> None:
-    """Say how each phone becomes its sensor: by a QR code where there is a terminal. origin: of the page."""
+def offer_phones(folder: Path, origin: str, names: tuple[str, ...], box_option: str) -> None:
+    """Log how each phone becomes its sensor: by a QR code where there is a terminal. origin: of the page."""
     try:
         codes = JoinCodes(folder)
         codes.set_names(names)
         for name in names:
             for line in invitation(codes, origin, name, sys.stdout.isatty()):
-                say(line)
+                _log.info(line)
     except OSError as error:
-        say(f"{folder}: no codes for phones can be kept there ({error.strerror}). They need the PIN.")
+        _log.warning(
+            f"{folder}: no codes for phones can be kept there ({error.strerror}). They need the PIN."
+        )
         return
-    say(f"Another phone: bunraku console phone NAME{box_option}")
+    _log.info(f"Another phone: bunraku console phone NAME{box_option}")
 
 
 def invitation(codes: JoinCodes, origin: str, name: str, with_picture: bool) -> Iterator[str]:

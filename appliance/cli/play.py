@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import socket
 import time
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from appliance.box.live_pose import forget_live_pose
-from appliance.box.log_writer import SAID, LogWriter
+from appliance.box.log import SAID, process_log
 from appliance.box.made_motion import forget_made_motion
 from appliance.box.runtime_folder import restored_file
 from appliance.box.show_state import forget_show_state
@@ -30,6 +31,8 @@ from appliance.stage.stage_error import StageError
 if TYPE_CHECKING:
     from appliance.cli.companions import Companion
     from appliance.outputs.datagram_sender import DatagramSender
+
+_log = logging.getLogger(__name__)
 
 _NO_REFUSAL = ("accepted", "hello", "profile", "lost", "reboot", "drain_limit")
 # In a technician's words; a reason that is missing here keeps its name from docs/wire.md.
@@ -84,6 +87,7 @@ def play_show(
 
         message = prove_network(show)
     with ExitStack() as opened:
+        log = opened.enter_context(process_log())
         stopped = opened.enter_context(stop_signals())
         scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
         if emulate and scratch:
@@ -96,8 +100,6 @@ def play_show(
             keeps, journal, minutes = True, scratch / "dance.journal", PICTURED_MINUTES
         elif not alone:
             keeps = journal is not None or (box.state_folder is not None and not emulate)
-        speaker = LogWriter()
-        opened.callback(speaker.close)
         if chosen is not None:
             opened.enter_context(restored_file(chosen))
         shown = False
@@ -116,40 +118,40 @@ def play_show(
             from appliance.cli.page_address import open_console_port
 
             page = opened.enter_context(open_console_port(box.console, or_any=True))
-        stage = Stage(show, box, speaker.say, box.path, rehearsal=emulate)
-        speaker.keep_in(stage.sharing.folder / SAID)
+        stage = Stage(show, box, box.path, rehearsal=emulate)
+        log.keep_in(stage.sharing.folder / SAID)
         with closing(stage):
             keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
             keeper = _keeper(keepers_box, journal, minutes) if keeps else None
             unlit = () if alone or show.config.lights.fixtures else unwired(show.config, box)
             for line in (*message.splitlines(), *_introduction(stage, emulate, control), *unlit):
-                speaker.say(line)
+                _log.info(line)
             companions = () if alone else tuple(_companions(show.config, box, control, window or shown))
             if page is not None:
-                companions += (page_companion(box, page, control, speaker.say, emulate, journal),)
+                companions += (page_companion(box, page, control, emulate, journal),)
             if emulate and scratch:
                 wait_until_calling(scratch)
-            with _running(companions + (() if keeper is None else (keeper,)), speaker, stage):
+            with _running(companions + (() if keeper is None else (keeper,)), stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:
                 from appliance.keeper.keeper import keep_rest
 
-                keep_rest(stage.box, stage.sharing.noted, journal, minutes, speaker.say)
+                keep_rest(stage.box, stage.sharing.noted, journal, minutes)
         if not alone:
             _forget_run(stage)
         for line in _conclusion(stage):
-            speaker.say(line)
+            _log.info(line)
         if filmstrip is not None and journal is not None:
             from appliance.cli.pictures import draw_dance, load_dance
             from appliance.cli.rehearsal import PICTURED_S
 
             picture = draw_dance(load_dance(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
-            speaker.say(f"The dance just now, held joints highlighted: {picture}")
+            _log.info(f"The dance just now, held joints highlighted: {picture}")
         if rehearse is not None and journal is not None:
             from appliance.cli.rehearsal import rehearsal_picture
 
             for line in rehearsal_picture(journal, rehearse, show):
-                speaker.say(line)
+                _log.info(line)
     if chosen is not None:
         from appliance.release.trial import ended_well
 
@@ -164,7 +166,8 @@ def _pair_to_dance(chosen: Path, directory: Path | None, box_file: Path | None) 
 
     require_no("--show", directory, chosen)
     require_no("--box", box_file, chosen)
-    pair = pair_to_dance(chosen, time.monotonic(), lambda message: print(message, flush=True))
+    with process_log():
+        pair = pair_to_dance(chosen, time.monotonic())
     return pair.show, pair.box
 
 
@@ -193,15 +196,13 @@ def _opened(control: ControlConfig, opened: ExitStack) -> socket.socket:
     return port
 
 
-def _running(
-    companions: tuple[Companion, ...], speaker: LogWriter, stage: Stage
-) -> AbstractContextManager[object]:
+def _running(companions: tuple[Companion, ...], stage: Stage) -> AbstractContextManager[object]:
     """A context in which they run; without any, their module is not loaded, so that a stage restarts fast."""
     if not companions:
         return nullcontext()
     from appliance.cli.companions import Companions
 
-    return Companions(companions, speaker.say, lambda: stage.health.ticks > 0)
+    return Companions(companions, lambda: stage.health.ticks > 0)
 
 
 def _companions(

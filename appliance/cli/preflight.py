@@ -6,7 +6,7 @@ import contextlib
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -37,7 +37,7 @@ class Options(NamedTuple):
     check_release: bool = False
 
 
-def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> int:
+def preflight(options: Options, uptime_s: float) -> int:
     """Write chosen.json into the run folder; 0 once it is there, 1 if it cannot be written."""
     places = Places(options.data, options.run)
     if options.late:
@@ -45,17 +45,17 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
             os.nice(19)
     try:
         if not options.late:  # this dances even if the new show ends this process
-            publish(places, Outcome(chosen_before(places), False, ()), False, uptime_s, say)
+            _say(publish(places, Outcome(chosen_before(places), False, ()), False, uptime_s))
         patience_s = LATE_TURN_S if options.late else TURN_S
         with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
             outcome = _found(options, places)
             for message in outcome.messages:
-                say(message)
-            publish(places, outcome, options.late, uptime_s, say)
+                _say(message)
+            _say(publish(places, outcome, options.late, uptime_s))
     except BlockingIOError:
-        say("Another preflight has not ended. The show before goes on. Plug the stick in again.")
+        _say("Another preflight has not ended. The show before goes on. Plug the stick in again.")
     except OSError as error:
-        say(
+        _say(
             f"{places.run}: what was chosen cannot be written there ({error.strerror}). The audience "
             "sees the show that comes with the box. Check the owner of this folder."
         )
@@ -93,15 +93,10 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def publish(
-    places: Places,
-    outcome: Outcome,
-    late: bool,
-    uptime_s: float,
-    say: Callable[[str], None],
-    restarts: bool = True,
-) -> None:
-    """Write the choice where all processes look for it; a show that has run for long is not interrupted.
+def publish(places: Places, outcome: Outcome, late: bool, uptime_s: float, restarts: bool = True) -> str:
+    """Write the choice where all processes look for it; when it dances, in a sentence or none.
+
+    A show that has run for long is not interrupted.
 
     restarts: the units start anew with it; else the caller sees to that.
     """
@@ -110,14 +105,15 @@ def publish(
     if before is not None and (not outcome.taken or uptime_s >= _AT_ONCE_S):
         before._replace(refused=outcome.choice.refused).write(path)
         if outcome.taken:
-            say("The running show goes on. The new one dances after the next power-on.")
-        return
+            return "The running show goes on. The new one dances after the next power-on."
+        return ""
     choice = outcome.choice.complete(built_in_box(places))._replace(data=places.data)
     aside = () if before is None else before.aside  # also what the stage put aside during the checks
     choice.without(Choice(aside=tuple(one for one in aside if one.id != choice.first.id))).write(path)
     if before is not None and restarts:
         (places.run / ANEW).touch()
-        say("The box was switched on only just now: the new show dances at once.")
+        return "The box was switched on only just now: the new show dances at once."
+    return ""
 
 
 def late_candidate_problems(show: Path, box: Path) -> list[str]:
@@ -176,12 +172,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from appliance.cli.check_release import check_release
 
         return check_release(options.data)
-    return preflight(options, _say, time.clock_gettime(time.CLOCK_BOOTTIME))
+    return preflight(options, time.clock_gettime(time.CLOCK_BOOTTIME))
 
 
 def _say(message: str) -> None:
-    with contextlib.suppress(OSError):
-        print(message, flush=True)
+    """Standard output, and no `logging`: its import costs more than this line."""
+    if message:
+        with contextlib.suppress(OSError):
+            print(message, flush=True)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from appliance.box.log_writer import LogWriter
+from appliance.box.log import process_log
 from appliance.box.notify import Notifier
 from appliance.box.parent_death import was_reported
 from appliance.box.stop_signals import stop_signals
@@ -24,6 +25,8 @@ from appliance.projector.run import Options, Run
 from appliance.projector.window import Kind, Size
 from appliance.release.choice import Choice, box_of
 from appliance.show.box import load_box
+
+_log = logging.getLogger(__name__)
 
 _LARGEST = 16384
 _RETRY_S = 10.0  # without a display: a projector is switched on late
@@ -93,11 +96,11 @@ def project_show(box_file: Path | None, options: Options, waits: bool = False) -
 
     waits: without a display, try again every 10 s in this process.
     """
-    with stop_signals() as stopped, closing(LogWriter()) as speaker, closing(Notifier()) as notifier:
+    with stop_signals() as stopped, process_log(), closing(Notifier()) as notifier:
         said = ""
         while not stopped():
             try:
-                _project(box_file, options, stopped, notifier, speaker.say)
+                _project(box_file, options, stopped, notifier)
                 break
             except ProjectorError as error:
                 if not (waits and error.status == NO_DISPLAY):
@@ -106,7 +109,7 @@ def project_show(box_file: Path | None, options: Options, waits: bool = False) -
                     return error.status
                 if str(error) != said:
                     said = str(error)
-                    speaker.say(f"{said} Trying again every {_RETRY_S:g} s.")
+                    _log.warning(f"{said} Trying again every {_RETRY_S:g} s.")
             notifier.ready("No display yet; trying again.")
             _wait(stopped, notifier)
     return 0
@@ -117,15 +120,14 @@ def _project(
     options: Options,
     stopped: Callable[[], bool],
     notifier: Notifier,
-    say: Callable[[str], None],
 ) -> None:
     from appliance.cli.console import card_lines
 
     box = load_box(box_file)
-    with closing(Run(box, replace(options, card=lambda: card_lines(box)), say)) as run:
+    with closing(Run(box, replace(options, card=lambda: card_lines(box)))) as run:
         for line in run.introduction():
-            say(line)
-        say(f"Shown: {run.project(stopped, notifier).sentence()}.")
+            _log.info(line)
+        _log.info(f"Shown: {run.project(stopped, notifier).sentence()}.")
 
 
 def _wait(stopped: Callable[[], bool], notifier: Notifier) -> None:

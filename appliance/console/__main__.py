@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 
 from appliance.box.parent_death import end_with_parent
+
+_log = logging.getLogger(__name__)
 
 
 def main() -> int:
     """Run with the settings that `bunraku console` or `bunraku play` hands over; the exit status."""
     end_with_parent()
-    from appliance.box.log_writer import LogWriter
+    from appliance.box.log import process_log
     from appliance.console.run import run_console
     from appliance.console.settings import Settings
 
-    speaker, settings = LogWriter(), Settings.unpacked(sys.argv[1])
-    try:
-        return run_console(settings)
-    except OSError as error:
-        speaker.say(
-            f"{error.filename or settings.folder}: the page has no place there ({error.strerror}). No "
-            "browser opens it; the dance goes on. Free space there, or give another folder as `state:`."
-        )
-        return 1
-    finally:
-        speaker.close()
+    settings = Settings.unpacked(sys.argv[1])
+    with process_log():
+        try:
+            return run_console(settings)
+        except OSError as error:
+            _log.error(
+                f"{error.filename or settings.folder}: the page has no place there ({error.strerror}). No "
+                "browser opens it; the dance goes on. Free space there, or give another folder as `state:`."
+            )
+    return 1
 
 
 if __name__ == "__main__":

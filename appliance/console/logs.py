@@ -9,7 +9,7 @@ from typing import Any
 
 from aiohttp import web
 
-from appliance.box.log_writer import MOST_SAID, SAID
+from appliance.box.log import MOST_SAID, SAID
 from appliance.console.child import output_of
 
 _PATIENCE_S = 10.0

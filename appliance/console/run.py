@@ -16,7 +16,6 @@ from aiohttp import web
 
 from appliance.box.door import Door
 from appliance.box.fallback import Fallbacks
-from appliance.box.log_limit import limit_log
 from appliance.box.notify import Notifier
 from appliance.box.open_files import open_more_files
 from appliance.box.process_health import ProcessHealthWriter
@@ -70,7 +69,6 @@ def run_console(settings: Settings) -> int:
     """Serve the page until SIGTERM or Ctrl-C; the exit status. Raises OSError where it has no place."""
     give_way(_NICER)
     open_more_files()
-    limit_log()
     with restored_file(Path(settings.folder) / WHERE):
         return asyncio.run(_serve(settings))
 

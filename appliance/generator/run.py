@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import time
 from collections.abc import Callable
 from functools import partial
@@ -19,6 +20,8 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
+
+_log = logging.getLogger(__name__)
 
 _LOOK_S = 0.05
 _NICE = 10
@@ -56,7 +59,7 @@ def run_generator(directory: Path | None, box_file: Path | None) -> None:
             try:
                 show = load_show(directory or _facts_folder(stage))
             except ConfigError as error:
-                own.speaker.say(f"{error}\nNothing is made until the stage dances another show.")
+                _log.error(f"{error}\nNothing is made until the stage dances another show.")
                 while not is_over():
                     pulse()
                     time.sleep(_LOOK_S)

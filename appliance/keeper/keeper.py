@@ -97,9 +97,7 @@ def supervise(
         process.abandon()
 
 
-def keep_rest(
-    box: BoxConfig, runtime: Path, journal: Path | None, minutes: float, say: Callable[[str], None]
-) -> None:
+def keep_rest(box: BoxConfig, runtime: Path, journal: Path | None, minutes: float) -> None:
     """After the dance: carry what a keeper did not live to carry, because it was ended while it started."""
     try:
         claim = Claim(runtime, "keeper")
@@ -107,5 +105,5 @@ def keep_rest(
         return
     with closing(claim):
         mirrored = mirrored_by(box, runtime, journal, minutes)
-        processes = [MirrorProcess(one, runtime, 0.0, say) for one in mirrored]
+        processes = [MirrorProcess(one, runtime, 0.0) for one in mirrored]
         supervise(processes, lambda: True, lambda now: None, _REST_S)

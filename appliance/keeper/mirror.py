@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,8 @@ from typing import Protocol
 
 from appliance.box.fallback import Fallback
 from appliance.recorder.journal_error import JournalError
+
+_log = logging.getLogger(__name__)
 
 TURN_S = 0.5  # so a power cut loses less than a second
 LOOK_S = 0.05  # how often a process looks whether it is to end
@@ -49,8 +52,8 @@ class Mirror:
     complaint: why the disk does not take it now, a sentence, else ""; failed: how often it did not.
     """
 
-    def __init__(self, mirrored: Mirrored, say: Callable[[str], None]) -> None:
-        self._mirrored, self._say = mirrored, say
+    def __init__(self, mirrored: Mirrored) -> None:
+        self._mirrored = mirrored
         self._due = 0.0
         self.fallback, self.complaint, self.failed = mirrored.fallback, "", 0
 
@@ -77,12 +80,12 @@ class Mirror:
             self._due = now + RETRY_S
             complaint = self._mirrored.explain(error)
             if complaint != self.complaint:
-                self._say(complaint)
+                _log.warning(complaint)
             self.complaint = complaint
             return
         if self.complaint:
             self.complaint = ""
-            self._say(self._mirrored.recovered)
+            _log.info(self._mirrored.recovered)
 
 
 def mirror_until(

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import gc
 import json
+import logging
 import os
 import signal
 import socket
 import traceback
-from collections.abc import Callable
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import NoReturn
@@ -22,6 +22,8 @@ from appliance.box.pace import Pace
 from appliance.box.parent_death import end_with
 from appliance.keeper.mirror import LOOK_S, RETRY_S, TURN_S, Mirror, Mirrored, mirror_until
 
+_log = logging.getLogger(__name__)
+
 HANGS_S = 5.0  # without a turn for this long, it is reported; a card that erases a block may take seconds
 STUCK_S = 60.0  # then it is killed: what hangs in the kernel ends once the disk answers, and is started again
 _AGAIN = (
@@ -29,7 +31,7 @@ _AGAIN = (
     "keeper's messages."
 )
 _LONGEST_TEXT, _LARGEST_MESSAGE = 2000, 1 << 16  # characters; bytes
-_SAID, _TURN = "said", "turn"  # kinds of message
+_TURN = 0  # a message after each turn, in place of the level of a log record
 
 
 class MirrorProcess:
@@ -38,10 +40,10 @@ class MirrorProcess:
     complaint: what cannot be kept, a sentence, else "". fallback: in force meanwhile.
     """
 
-    def __init__(self, mirrored: Mirrored, runtime: Path, end_s: float, say: Callable[[str], None]) -> None:
+    def __init__(self, mirrored: Mirrored, runtime: Path, end_s: float) -> None:
         """runtime: the folder where the box's processes meet; end_s: as for mirror_until."""
         self.fallback = mirrored.fallback
-        self._mirrored, self._runtime, self._end_s, self._say = mirrored, runtime, end_s, say
+        self._mirrored, self._runtime, self._end_s = mirrored, runtime, end_s
         self._process = 0  # its number; 0: none runs
         self._channel: socket.socket | None = None
         self._pace = Pace(TURN_S, 1.0 / LOOK_S)
@@ -85,7 +87,7 @@ class MirrorProcess:
         """Wait no longer: a process that still runs is killed, and ends once the disk lets it."""
         if self._process:
             self._kill()
-            self._say(
+            _log.error(
                 f"{self._mirrored.name}: the disk does not answer, and what was noted last is not on it. "
                 "Check the disk: bunraku doctor."
             )
@@ -119,14 +121,14 @@ class MirrorProcess:
                 return
             if not message:
                 return
-            kind, text = json.loads(message)
-            if kind == _SAID:
-                self._say(text)
+            level, text = json.loads(message)
+            if level != _TURN:
+                _log.log(level, text)
                 continue
             self._silent_s, self._mirrors_complaint = 0.0, text
             if self._trouble:
                 self._trouble = ""
-                self._say(f"{self._mirrored.name}: it is carried to the disk again.")
+                _log.info(f"{self._mirrored.name}: it is carried to the disk again.")
 
     def _check_process(self, now: float) -> None:
         ended, status = os.waitpid(self._process, os.WNOHANG)
@@ -158,7 +160,7 @@ class MirrorProcess:
     def _report_trouble(self, what: str) -> None:
         trouble = f"{self._mirrored.name}: {what}"
         if trouble != self._trouble:
-            self._say(trouble)
+            _log.warning(trouble)
         self._trouble = trouble
 
     def _run(self, channel: socket.socket, parent: int) -> NoReturn:
@@ -166,7 +168,8 @@ class MirrorProcess:
         status = 1
         try:
             _detach(channel, parent)
-            mirror = Mirror(self._mirrored, lambda text: _send(channel, _SAID, text))
+            logging.getLogger().handlers = [_ToParent(channel)]  # the parent's has no thread here
+            mirror = Mirror(self._mirrored)
             with closing(CheckpointReader(self._runtime)) as place:
                 mirror_until(
                     lambda: _is_closed(channel),
@@ -182,6 +185,17 @@ class MirrorProcess:
             os._exit(status)
 
 
+class _ToParent(logging.Handler):
+    """Records of a mirror, which its parent writes."""
+
+    def __init__(self, channel: socket.socket) -> None:
+        super().__init__()
+        self._channel = channel
+
+    def emit(self, record: logging.LogRecord) -> None:
+        _send(self._channel, record.levelno, self.format(record))
+
+
 def _detach(channel: socket.socket, parent: int) -> None:
     """End only with the parent, and hold none of its locks, files and sockets."""
     gc.freeze()  # unused objects of the parent would close descriptors that are others by then
@@ -194,10 +208,10 @@ def _detach(channel: socket.socket, parent: int) -> None:
     channel.setblocking(False)
 
 
-def _send(channel: socket.socket, kind: str, text: str) -> None:
+def _send(channel: socket.socket, level: int, text: str) -> None:
     """To a parent that may be stopped: what finds no room is dropped, and a complaint is sent each turn."""
     with suppress(OSError):
-        channel.send(json.dumps([kind, text[:_LONGEST_TEXT]]).encode())
+        channel.send(json.dumps([level, text[:_LONGEST_TEXT]]).encode())
 
 
 def _is_closed(channel: socket.socket) -> bool:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from appliance.box.log import process_log
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.stop_signals import stop_signals
 from appliance.lights.patch import Patch
-from appliance.lights.run import require_wires, rig_here, say, wired
+from appliance.lights.run import require_wires, rig_here, wired
 from appliance.lights.unknown_name import UnknownNameError
 from appliance.lights.walk import steps, walk
 from appliance.show.box import load_box
@@ -18,6 +20,8 @@ from appliance.show.config_error import did_you_mean
 from appliance.show.lights import drivable
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import unwired
+
+_log = logging.getLogger(__name__)
 
 
 def walk_rig(
@@ -34,6 +38,7 @@ def walk_rig(
     patch = Patch(config.fixtures, show.directory)
     to_see = list(steps(patch, fixtures, attribute))
     with ExitStack() as opened:
+        opened.enter_context(process_log())
         stopped = opened.enter_context(stop_signals())
         opened.callback(Claim(runtime_folder(box), "lights").close)
         universes = wired(patch, box)
@@ -47,12 +52,12 @@ def walk_rig(
             return time.monotonic()
 
         for sentence in unwired(show.config, box):
-            say(sentence)
-        say(f"{len(to_see)} steps of {step_s:g} s or more; Ctrl-C ends the walk, and all goes dark.")
-        walk(patch, to_see, step_s, box.lights.rate_hz, send_levels, say, stopped)
+            _log.info(sentence)
+        _log.info(f"{len(to_see)} steps of {step_s:g} s or more; Ctrl-C ends the walk, and all goes dark.")
+        walk(patch, to_see, step_s, box.lights.rate_hz, send_levels, stopped)
         for universe in universes:
             for message in filter(None, (universe.wire.trouble, universe.wire.remark)):
-                say(message)
+                _log.warning(message)
 
 
 def _require_known(show: Show, fixtures: list[str], attribute: str | None) -> None:

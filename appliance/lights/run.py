@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -30,6 +31,8 @@ from appliance.show.lights import LightsConfig
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import at_venue, misplaced, unwired
 
+_log = logging.getLogger(__name__)
+
 _LOOK_S = 0.004  # while silent: how soon after the stage the lights take over
 
 _REPORT_S = 1.0
@@ -46,7 +49,6 @@ class Lights:
         box: BoxConfig,
         stage: FrameReader,
         show_state: ShowStateReader,
-        say: Callable[[str], None],
         fallbacks: Fallbacks,
         inbox: OrderInbox | None = None,
         live: LiveRig | None = None,
@@ -60,7 +62,7 @@ class Lights:
         self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz, puppets, led, hands)
         self.universes = wired(patch, box)
         self._walk, self._live = OrderedWalk(inbox, patch, box.lights.rate_hz), live
-        self._stage, self._show_state, self._say, self._fallbacks = stage, show_state, say, fallbacks
+        self._stage, self._show_state, self._fallbacks = stage, show_state, fallbacks
         self._foreign: int | None = None
         self._was_lost = True
         self._speaking = Speaking(box, self.universes)
@@ -72,9 +74,9 @@ class Lights:
         mappings = [mapping.name for mapping in self.show.config.lights.mappings]
         wires = " and ".join(universe.wire.name for universe in self.universes)
         rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: each lamp follows a limb"
-        self._say(f"Lights: {counted(len(self.rig.patch.fixtures), 'fixture')} by {wires}; {rules}.")
+        _log.info(f"Lights: {counted(len(self.rig.patch.fixtures), 'fixture')} by {wires}; {rules}.")
         for sentence in unwired(self.show.config, self.box):
-            self._say(sentence)
+            _log.warning(sentence)
 
     def run(self, stopped: Callable[[], bool], pulse: Callable[[float], None]) -> None:
         """Render and send on a grid of absolute deadlines until `stopped`; then fade to the safe look.
@@ -130,7 +132,7 @@ class Lights:
             return frame
         if self._foreign != self._stage.generation:
             self._foreign = self._stage.generation
-            self._say(
+            _log.warning(
                 f"The stage dances '{facts.show_name}' with another skeleton. The lights stay in their safe "
                 f"look. Start them with --show {facts.show_directory}."
             )
@@ -141,22 +143,25 @@ class Lights:
         lost = self.rig.is_lost
         if lost and not self._was_lost:
             self._fallbacks.set(STAGE_UNSEEN.name, True)
-            self._say(
+            _log.warning(
                 f"No frame from the stage for {LOST_S:g} s. The lights fade to their safe look; they dance "
                 "again as soon as the stage does. See what `bunraku play` says."
             )
         elif self._was_lost and not lost:
             self._fallbacks.set(STAGE_UNSEEN.name, False)
-            self._say("The stage dances, and the lights with it.")
+            _log.info("The stage dances, and the lights with it.")
         self._was_lost = lost
         for universe in self.universes:
             name, trouble = universe.wire.name, universe.wire.trouble or ""
             if trouble != self._troubles.get(name, ""):
-                self._say(trouble or f"{name} is well again.")
+                if trouble:
+                    _log.warning(trouble)
+                else:
+                    _log.info(f"{name} is well again.")
             self._troubles[name] = trouble
             if (remark := universe.wire.remark) and remark not in self._remarks:
                 self._remarks.add(remark)
-                self._say(remark)
+                _log.warning(remark)
         self._fallbacks.parts = self._troubles
         self._fallbacks.concern(DMX_AWAY.name, [name for name, trouble in self._troubles.items() if trouble])
         self._fallbacks.set(DMX_AWAY.name, " ".join(filter(None, self._troubles.values())))
@@ -203,7 +208,7 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
         live, inbox = own.keep(LiveRig(folder)), _open_inbox(folder)
         if inbox is not None:
             own.keep(inbox)
-        parts = stage, show_state, own.speaker.say, own.fallbacks, inbox, live
+        parts = stage, show_state, own.fallbacks, inbox, live
         if directory is not None:
             lights = Lights(load_show(directory), box, *parts)
             own.notifier.ready("The lights dance.")
@@ -216,7 +221,7 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
                 try:
                     lights = Lights(active.load(), box, *parts)
                 except ConfigError as error:
-                    own.speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
+                    _log.error(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:
                     _light(lights, lambda: stopped() or active.is_new(time.monotonic()), own.pulse)
             own.pulse(time.monotonic())

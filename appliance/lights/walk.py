@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,8 @@ from appliance.lights.slot import Slot
 from appliance.show.fixture_profile import DIMMER, PAN, TILT
 from appliance.show.light_rules import AIM
 from appliance.show.venue_lights import UNIVERSE_CHANNELS
+
+_log = logging.getLogger(__name__)
 
 LONGEST_STEP_S = 0.04  # time step; a late one continues where it was, so that no peak is skipped
 _ROOM = 2.2  # sweeps from end to end that a head gets time for; it makes two
@@ -155,7 +158,6 @@ def walk(
     step_s: float,
     rate_hz: float,
     show: Callable[[dict[int, bytes]], float],
-    say: Callable[[str], None],
     stopped: Callable[[], bool],
 ) -> None:
     """Take the steps, `step_s` each or as long as heads need, at `rate_hz`.
@@ -171,8 +173,8 @@ def walk(
             break
         if walking.step is not said:
             if said is None or walking.step.fixture != said.fixture:
-                say(introduction(patch, walking.step.fixture))
+                _log.info(introduction(patch, walking.step.fixture))
             said = walking.step
-            say(f"  {said.attribute}, {said.description}")
+            _log.info(f"  {said.attribute}, {said.description}")
         now = show(levels)
     show(dark)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from appliance.projector.warp import NOT_WARPED, Warp
 from appliance.projector.warp import complaint as warp_complaint
 from appliance.show.box import BoxConfig
 from appliance.show.projector import LEAST_TO_MOST_GAMMA, LEAST_TO_MOST_OVERLAP, ProjectorConfig
+
+_log = logging.getLogger(__name__)
 
 _HEADER = (
     "# How the picture lies on the wall; written by bunraku project, corners clockwise from the top left.\n"
@@ -75,9 +78,9 @@ class AlignmentFile:
     error is reported in one sentence, and the alignment then holds for this run alone.
     """
 
-    def __init__(self, folder: Path, config: ProjectorConfig, say: Callable[[str], None]) -> None:
+    def __init__(self, folder: Path, config: ProjectorConfig) -> None:
         self.path = folder / file_name(config)
-        self._from_box, self._say = Alignment.of_box(config), say
+        self._from_box = Alignment.of_box(config)
         self._saved = self._wanted = self._load()
         self._is_wanted = threading.Event()
         self._closing = False
@@ -124,7 +127,7 @@ class AlignmentFile:
         self._is_wanted.set()
         self._thread.join(LAST_WRITE_S)
         if self._thread.is_alive():
-            self._say(
+            _log.warning(
                 f"{self.path}: the disk does not answer, and the newest alignment is perhaps not kept: after "
                 "the next start the picture may lie as before. Look at the disk: bunraku doctor."
             )
@@ -144,7 +147,7 @@ class AlignmentFile:
             private_folder(self.path.parent)
             write_whole(self.path, _text(alignment, self._from_box).encode(), private=True)
         except OSError as error:
-            self._say(
+            _log.warning(
                 f"{self.path}: the alignment cannot be kept ({error.strerror}). The picture lies as you put "
                 "it until the projector ends. Make the folder writable, or name another one under `state` in "
                 "the box file."
@@ -169,12 +172,12 @@ class AlignmentFile:
             broken = self.path.with_name(self.path.name + ".broken")
             with contextlib.suppress(OSError):
                 self.path.replace(broken)
-            self._say(
+            _log.warning(
                 f"{self.path}: the alignment is damaged and set aside as {broken.name}. The picture fills "
                 "the display. Lay it onto the wall again: key c."
             )
         except OSError as error:
-            self._say(
+            _log.warning(
                 f"{self.path}: the alignment cannot be read ({error.strerror}). The picture fills the "
                 "display. Check the rights of this file."
             )

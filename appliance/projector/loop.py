@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -38,6 +39,8 @@ from appliance.show.config_error import ConfigError
 from appliance.show.look import LookConfig, looks_by_name
 from appliance.show.projector import ProjectorConfig
 from appliance.show.show import load_show
+
+_log = logging.getLogger(__name__)
 
 STALE_S = 0.5
 FADE_S = 0.5
@@ -80,11 +83,10 @@ class Projector:
         reader: FrameReader,
         show_state: ShowStateReader,
         controls: Controls,
-        say: Callable[[str], None],
         make_painter: MakePainter = KEEPING,
     ) -> None:
         self._gl, self._config, self._make_painter = gl, config, make_painter
-        self._reader, self._show_state, self._controls, self._say = reader, show_state, controls, say
+        self._reader, self._show_state, self._controls = reader, show_state, controls
         self._final = FinalPass(gl, config)
         self._presence = Presence(config.rate or USUAL_RATE)
         self._generation = 0
@@ -217,7 +219,7 @@ class Projector:
             return
         self.is_preparing = True
         self._painter = self._make_painter(self._gl, show.skeleton, show.looks, show.directory)
-        self._cards = Cards(self._gl, show.cards, show.directory, self._say)
+        self._cards = Cards(self._gl, show.cards, show.directory)
         for part in (SHARES[-1], share):
             size = self._picture_size(display, part)
             wall = self._final.wall(screen, display, self._controls, 1.0, size)
@@ -271,7 +273,7 @@ class Projector:
             looks = self._with_images(looks_by_name(config.looks, directory))
             cards = cards_by_name(config.cards)
         except ConfigError as error:
-            self._say(
+            _log.warning(
                 f"{error} The audience sees the built-in looks. Correct the show, then start the stage again."
             )
             looks, cards = looks_by_name(()), cards_by_name(())
@@ -291,7 +293,7 @@ class Projector:
                 read_image(look.image)
                 self._read.add(image)
             except OSError as error:
-                self._say(
+                _log.warning(
                     f"{look.image} cannot be read as an image ({error}). The audience sees the look '{name}' "
                     "without it. Save it anew."
                 )

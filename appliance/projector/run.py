@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import socket
 import time
@@ -50,6 +51,8 @@ from appliance.projector.stream.keying import keyed
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
 
+_log = logging.getLogger(__name__)
+
 SHOWS_FOR_S = 600.0  # the test card of the first start
 MARK = "used"  # in the box's state folder: this box has been used
 
@@ -90,9 +93,9 @@ class Options:
 class Run:
     """Everything open while the projector runs. Raises ProjectorError, ConfigError or RuntimeFolderError."""
 
-    def __init__(self, box: BoxConfig, options: Options, say: Callable[[str], None]) -> None:
+    def __init__(self, box: BoxConfig, options: Options) -> None:
         config = box.projector
-        self._options, self._say = options, say
+        self._options = options
         with ExitStack() as opened:
             folder = runtime_folder(box)
             self._window = Window(
@@ -106,19 +109,19 @@ class Run:
             self._raw = None if options.raw is None else RawStream(options.raw, is_keyed=options.is_keyed)
             if self._raw is not None:
                 opened.callback(self._raw.close)
-            self._feed = None if config.stream is None else Feed(config.stream, say)
+            self._feed = None if config.stream is None else Feed(config.stream)
             if self._feed is not None:
                 opened.callback(self._feed.close)
             self._seen_wall = SeenWall(folder)
             opened.callback(self._seen_wall.close)
-            self._file = AlignmentFile(alignment_folder(box), config, say)
+            self._file = AlignmentFile(alignment_folder(box), config)
             opened.callback(self._file.close)
             self._controls = Controls(self._file.alignment, self._file.keep, options.shows_info)
             self._first_start: FirstStart | None = None
             if options.is_first:
                 self._first_start = FirstStart(alignment_folder(box), (self._file.path, box.sensors.keys))
                 self._controls.shows_test_card = self._first_start.is_on
-            self._inbox = _open_inbox(folder, opened, say)
+            self._inbox = _open_inbox(folder, opened)
             self.fallbacks = Fallbacks(OF_THE_PROJECTOR)
             self._health = ProcessHealthWriter(folder, "projector", self.fallbacks)
             opened.callback(self._health.close)
@@ -127,9 +130,7 @@ class Run:
             is_dark = box.pair is not None and box.pair.picture == "black"
             self._show_state = DarkWhileFollowing(folder) if is_dark else ShowStateReader(folder)
             opened.callback(self._show_state.close)
-            self.projector = Projector(
-                self.context.gl, config, self.reader, self._show_state, self._controls, say
-            )
+            self.projector = Projector(self.context.gl, config, self.reader, self._show_state, self._controls)
             opened.callback(self.projector.release)
             self._closing = opened.pop_all()
         rate = config.rate or self._window.display_rate or USUAL_RATE
@@ -228,7 +229,7 @@ class Run:
         if not self._is_resolution_said:
             self._is_resolution_said = True
             rate = 1.0 / self._pacing.period_s
-            self._say(about_resolution(self._resolution.share, self._window.size, rate))
+            _log.warning(about_resolution(self._resolution.share, self._window.size, rate))
 
     def _write_png(self, folder: Path, pixels: bytes, size: Size) -> None:
         try:
@@ -248,7 +249,7 @@ class Run:
                 continue
             message = press(key, self._controls, self._window.size)
             if message:
-                self._say(message)
+                _log.info(message)
         if self._controls.wants_fullscreen:
             self._controls.wants_fullscreen = False
             self._window.toggle_fullscreen()
@@ -284,10 +285,10 @@ class Run:
         )
         self._card_lines = (socket.gethostname(), *where, f"{width}x{height} {self._window.driver}")
         if self._options.shows_info:
-            self._say(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")
+            _log.info(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")
         if not self._is_software_said and figures.dances >= _JUDGED_AFTER:
             self._is_software_said = True
-            self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self.context.renderer))
+            _log.warning(about_software(figures.rate, 1.0 / self._pacing.period_s, self.context.renderer))
 
     def _end_first_start(self, now: float) -> None:
         if self._first_start is None or not self._first_start.is_on:
@@ -295,7 +296,7 @@ class Run:
         newest = self.reader.newest(now)
         sequence = -1 if newest is None else newest.sensor_sequence
         if self._first_start.is_over(now, sequence, self._show_state.read(), self._controls.shows_test_card):
-            self._say(self._controls.set_test_card(False))
+            _log.info(self._controls.set_test_card(False))
 
     def _publish_health(self, now: float, stage: str, share: float) -> None:
         """Publish for the box's other processes; a stage that was never seen does not count as away."""
@@ -315,19 +316,19 @@ class Run:
             )
 
 
-def _open_inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> OrderInbox | None:
+def _open_inbox(folder: Path, opened: ExitStack) -> OrderInbox | None:
     """The inbox for orders by OSC; without it keys still work, and the dance is shown."""
     try:
         opened.callback(Claim(folder, "projector").close)
         inbox = OrderInbox(folder, "projector")
     except AlreadyHereError:
-        say(
+        _log.warning(
             "Another projector of this box takes the orders by OSC. The audience sees the dance on both. "
             "End one of them if that was not meant."
         )
         return None
     except OSError as error:
-        say(
+        _log.warning(
             f"{folder}: no place for orders by OSC ({error.strerror}). The dance is shown; corners and "
             "brightness are set by keys alone. Make room in this folder."
         )

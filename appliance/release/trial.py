@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +15,8 @@ from appliance.keeper.mirror import reason_of
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.foreign_file import stored_json
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
+
+_log = logging.getLogger(__name__)
 
 TRIES, ANEW = "tries", "anew"
 PROVEN_S = 10.0  # a show that has danced for this long dances on this box
@@ -29,7 +31,7 @@ class Tries(NamedTuple):
     pid: int = 0
 
 
-def pair_to_dance(chosen: Path, now: float, say: Callable[[str], None]) -> Pair:
+def pair_to_dance(chosen: Path, now: float) -> Pair:
     """The choice to dance in this start, which is counted; never raises, because something always dances.
 
     A new pair has to dance for PROVEN_S within three starts. A proven one may be killed any number of times,
@@ -37,18 +39,18 @@ def pair_to_dance(chosen: Path, now: float, say: Callable[[str], None]) -> Pair:
     """
     choice = Choice.read(chosen)
     if choice is None:
-        say(
+        _log.error(
             f"{chosen} is missing or broken: what was chosen is not known. The audience sees the show that "
             "comes with the box. Look what the preflight says: systemctl status bunraku-preflight."
         )
         return Pair(good=True)
     folder = chosen.parent
-    choice = _found_again(chosen, choice, say)
+    choice = _found_again(chosen, choice)
     tries = _read_tries(folder, choice.first, now)
     if tries is not None and len(choice.pairs) > 1:
         most = _STARTS_OF_A_GOOD_ONE if choice.first.good else _STARTS
         if tries.starts >= most:
-            choice, tries = _put_aside(chosen, choice, most, say), Tries(choice.pairs[1].id)
+            choice, tries = _put_aside(chosen, choice, most), Tries(choice.pairs[1].id)
     if tries is not None:
         with contextlib.suppress(OSError):
             newest = tries._replace(starts=tries.starts + 1, pid=os.getpid())
@@ -145,17 +147,17 @@ def _danced_s(folder: Path, pid: int, now: float) -> float | None:
         return newest.left - frames.facts.started
 
 
-def _put_aside(chosen: Path, choice: Choice, starts: int, say: Callable[[str], None]) -> Choice:
+def _put_aside(chosen: Path, choice: Choice, starts: int) -> Choice:
     before, after = choice.pairs[:2]
     message = (
         f"The {before.source} did not dance in {starts} starts and is put aside. The audience sees the dance "
         f"that {_source(after)}. Run bunraku check on it, mend it, and bring it again."
     )
     left = choice._replace(pairs=choice.pairs[1:], aside=(*choice.aside, Aside(before.id, message)))
-    return _publish(chosen, choice, left, message, say)
+    return _publish(chosen, choice, left, message)
 
 
-def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Choice:
+def _found_again(chosen: Path, choice: Choice) -> Choice:
     """Drops leading pairs whose disk is missing, instead of timing out on each."""
     there = next((number for number, one in enumerate(choice.pairs) if one.is_there), len(choice.pairs) - 1)
     if there == 0:
@@ -165,12 +167,12 @@ def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Ch
         f"{_source(choice.pairs[there])}. Look at the data partition: bunraku doctor."
     )
     left = choice._replace(pairs=choice.pairs[there:], refused=(message, *choice.refused))
-    return _publish(chosen, choice, left, message, say)
+    return _publish(chosen, choice, left, message)
 
 
-def _publish(chosen: Path, before: Choice, after: Choice, message: str, say: Callable[[str], None]) -> Choice:
+def _publish(chosen: Path, before: Choice, after: Choice, message: str) -> Choice:
     """Publishes the choice that dances from now on to all processes of the box."""
-    say(message)
+    _log.warning(message)
     with contextlib.suppress(OSError):
         after.write(chosen)
         if before.first.box != after.first.box:

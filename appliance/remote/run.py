@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import select
 import socket
 import time
@@ -41,6 +42,8 @@ from appliance.show.remote import MidiConfig, TimecodeConfig
 from appliance.show_control.midi_bindings import MidiBindings, Moved, moved
 from appliance.show_control.packet import Message, datagram
 from appliance.show_control.port import Port
+
+_log = logging.getLogger(__name__)
 
 _TURN_S = 0.01  # how often due cues and sound are looked at; MIDI and datagrams wake the process at once
 _AT_ONCE = 64
@@ -233,12 +236,10 @@ class Midi:
 class Remote:
     """Timecode and MIDI of one box file. Raises OSError where the runtime folder takes no file."""
 
-    def __init__(
-        self, box: BoxConfig, folder: Path, say: Callable[[str], None], fallbacks: Fallbacks
-    ) -> None:
+    def __init__(self, box: BoxConfig, folder: Path, fallbacks: Fallbacks) -> None:
         control = box.control
         assert control is not None  # the box file was checked
-        self._box, self._say, self._fallbacks = box, say, fallbacks
+        self._box, self._fallbacks = box, fallbacks
         self._to = ("127.0.0.1" if control.host == "0.0.0.0" else control.host, control.port)
         self._desk = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._desk.setblocking(False)
@@ -316,7 +317,10 @@ class Remote:
         self._look_after_house()
         if self.trouble != self._said:
             self._said = self.trouble
-            self._say(self.trouble or "Timecode can be heard again.")
+            if self.trouble:
+                _log.warning(self.trouble)
+            else:
+                _log.info("Timecode can be heard again.")
         newest = None if self.midi is None else self.midi.newest
         return {
             "timecode": "" if label is None else str(at(label, clock.rate)),
@@ -389,7 +393,7 @@ def run_remote(box_file: Path | None) -> None:
     """Hear timecode and MIDI until a signal comes. Raises ConfigError, RuntimeFolderError."""
     box = load_box(box_file)
     with OwnProcess(box, "remote", OF_THE_REMOTE) as own:
-        remote = own.keep(Remote(box, own.folder, own.speaker.say, own.fallbacks))
+        remote = own.keep(Remote(box, own.folder, own.fallbacks))
         own.notifier.ready("Timecode and MIDI are heard.")
         report_at = 0.0
         while not own.stopped():

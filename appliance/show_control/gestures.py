@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -23,6 +24,8 @@ from appliance.sensor.gesture_memory import (
 from appliance.sensor.gestures import RATE_HZ, REPETITIONS, Floats, Gesture, Recogniser, Repetitions, learned
 from appliance.show.config_error import did_you_mean
 from appliance.show_control.stage_observer import StageObserver
+
+_log = logging.getLogger(__name__)
 
 LOOK_S = 0.08  # how long control sleeps at most while a hand may make a gesture
 RECORD_S = 60.0  # within which the repetitions have to come
@@ -91,10 +94,9 @@ class Gestures:
         state: Path | None,
         observer: StageObserver,
         call: Callable[[str, float], None],
-        say: Callable[[str], None],
     ) -> None:
         """state: the folder on the disk; None: gestures last for this run."""
-        self._observer, self._call, self._say = observer, call, say
+        self._observer, self._call = observer, call
         self._shows: dict[str, list[Gesture]] = {}
         self._writer: BlockWriter | None = None
         self._hands: dict[str, _Hand] = {}
@@ -231,7 +233,7 @@ class Gestures:
         hand.remember(orientation)
         found = hand.recogniser.take(orientation, now)
         if found is not None:
-            self._say(f"The gesture '{found.name}' calls cue {found.cue}.")
+            _log.info(f"The gesture '{found.name}' calls cue {found.cue}.")
             self._call(found.cue, now)
 
     def _learn(self, joint: str, takes: list[Floats]) -> None:
@@ -254,7 +256,7 @@ class Gestures:
 
     def _end(self, message: str) -> None:
         self._recording, self.message = None, message
-        self._say(message)
+        _log.info(message)
         self._begin_anew()
 
     def _begin_anew(self) -> None:
@@ -279,7 +281,7 @@ class Gestures:
             self._complain(str(error))
 
     def _complain(self, reason: str) -> None:
-        self._say(f"Gestures cannot be kept ({reason}): they last until show control is started again.")
+        _log.warning(f"Gestures cannot be kept ({reason}): they last until show control is started again.")
 
     def _read(self, folder: Path, state: Path) -> None:
         """The last show control's gestures in memory, or else those on the disk."""
@@ -290,7 +292,9 @@ class Gestures:
             for one in found:
                 self._shows = read_gestures(one)
         except (OSError, ValueError) as error:
-            self._say(f"{state / FILE_NAME}: the gestures in it cannot be read ({error}). Record them again.")
+            _log.warning(
+                f"{state / FILE_NAME}: the gestures in it cannot be read ({error}). Record them again."
+            )
 
 
 def _hands_of(facts: Facts) -> dict[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import select
 import signal
 import socket
@@ -34,6 +35,8 @@ from appliance.show_control.port import Address, Port
 from appliance.show_control.settings import Settings
 from appliance.show_control.stage_observer import StageObserver
 
+_log = logging.getLogger(__name__)
+
 _PAUSE_S = 0.5  # a fader that moves all the time never floods the terminal
 
 _LONGEST_SLEEP_S = 0.25  # a restarted stage is found within this
@@ -48,11 +51,9 @@ _REST_S = 0.002  # after as many: a flood leaves the processor to others
 class ControlProcess:
     """Everything open. Raises OSError where the folder takes no file, or another one is at work there."""
 
-    def __init__(
-        self, settings: Settings, say: Callable[[str], None], monotonic: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, settings: Settings, monotonic: Callable[[], float] = time.monotonic) -> None:
         folder, now = Path(settings.folder), monotonic()
-        self._say, self._monotonic = say, monotonic
+        self._monotonic = monotonic
         with ExitStack() as opened:
             self.port = Port(socket.socket(fileno=settings.descriptor), settings.senders)
             opened.callback(self.port.close)
@@ -84,7 +85,7 @@ class ControlProcess:
                 show_state, self.observer, self._dispatch, keys, self._answer, writer.write, live
             )
             state = Path(settings.state) if settings.state else None
-            self._gestures = Gestures(folder, state, self.observer, self.handler.call_cue, say)
+            self._gestures = Gestures(folder, state, self.observer, self.handler.call_cue)
             opened.callback(self._gestures.close)
             self.handler.gestures = self._gestures
             self._poll = select.poll()
@@ -95,7 +96,7 @@ class ControlProcess:
         self._failures_said, self._failures_said_at = 0, float("-inf")
         self._news = ConsoleMessages(show_state)
         if message := held_back(show_state):
-            say(f"Still from before: {message}")
+            _log.warning(f"Still from before: {message}")
 
     def run(self, ended: Callable[[], bool], wake: int, notifier: Notifier) -> None:
         """Until `ended` says so; `wake` is a descriptor that can be read when it may."""
@@ -128,7 +129,7 @@ class ControlProcess:
                 break
         self._guarded(self._look_after)
         if message := self._failures(self._monotonic()):
-            self._say(message)
+            _log.error(message)
         if taken == _AT_ONCE:
             time.sleep(_REST_S)
 
@@ -158,7 +159,7 @@ class ControlProcess:
         news = self._news.look(self.handler.show_state, now)
         for message in (self.port.news(now), news, *self._foreign.news(now)):
             if message:
-                self._say(message)
+                _log.info(message)
 
     def _follow_leader(self, now: float) -> None:
         """On a box of a pair that follows: declare what the other one has declared."""
@@ -205,16 +206,16 @@ class ControlProcess:
         return max(min(*due, now + longest_s) - now, 0.0)
 
 
-def control(settings: Settings, say: Callable[[str], None]) -> int:
+def control(settings: Settings) -> int:
     """Show control until SIGTERM, Ctrl-C or a closed terminal; the exit status."""
     with _waking_stop_signals() as (ended, wake):
-        process = ControlProcess(settings, say)
+        process = ControlProcess(settings)
         try:
             process.run(ended, wake, Notifier())
         finally:
             process.close()
         if message := process.conclusion():
-            say(message)
+            _log.info(message)
     return 0
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,8 @@ from appliance.sound.card import Card
 from appliance.sound.couplings import Couplings
 from appliance.sound.fallback import CARD_AWAY, DROPOUTS, NO_CARD, OF_THE_SOUND, STAGE_UNSEEN
 from appliance.sound.instrument import Instrument
+
+_log = logging.getLogger(__name__)
 
 LOOK_S = 0.02  # how often show, cue and fades are looked at: each look holds up the card's thread
 LOST_S = 0.5  # without a frame: as the projector
@@ -63,7 +66,6 @@ class Sound:
         config: SoundConfig,
         stage: FrameReader,
         show_state: ShowStateReader,
-        say: Callable[[str], None],
         fallbacks: Fallbacks,
     ) -> None:
         self.instrument: Instrument | None = None
@@ -71,7 +73,7 @@ class Sound:
         self._couplings: Couplings | None = None
         self._changes_at = 0.0  # when the next one takes its place
         self._config, self._stage, self._show_state = config, stage, show_state
-        self._say, self._fallbacks = say, fallbacks
+        self._fallbacks = fallbacks
         self._strings, self._entrance = StringsConfig(), Entrance()
         self._fades: dict[str, float] = {}
         self._places: dict[str, int] = {}
@@ -149,7 +151,7 @@ class Sound:
         self._fallbacks.set(CARD_AWAY.name, "" if card.is_missing else card.trouble)
         self._fallbacks.set(NO_CARD.name, card.is_missing)
         if card.refused:
-            self._say(
+            _log.warning(
                 f"No real-time priority for the sound ({card.refused}). The strings sound; on a busy "
                 "machine one block in a hundred came 9 ms late instead of 1, and crackled. Allow it with "
                 "LimitRTPRIO= in the unit."
@@ -157,14 +159,17 @@ class Sound:
             card.refused = ""
         if card.trouble != self._trouble:
             self._trouble = card.trouble
-            self._say(card.trouble or "The sound card is back, and the strings sound.")
+            if card.trouble:
+                _log.warning(card.trouble)
+            else:
+                _log.info("The sound card is back, and the strings sound.")
 
     def _begin(self, directory: Path) -> None:
         self._couplings = None
         try:
             show = load_show(directory)
         except ConfigError as error:
-            self._say(f"{error}\nThe strings stay silent until the stage dances another show.")
+            _log.error(f"{error}\nThe strings stay silent until the stage dances another show.")
             self._next = None
             return
         strings = show.config.strings
@@ -174,7 +179,7 @@ class Sound:
             self._couplings = Couplings(show.skeleton)
         name = show.config.name
         count = 0 if self._next is None else len(self._next.strings.bones)
-        self._say(f"{name}: {count} strings." if count else f"{name} has no `strings:`, and is silent.")
+        _log.info(f"{name}: {count} strings." if count else f"{name} has no `strings:`, and is silent.")
 
 
 def require_sound(box: BoxConfig) -> SoundConfig:
@@ -196,7 +201,7 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
     with OwnProcess(box, "sound", OF_THE_SOUND) as own:
         stage, danced = own.keep(FrameReader(own.folder)), own.keep(FrameReader(own.folder))
         show_state, for_the_card = (own.keep(ShowStateReader(own.folder)) for _ in range(2))
-        sound = Sound(config, stage, show_state, own.speaker.say, own.fallbacks)
+        sound = Sound(config, stage, show_state, own.fallbacks)
         priority = (
             max(box.realtime.priority // 2, 1) if box.realtime.enabled else None
         )  # the dance goes first

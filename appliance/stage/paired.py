@@ -102,16 +102,18 @@ class PairedStage:
         tick: Tick,
         reconciler: Reconciler,
         folder: Path,
-        say: Callable[[str], None],
+        note: Callable[[str], None],
         made: Callable[[str], Loop] | None = None,
     ) -> None:
-        """made: gives the loops that this box's generator has made; it raises ValueError."""
+        """note: logs a sentence, and notes it in the journal. made: gives the loops that this box's generator
+        has made; it raises ValueError.
+        """
         facts = facts_of_run(show, list(parts.worn))
         self._layout = layout_of(facts)
         self._settings = settings_of(config)
         self.pair = self._open(fingerprint_of(show, facts), time.monotonic())
         self._parts, self._tick, self._wearing, self._reconciler = parts, tick, wearing, reconciler
-        self._say = say
+        self._log_and_note = note
         self._rerun = Rerun(tick, wearing, facts["sensors"])
         self._own_link, self._own_live = parts.link, parts.live_inbox
         self._own_latest_start_s = tick.latest_start_s
@@ -186,7 +188,7 @@ class PairedStage:
         self.pair.roles.begin(now)
         name, peers = self._settings.name, self._settings.peers
         if self._carrier.is_apart(peers):
-            self._say(
+            self._log_and_note(
                 f"{name.capitalize()} ({' and '.join(peers)}) is in no network of the outputs: if the link "
                 "fails, both send. Give its address in the outputs' network as the first `peer:`."
             )
@@ -304,7 +306,7 @@ class PairedStage:
         self._role = role = self.pair.roles.role
         if before is role:
             return
-        self._say(self._sentence(role))
+        self._log_and_note(self._sentence(role))
         if before is Role.LEADS:
             self._has_danced = False
             self._hear_leader()
@@ -411,7 +413,7 @@ class PairedStage:
         self.resyncs += 1
         self.pair.forget_state()
         if self.resyncs < 10 or self.resyncs % 100 == 0:
-            self._say(f"{why} The leader's state is fetched again.")
+            self._log_and_note(f"{why} The leader's state is fetched again.")
 
     def _take_state(self, item: bytes) -> None:
         (self._applied,) = struct.unpack_from("<q", item)

@@ -47,7 +47,7 @@ class Replay:
         assert isinstance(parts.network, RecordedNetwork)
         self._network = parts.network
         parts.make_by(maker_of(show, parts.led.motion))
-        wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
+        wearing = SensorFit(parts, SensorMemory(None))
         self.tick = Tick(parts, wearing, 0.0)
         self._rerun = Rerun(self.tick, wearing, run.header["sensors"])
         parts.link, parts.live_inbox = self._rerun.heard, self._rerun.live
@@ -121,7 +121,3 @@ def _refused(what: str) -> Iterator[None]:
             f"{what} is of another release, or damaged ({type(error).__name__}: {error}). The run can be "
             "drawn; to dance it again, take the release that recorded it."
         ) from error
-
-
-def _nobody(message: str) -> None:
-    """A replay takes the messages of that night from the events."""

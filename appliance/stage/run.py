@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -38,12 +39,14 @@ from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
 from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
-from appliance.stage.watch import Watch
+from appliance.stage.watch import Trouble, Watch
 
 if TYPE_CHECKING:
     from appliance.dancer.puppet import PuppetNetwork
     from appliance.pose.skeleton import Skeleton
     from appliance.stage.paired import PairedStage
+
+_log = logging.getLogger(__name__)
 
 _ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5
@@ -65,12 +68,11 @@ class Stage:
         self,
         show: Show,
         box: BoxConfig,
-        say: Callable[[str], None],
         box_file: Path | None = None,
         rehearsal: bool = False,
     ) -> None:
         self.show, self.box, self.box_file, self.rehearsal = show, box, box_file, rehearsal
-        self.say, self._now = say, 0.0
+        self._now = 0.0
         self._comes_from_stop = self._held_up = self._is_ready = False
         self.health = Health()
         with ExitStack() as opened:
@@ -80,7 +82,7 @@ class Stage:
             opened.callback(self.notifier.close)
             self.resuming = Resumption(show.config.name, self.sharing.noted, box.state_folder, box.resume)
             opened.callback(self.resuming.close)
-            self.memory = SensorMemory(box.state_folder, say, self.sharing.noted)
+            self.memory = SensorMemory(box.state_folder, self.sharing.noted)
             opened.callback(self.memory.close)
             self.parts: StageParts = assemble(
                 *(show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY),
@@ -112,7 +114,7 @@ class Stage:
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
         corrects_heading = box.sensors.heading == "auto"
-        self.wearing = SensorFit(self.parts, self.memory, self._say_and_note, corrects_heading)
+        self.wearing = SensorFit(self.parts, self.memory, corrects_heading)
         self.batteries = BatteryLives()
         self._resume(TickClock().now())
         late_look_s = box.limits.wait_ms / 1000.0
@@ -134,7 +136,7 @@ class Stage:
             return
         missing = enter_realtime(self.box.realtime.priority)
         for message in missing:
-            self.say(message)
+            _log.warning(message)
         self.watch.note_missing_rights(missing)
         try:
             self._tick_on(seconds, stopped)
@@ -152,14 +154,14 @@ class Stage:
         begun = clock.now()
         self.health.begin(begun)
         facts = facts_of(self.show, self.box_file, self.iterations, begun, self.rehearsal)
-        self.sharing.begin(self.parts, facts, self.say)
+        self.sharing.begin(self.parts, facts)
         self.watch.note_start(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
         self._publish_health(begun)
         self.resuming.write_start(self.reconciler)
         if self.recorder is not None:
             self.recorder.keyframe(self.tick)
         if self.show.config.dancer.seed is None:
-            self._say_and_note(f"The answer's noise has the seed {self.parts.liveliness.seed}.")
+            self._log_and_note(f"The answer's noise has the seed {self.parts.liveliness.seed}.")
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
         if self.paired is not None:
             self.paired.begin(clock.now())
@@ -190,6 +192,7 @@ class Stage:
         """Count the tick and write it into the journal; the frame has left already."""
         tick, health = self.tick, self.health
         cost_ms = tick.after(slot)
+        self._log_news_of_sensors()
         left_ms = 1000.0 * (slot.lateness_s + tick.waited_s) + cost_ms
         late = tick.late or left_ms > self.box.limits.late_ms
         health.tick(cost_ms, self.box.limits.tick_budget_ms)
@@ -216,7 +219,7 @@ class Stage:
         if self.recorder is None:
             return None  # what another box would follow is what the recorder notes; it was said why not
         rest = self.box.outputs, self.show, self.parts, self.wearing, self.tick, self.reconciler
-        more = self.sharing.folder, self._say_and_note, self.made[0].loop if self.made else None
+        more = self.sharing.folder, self._log_and_note, self.made[0].loop if self.made else None
         if pair is not None:
             from appliance.stage.paired import PairedStage
 
@@ -248,14 +251,19 @@ class Stage:
             self.inbox.answer(order, False, paired.refused(order))
         if self.health.is_due(now):
             self.health.look(now)
-            self.say(self.health.line(*self.parts.led.iterations.asked, None, False) + "  follows")
+            _log.info(self.health.line(*self.parts.led.iterations.asked, None, False) + "  follows")
             self._publish_health(now)
         return False
 
     def _note_followed(self, now: float, cost_ms: float) -> None:
         """A tick of the leader was run here."""
+        self._log_news_of_sensors()
         self.health.tick(cost_ms, self.box.limits.tick_budget_ms)
         self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)
+
+    def _log_news_of_sensors(self) -> None:
+        for message in self.wearing.messages:
+            self._log_and_note(message)
 
     def _follow_sensor(self, slot: Slot) -> float:
         """The phase lock's correction to the next period, seconds."""
@@ -306,7 +314,7 @@ class Stage:
             asked = {"name": order.name, "values": order.values, "text": order.text}
             self.recorder.event(ORDER, now, order=asked, done=done, message=message)
         if message:
-            self.say(message)
+            _log.info(message)
         return done, message
 
     def _give_back(self, now: float) -> tuple[bool, str]:
@@ -317,11 +325,13 @@ class Stage:
 
     def _resume(self, now: float) -> None:
         """After a crash or a power cut: go on where the show was, or else with what is declared."""
-        messages = [self.resuming.complaint, self.resuming.go_on(self.reconciler, now)]
+        if self.resuming.complaint:
+            _log.warning(self.resuming.complaint)
+        messages = [self.resuming.go_on(self.reconciler, now)]
         if not self.resuming.went_on:
             messages.append(self.reconciler.begin(now))
         for sentence in filter(None, messages):
-            self.say(sentence)
+            _log.info(sentence)
 
     def _publish_health(self, now: float) -> None:
         """Publish how the box is in the shared frame."""
@@ -340,9 +350,9 @@ class Stage:
             *(now, self.health, self.reconciler, age_s, locked, roster, fallbacks, paired)
         )
 
-    def _say_and_note(self, message: str) -> None:
-        """Say it on the terminal, and note that in the journal."""
-        self.say(message)
+    def _log_and_note(self, message: str) -> None:
+        """For the log, and for the journal."""
+        _log.log(logging.WARNING if isinstance(message, Trouble) else logging.INFO, message)
         if self.recorder is not None:
             self.recorder.event(SAID, self._now, message=message)
 
@@ -361,16 +371,16 @@ class Stage:
         self.health.look(now)
         if most := self.second_look.most_that_fits(self.health.slowest_ms, times.coding):
             self._carry_out(Order("allow", (float(most),)), now)
-            self._say_and_note(self.watch.note_second_look(most))
+            self._log_and_note(self.watch.note_second_look(most))
         folder_news = self.watch.note_folder(now, renew_lost())
         news = self.watch.check(now, self.health, self.parts.link.states(now))
         line = self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked)
         line = "  ".join(filter(None, (line, self.watch.fallbacks.line(now))))
         self.notifier.status(line)
-        self.say(line)
+        _log.info(line)
         self._publish_health(now)
         for sentence in filter(None, (folder_news, *news)):
-            self._say_and_note(sentence)
+            self._log_and_note(sentence)
         for imu_id, offsets in self.parts.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)
 
@@ -380,7 +390,7 @@ class Stage:
             facts = facts_of_run(self.show, list(self.parts.worn))
             return Recorder(self.sharing.noted, facts, len(packed(self.parts)))
         except OSError as error:
-            self.say(
+            _log.warning(
                 f"{self.sharing.noted}: no journal can be noted there ({error.strerror}). The dance goes on "
                 "without one. Free memory there, or give another folder as `runtime:` in the box file."
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import astuple, dataclass, field, replace
 from typing import Any
 
@@ -38,7 +38,7 @@ _KEPT_DEGREES = 1.0  # a heading that was corrected by more is remembered
 
 
 class SensorFit:
-    """Joins what the sensors say with what the joints get; messages leave with `look`.
+    """Joins what the sensors say with what the joints get; `messages` are those of the newest `look`.
 
     One neutral pose is taken by itself at each power-on, when the dancer stands still; after that only when
     asked for. A wearable that is back within a minute, or whose IMU restarted, keeps the pose: its heading is
@@ -52,13 +52,12 @@ class SensorFit:
         self,
         parts: StageParts,
         memory: SensorMemory,
-        say: Callable[[str], None],
         corrects_heading: bool = True,
     ) -> None:
         self._link = parts.link
         self._memory = memory
-        self._say = say
         self._news: list[str] = []
+        self.messages: tuple[str, ...] = ()
         self.corrects_heading = corrects_heading
         self._wearers = {name: _binding(parts, name) for name in parts.worn}
         for wearer in self._wearers.values():
@@ -96,8 +95,7 @@ class SensorFit:
                 self._take(wearer)
             elif now > wearer.waits_until:
                 self._give_up(wearer)
-        for sentence in self._news:
-            self._say(sentence)
+        self.messages = tuple(self._news)
         self._news.clear()
 
     def named(self, sensor: str | None) -> list[str]:

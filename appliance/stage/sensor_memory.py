@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import logging
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from appliance.sensor.memory import (
 )
 from appliance.sensor.neutral import NeutralPose
 
+_log = logging.getLogger(__name__)
+
 
 class SensorMemory:
     """Neutral poses by sensor and joint, calibrations by IMU.
@@ -28,9 +31,8 @@ class SensorMemory:
     last, and the disk where that has nothing: after each power-on.
     """
 
-    def __init__(self, state: Path | None, say: Callable[[str], None], runtime: Path | None = None) -> None:
+    def __init__(self, state: Path | None, runtime: Path | None = None) -> None:
         """state: the folder on the disk; None, or without a runtime folder: changes last for this run."""
-        self._say = say
         self._neutral: dict[Worn, NeutralPose] = {}
         self._profiles: dict[bytes, bytes] = {}
         self._writer: BlockWriter | None = None
@@ -81,7 +83,7 @@ class SensorMemory:
             self._complain(str(error))
 
     def _complain(self, reason: str) -> None:
-        self._say(
+        _log.warning(
             f"Neutral poses and calibrations cannot be kept ({reason}). The show goes on; after a restart "
             "sensors need a moment of stillness again. Free memory there, or give another folder as "
             "`runtime:` in the box file."
@@ -103,7 +105,7 @@ class SensorMemory:
             for text in memory_file(state).read():
                 self._neutral, self._profiles = read_memory(text)
         except OSError as error:
-            self._say(
+            _log.warning(
                 f"{path}: what was remembered of the sensors cannot be read ({error.strerror}). "
                 "Sensors need a moment of stillness tonight. Check the permissions of this file."
             )
@@ -117,7 +119,7 @@ class SensorMemory:
             path.replace(broken)
         except OSError as error:
             remark = f"It could not be set aside ({error.strerror})"
-        self._say(
+        _log.warning(
             f"{path}: what was remembered of the sensors is damaged. {remark}; "
             "the show goes on, and sensors need a moment of stillness tonight."
         )

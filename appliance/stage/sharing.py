@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -21,6 +22,8 @@ from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.stage_parts import StageParts
+
+_log = logging.getLogger(__name__)
 
 _ZONE = Path("/sys/class/thermal/thermal_zone0/temp")
 
@@ -102,7 +105,7 @@ class Sharing:
         self._thermometer = Thermometer()
         self.complaint = ""
 
-    def begin(self, parts: StageParts, facts: Facts, say: Callable[[str], None]) -> None:
+    def begin(self, parts: StageParts, facts: Facts) -> None:
         """From now on frames are shared, if the folder has room for them; without it, the dance goes on."""
         try:
             parts.outputs.share(FrameWriter(self.folder, facts))
@@ -112,7 +115,7 @@ class Sharing:
                 "receivers in the network, but neither lights nor projector on this box see it. Free memory "
                 "there, or give another folder as `runtime:` in the box file, and start again."
             )
-            say(self.complaint)
+            _log.warning(self.complaint)
 
     def publish_health(
         self,

@@ -23,6 +23,12 @@ SILENT_S = 0.5
 CHARGED = 25  # percent: above it a low battery may be said again
 
 
+class Trouble(str):
+    """A sentence about what the show goes on without: the log has it as a warning."""
+
+    __slots__ = ()
+
+
 class Watch:
     """Checks for silent sensors at each tick, for all else once a second, after the frame has left."""
 
@@ -92,8 +98,8 @@ class Watch:
             return ""
         if not lost:
             self.fallbacks.count(rows.FOLDER_LOST.name, now)
-            return rows.FOLDER_LOST.message
-        message = (
+            return Trouble(rows.FOLDER_LOST.message)
+        message = Trouble(
             f"The folder where the box's processes meet was deleted, or files in it: {lost} The dance goes "
             "on, but commands, lights and picture may not come back once they end. Start the box again: "
             "systemctl restart bunraku.target, or `bunraku play`."
@@ -193,11 +199,13 @@ class Watch:
                 else f"Sensor {name} is linked by {sensor.way}, and holds {joints or no_joint}."
             )
         if sensor.complaint and self._changes("complaint", sensor.complaint, True):
-            yield sensor.complaint
+            yield Trouble(sensor.complaint)
         is_charged = CHARGED <= sensor.battery != wire.BATTERY_UNKNOWN
         is_low = sensor.battery < LOW_BATTERY or (("low", name) in self._said and not is_charged)
         if self._changes("low", name, is_low) and is_low:
-            yield f"Sensor {name}: {sensor.battery} % of its battery left. The dance goes on. Charge it soon."
+            yield Trouble(
+                f"Sensor {name}: {sensor.battery} % of its battery left. The dance goes on. Charge it soon."
+            )
 
     def _silence_news(self, now: float, known: set[str]) -> Iterator[str]:
         """known: sensors that have a key; a revoked one is silent for good, and that was said."""
@@ -207,7 +215,10 @@ class Watch:
             is_silent = silent_s > SILENT_S and (was_said or (silent_s < math.inf and name in known))
             if self._changes("silent", name, is_silent):
                 yield (
-                    f"Sensor {name} silent for {silent_s:.1f} s. The dancer moves freely. Check its battery."
+                    Trouble(
+                        f"Sensor {name} silent for {silent_s:.1f} s. The dancer moves freely. Check its "
+                        "battery."
+                    )
                     if is_silent
                     else f"Sensor {name} is back. It takes its joint again."
                 )
@@ -222,14 +233,14 @@ class Watch:
             yield (
                 "The live dancer takes the phrase's place."
                 if heard
-                else "No live dancer is heard: the phrase plays on. Check the program that sends it."
+                else Trouble("No live dancer is heard: the phrase plays on. Check the program that sends it.")
             )
 
     def _stamp_news(self) -> Iterator[str]:
         """Once: that this system does not say when a datagram came."""
         for intake in self._parts.link.intakes:
             if self._changes("stamps", intake.name, not getattr(intake, "has_stamps", True)):
-                yield (
+                yield Trouble(
                     f"This system does not stamp what comes in on {intake.name}: a reading counts as arrived "
                     "when it is read, up to 20 ms late. The dance goes on, a little less in step with the "
                     "sensor. Linux itself stamps; emulators (qemu-user) do not."
@@ -241,16 +252,20 @@ class Watch:
             is_gone = receiver.name in gone
             if self._changes("gone", receiver.name, is_gone):
                 yield (
-                    f"Receiver {receiver.name} does not get the dance: {receiver.last_error}. "
-                    "The others go on, and it is tried again each second. Start it, or check its address."
+                    Trouble(
+                        f"Receiver {receiver.name} does not get the dance: {receiver.last_error}. "
+                        "The others go on, and it is tried again each second. Start it, or check its address."
+                    )
                     if is_gone
                     else f"Receiver {receiver.name} gets the dance again."
                 )
         is_broken = any(one.puppet.is_broken for one in self._parts.puppets)
         if self._changes("network", "", is_broken):
             yield (
-                "The network gives poses that are not numbers. The dancer holds the last good pose. "
-                "Copy the show bundle again and restart."
+                Trouble(
+                    "The network gives poses that are not numbers. The dancer holds the last good pose. "
+                    "Copy the show bundle again and restart."
+                )
                 if is_broken
                 else "The network gives poses again. The dancer moves."
             )

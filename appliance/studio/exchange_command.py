@@ -193,6 +193,7 @@ def import_(
     from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
     from appliance.studio.exchange.importing import PointsOptions, import_points
     from appliance.studio.exchange.landmarks_file import is_landmarks, read_landmarks
+    from appliance.studio.progress import logged
 
     known_ending(out)
     if landmarks or is_landmarks(points):
@@ -203,7 +204,10 @@ def import_(
         dance, lines = found.recording, [f"{points.name}: {line}." for line in found.lines]
     else:
         options = PointsOptions(names, like, fps, unit.value if unit else None, up.value, gap)
-        imported = import_points(points, options, print)
+        from rich.console import Console
+
+        with logged(Console()):
+            imported = import_points(points, options)
         dance, lines = imported.recording, imported.report()
     _write(out, dance)
     for line in lines:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -66,6 +67,29 @@ def reported(
         calls += 1
 
     yield say
+
+
+@contextmanager
+def logged(console: Console) -> Iterator[None]:
+    """A context in which what the studio logs is shown there, as it is."""
+    logger, handler = logging.getLogger("appliance.studio"), _OnConsole(console)
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+        logger.removeHandler(handler)
+
+
+class _OnConsole(logging.Handler):
+    def __init__(self, console: Console) -> None:
+        super().__init__()
+        self._console = console
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._console.print(self.format(record), markup=False, highlight=False, soft_wrap=True)
 
 
 @contextmanager

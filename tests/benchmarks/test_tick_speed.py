@@ -75,7 +75,7 @@ def test_the_whole_tick(measured: Callable[..., Any], parts: StageParts, key: Se
     sensor = PairedSensor(key, intake.address[1], turning(seconds_per_turn=7.2), 100.0)
     now = sensor.pair(parts.link, 100.0)
     paired = parts.link.counts["accepted"]
-    wearing = SensorFit(parts, SensorMemory(None, print), print)
+    wearing = SensorFit(parts, SensorMemory(None))
     parts.led.iterations = Iterations(10, 9, 10)
     tick = Tick(parts, wearing, latest_start_s=TICK_S)
     for other in parts.puppets[1:]:

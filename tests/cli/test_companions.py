@@ -20,6 +20,7 @@ from appliance.cli.companions import UNAVAILABLE, Companion, Companions
 from tests.box import disks
 from tests.bundles import write_show
 from tests.console.page import box_with_page
+from tests.logged import said
 from tests.show_control.doubles import until
 from tests.system.processes import children_running, wait_until
 
@@ -57,8 +58,7 @@ def is_gone(pid: int) -> bool:
 
 def test_a_companion_starts_when_it_may_and_ends_with_the_context(diary: Diary) -> None:
     dances: list[bool] = []
-    said: list[str] = []
-    with Companions([diary.child("time.sleep(60)")], said.append, lambda: bool(dances)):
+    with Companions([diary.child("time.sleep(60)")], lambda: bool(dances)):
         time.sleep(0.2)
         assert diary.pids == []
         dances.append(True)
@@ -68,14 +68,13 @@ def test_a_companion_starts_when_it_may_and_ends_with_the_context(diary: Diary) 
 
 
 def test_without_a_first_tick_nothing_is_started(diary: Diary) -> None:
-    with Companions([diary.child("time.sleep(60)")], print, lambda: False):
+    with Companions([diary.child("time.sleep(60)")], lambda: False):
         pass
     assert diary.pids == []
 
 
 def test_a_killed_companion_is_restarted_and_reported(diary: Diary) -> None:
-    said: list[str] = []
-    with Companions([diary.child("time.sleep(60)")], said.append, lambda: True):
+    with Companions([diary.child("time.sleep(60)")], lambda: True):
         until(lambda: len(diary.pids) == 1)
         os.kill(diary.pids[0], signal.SIGKILL)
         until(lambda: len(diary.pids) == 2)
@@ -87,8 +86,7 @@ def test_a_companion_that_dies_at_once_is_retried_ever_more_slowly_and_reported_
 ) -> None:
     monkeypatch.setattr(companions, "SHORTEST_PAUSE_S", 0.01)
     monkeypatch.setattr(companions, "LONGEST_PAUSE_S", 0.02)
-    said: list[str] = []
-    with Companions([diary.child("sys.exit(3)")], said.append, lambda: True):
+    with Companions([diary.child("sys.exit(3)")], lambda: True):
         until(lambda: len(diary.pids) >= 6)
     assert len(said) == 4
     assert said[0].startswith("The child ended by itself (status 3).")
@@ -107,8 +105,7 @@ def test_a_companion_that_dies_all_evening_overflows_nothing() -> None:
 
 
 def test_a_companion_that_the_user_closed_stays_closed(diary: Diary) -> None:
-    said: list[str] = []
-    with Companions([diary.child("sys.exit(0)", may_close=True)], said.append, lambda: True):
+    with Companions([diary.child("sys.exit(0)", may_close=True)], lambda: True):
         until(lambda: bool(said))
         time.sleep(0.5)
     assert len(diary.pids) == 1
@@ -119,13 +116,12 @@ def test_a_companion_waits_for_its_needs(
     diary: Diary, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(companions, "RETRY_S", 0.1)
-    said: list[str] = []
     display, reported, shows = tmp_path / "display", tmp_path / "told", tmp_path / "shows"
     waits = "from appliance.box.parent_death import was_reported; "
     waits += f"open({str(reported)!r}, 'a').write(f'{{was_reported({UNAVAILABLE}):d}}'); "
     waits += f"os.path.exists({str(display)!r}) or sys.exit({UNAVAILABLE}); "
     waits += f"open({str(shows)!r}, 'w').close(); time.sleep(60)"
-    with Companions([diary.child(waits)], said.append, lambda: True):
+    with Companions([diary.child(waits)], lambda: True):
         until(lambda: len(diary.pids) >= 3)
         display.touch()
         until(lambda: shows.exists())
@@ -135,9 +131,8 @@ def test_a_companion_waits_for_its_needs(
 
 
 def test_a_companion_that_cannot_start_is_reported_and_retried() -> None:
-    said: list[str] = []
     missing = Companion("The child", ("/nowhere/at/all",), "Something is missing.")
-    with Companions([missing], said.append, lambda: True):
+    with Companions([missing], lambda: True):
         until(lambda: len(said) >= 2)
     assert said[0].startswith("The child cannot be started (No such file or directory).")
 
@@ -146,7 +141,7 @@ def test_a_companion_that_does_not_end_is_killed(diary: Diary, monkeypatch: pyte
     monkeypatch.setattr(companions, "LAST_OUTPUT_S", 0.2)
     stubborn = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); "
     stubborn += "open(sys.argv[1], 'a').write('0\\n'); time.sleep(60)"
-    with Companions([diary.child(stubborn)], print, lambda: True):
+    with Companions([diary.child(stubborn)], lambda: True):
         until(lambda: len(diary.pids) == 2)
     assert is_gone(diary.pids[0])
 
@@ -157,7 +152,7 @@ from appliance.cli.companions import Companion, Companions
 child = "from appliance.box.parent_death import end_with_parent; end_with_parent(); "
 child += "import os, sys, time; open(sys.argv[1], 'a').write(f'{os.getpid()}\\\\n'); time.sleep(60)"
 command = (sys.executable, "-c", child, sys.argv[1])
-with Companions([Companion("The child", command, "")], print, lambda: True):
+with Companions([Companion("The child", command, "")], lambda: True):
     time.sleep(60)
 """
 
@@ -187,7 +182,7 @@ def test_one_that_hangs_on_a_dead_disk_is_left_behind(diary: Diary, tmp_path: Pa
         pytest.skip(reason)
     (tmp_path / "disk").mkdir()
     with disks.disk(disks.made_image(tmp_path / "image"), tmp_path / "disk") as disk, disks.frozen(disk):
-        with Companions([diary.child(f"open({str(disk / 'file')!r}, 'w')")], print, lambda: True):
+        with Companions([diary.child(f"open({str(disk / 'file')!r}, 'w')")], lambda: True):
             until(lambda: len(diary.pids) == 1)
             until(lambda: "State:\tD" in Path(f"/proc/{diary.pids[0]}/status").read_text())
         assert not is_gone(diary.pids[0])
@@ -204,8 +199,7 @@ def pinging(diary: Diary, script: str, watchdog_s: float = PERIOD_S) -> Companio
 
 
 def test_one_that_stands_still_is_killed_said_and_started_again(diary: Diary) -> None:
-    said: list[str] = []
-    with Companions([pinging(diary, f"notifier.ready(); {LOOP}")], said.append, lambda: True):
+    with Companions([pinging(diary, f"notifier.ready(); {LOOP}")], lambda: True):
         until(lambda: len(diary.pids) == 1)
         time.sleep(2 * PERIOD_S)
         assert len(diary.pids) == 1 and said == [], "one that pings is left in peace"
@@ -226,8 +220,7 @@ def test_signs_count_from_the_process_itself_alone(
     diary: Diary, monkeypatch: pytest.MonkeyPatch, script: str
 ) -> None:
     monkeypatch.setattr(companions, "READY_S", PERIOD_S)
-    said: list[str] = []
-    with Companions([pinging(diary, script)], said.append, lambda: True):
+    with Companions([pinging(diary, script)], lambda: True):
         until(lambda: len(diary.pids) >= 2)
     assert said[0].startswith("The child hung")
 
@@ -238,7 +231,7 @@ def test_one_without_a_watchdog_is_told_nothing_of_one(diary: Diary, monkeypatch
     monkeypatch.setenv("WATCHDOG_USEC", "1000000")
     noted = diary.path.with_name("environ.txt")
     script = f"open({str(noted)!r}, 'w').write(repr(os.environ.get('NOTIFY_SOCKET'))); time.sleep(60)"
-    with Companions([pinging(diary, script, math.inf)], print, lambda: True):
+    with Companions([pinging(diary, script, math.inf)], lambda: True):
         until(lambda: noted.exists() and noted.read_text() != "")
     assert noted.read_text() == "None"
 

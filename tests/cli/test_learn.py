@@ -22,6 +22,7 @@ from appliance.cli.learned import figures_of, sentence_of
 from appliance.console.learning import STUDIO_MISSING, Learning, Wanted
 from appliance.show.bundle import default_show_path, named_show
 from tests.command import Command
+from tests.logged import said
 
 # Stands for `bunraku`: trains until it is told that it may end; stops at SIGTERM with a checkpoint, as train.
 PROGRAM = """
@@ -57,14 +58,14 @@ class Box:
         monkeypatch.setattr(learn, "BUNRAKU", (sys.executable, "-c", program))
         monkeypatch.setattr(learn, "require_studio", lambda: None)
         monkeypatch.setattr(learn, "_LOOK_S", 0.02)
-        self.folder, self.said = folder, list[str]()
+        self.folder, self.said = folder, said
         self.show_before = {path.name: path.read_bytes() for path in default_show_path().glob("*.yaml")}
 
     def let_end(self) -> None:
         (self.folder / "may end").touch()
 
     def run(self) -> int:
-        return Learner(self.learning, lambda: self.dances, None, (), self.said.append).run()
+        return Learner(self.learning, lambda: self.dances).run()
 
     def begun(self) -> list[list[str]]:
         return (

@@ -7,7 +7,6 @@ import contextlib
 import http.client
 import itertools
 import json
-import logging
 import resource
 import socket
 import time
@@ -19,7 +18,6 @@ import pytest
 
 from appliance.box.door import IDLE_S, MOST, MOST_FROM_ONE, MOST_STRANGERS, Door
 from appliance.box.fallback import Fallbacks
-from appliance.box.log_limit import LINES, PERIOD_S, LogLimit
 from appliance.box.open_files import open_more_files
 from appliance.console.devices import FREE_TRIES, LONG_DIGITS, LONGEST_PAUSE_S, MOST_WRONG, PAUSE_S, WrongPins
 from appliance.console.fallback import CROWDED, OF_THE_PAGE, PIN_CHANGED, note_crowd
@@ -294,19 +292,6 @@ def test_whatever_strangers_do_known_devices_have_room() -> None:
         doorway.comes("10.0.0.9", 1000 + number)
     assert not any(one.is_closed for one in known)
     assert len(doorway.door) == MOST
-
-
-def test_the_log_says_how_much_it_left_out() -> None:
-    now = [0.0]
-    limit = LogLimit(lambda: now[0])
-    records = [
-        logging.LogRecord("a", logging.ERROR, "", 0, "message %d", (number,), None) for number in range(99)
-    ]
-    assert [limit.filter(one) for one in records[:50]] == [True] * LINES + [False] * (50 - LINES)
-    now[0] = PERIOD_S
-    assert limit.filter(records[50])
-    assert records[50].getMessage() == f"message 50 ({50 - LINES} messages before this one were left out.)"
-    assert limit.filter(records[51]) and records[51].getMessage() == "message 51"
 
 
 def test_what_is_no_http_leaves_no_traceback_in_the_log(own_page: Page) -> None:

@@ -21,6 +21,7 @@ from appliance.studio.exchange.importing import PointsOptions, import_points
 from appliance.studio.exchange.points_file import read_names, read_points
 from appliance.studio.exchange.topology import directions_at_rest, parents_by_name
 from tests.command import Command
+from tests.logged import said
 from tests.pose.conventions import as_the_system_writes, dance_of
 from tests.studio.bodies import NAMINGS, body, moved
 
@@ -284,8 +285,7 @@ def imported(folder: Path, points: Array, names: Sequence[str], **options: Any) 
     """Points through a file: the dance, and what is said."""
     np.save(folder / "points.npy", points)
     (folder / "names.txt").write_text("\n".join(names))
-    said: list[str] = []
-    found = import_points(folder / "points.npy", PointsOptions(folder / "names.txt", **options), said.append)
+    found = import_points(folder / "points.npy", PointsOptions(folder / "names.txt", **options))
     return found.recording, "\n".join(said)
 
 
@@ -391,8 +391,7 @@ def test_tables_as_programs_write_them_are_read(kind: str, tmp_path: Path) -> No
     meant = moved(body(), seconds=1.0)
     points = points_of(meant)
     (tmp_path / "points.csv").write_text(table_of(points, meant.skeleton.names, kind))
-    said: list[str] = []
-    found = import_points(tmp_path / "points.csv", PointsOptions(), said.append).recording
+    found = import_points(tmp_path / "points.csv", PointsOptions()).recording
     assert found.skeleton.names == meant.skeleton.names
     assert found.fps == (25.0 if kind == "frame and time" else 50.0)
     assert TABLES[kind] in "\n".join(said)
@@ -407,9 +406,9 @@ def test_names_and_a_rate_that_are_given_apply_before_those_of_the_table_are_jud
     (tmp_path / "points.csv").write_text(text)
     (tmp_path / "names.txt").write_bytes("\n".join(meant.skeleton.names).encode("utf-16"))
     with pytest.raises(ExchangeError, match="Two points have the same name"):
-        import_points(tmp_path / "points.csv", PointsOptions(), print)
+        import_points(tmp_path / "points.csv", PointsOptions())
     options = PointsOptions(tmp_path / "names.txt", fps=100.0)
-    assert import_points(tmp_path / "points.csv", options, print).recording.fps == 100.0
+    assert import_points(tmp_path / "points.csv", options).recording.fps == 100.0
 
 
 def test_a_first_column_that_counts_is_no_place(tmp_path: Path) -> None:
@@ -417,8 +416,7 @@ def test_a_first_column_that_counts_is_no_place(tmp_path: Path) -> None:
     text = table_of(points_of(meant), meant.skeleton.names, "index")
     (tmp_path / "points.csv").write_text(text.split("\n", 1)[1])
     (tmp_path / "names.txt").write_text("\n".join(meant.skeleton.names))
-    said: list[str] = []
-    found = import_points(tmp_path / "points.csv", PointsOptions(tmp_path / "names.txt"), said.append)
+    found = import_points(tmp_path / "points.csv", PointsOptions(tmp_path / "names.txt"))
     assert found.recording.skeleton.names == meant.skeleton.names
     assert "the first column, which rises evenly" in "".join(said)
 

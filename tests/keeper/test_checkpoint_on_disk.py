@@ -18,6 +18,7 @@ from appliance.keeper.mirror import RETRY_S, TURN_S, Mirror
 from appliance.keeper.records import mirrored_checkpoint
 from tests.box import disks
 from tests.deploy.cut import cut_off
+from tests.logged import said
 from tests.standing import moved
 
 HEAD_BYTES = 24  # of a slot
@@ -42,10 +43,10 @@ class Mirrored:
 
     def __init__(self, runtime: Path, state: Path) -> None:
         runtime.mkdir(exist_ok=True)
-        self.said: list[str] = []
+        self.said = said
         self.stage = CheckpointWriter(runtime)
         self.state = state
-        self.mirror = Mirror(mirrored_checkpoint(runtime, state), self.said.append)
+        self.mirror = Mirror(mirrored_checkpoint(runtime, state))
 
     @property
     def on_disk(self) -> Checkpoint | None:

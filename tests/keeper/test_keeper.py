@@ -31,6 +31,7 @@ from appliance.stage.recorder import FILE, FORMAT, KIND
 from tests.box import disks
 from tests.bundles import write_show
 from tests.fake_clock import FakeTime
+from tests.logged import said
 from tests.recorder.night import Night
 from tests.show_control.doubles import until
 from tests.standing import moved
@@ -194,20 +195,20 @@ def test_a_mirror_turns_until_it_is_stopped_and_then_once_more() -> None:
     time, copied_at = FakeTime(), list[float]()
     copied = Copied(lambda now: copied_at.append(round(now - 1000.0, 1)))
     clock = {"monotonic": time.monotonic, "sleep": time.sleep}
-    mirror_until(lambda: time.now > 1001.2, Mirror(copied, print), lambda: False, END_S, **clock)
+    mirror_until(lambda: time.now > 1001.2, Mirror(copied), lambda: False, END_S, **clock)
     assert copied_at[:3] == [0.0, 0.5, 1.0] and len(copied_at) == 4
     assert copied.is_closed
 
 
 def test_an_error_is_said_once_and_tried_again_later() -> None:
-    said, copied_at, errors = list[str](), list[float](), [OSError("Full."), ValueError("Too long."), None]
+    copied_at, errors = list[float](), [OSError("Full."), ValueError("Too long."), None]
 
     def copy(now: float) -> None:
         copied_at.append(now)
         if error := errors[0]:
             raise error
 
-    mirror = Mirror(Copied(copy), said.append)
+    mirror = Mirror(Copied(copy))
     for now in range(100):
         mirror.turn(float(now))
         if now in (39, 69):
@@ -220,7 +221,7 @@ def test_an_error_is_said_once_and_tried_again_later() -> None:
 def end_of(place: CheckpointWriter, runtime: Path, ends_at: float, end_s: float = END_S) -> list[float]:
     """When a mirror that is stopped at 0.7 s turns, the last time at its end; its stage ends at `ends_at`."""
     time, turned = FakeTime(), list[float]()
-    mirror = Mirror(Copied(lambda now: turned.append(round(now - 1000.0, 2))), print)
+    mirror = Mirror(Copied(lambda now: turned.append(round(now - 1000.0, 2))))
 
     def sleep(seconds: float) -> None:
         time.sleep(seconds)
@@ -257,10 +258,10 @@ def test_what_a_keeper_did_not_live_to_carry_is_carried_after_the_dance(night: N
     night.dance(40)
     box = BoxConfig()
     with closing(Claim(tmp_path / "runtime", "keeper")):
-        keep_rest(box, tmp_path / "runtime", journal, 1.0, print)
+        keep_rest(box, tmp_path / "runtime", journal, 1.0)
         assert not journal.exists()  # a keeper that is there does it itself
     for _ in range(2):
-        keep_rest(box, tmp_path / "runtime", journal, 1.0, print)
+        keep_rest(box, tmp_path / "runtime", journal, 1.0)
         assert len(read_journal(journal).ticks) == 40
     assert len(segment_paths(journal)) == 1
 
@@ -341,8 +342,8 @@ class Watched:
     """The process of one that is stuck, and what was said of it."""
 
     def __init__(self, folder: Path) -> None:
-        self.now, self.said, self._turns = 1000.0, list[str](), folder / "turns"
-        self.process = MirrorProcess(Stuck(self._turns), folder, 0.0, self.said.append)
+        self.now, self.said, self._turns = 1000.0, said, folder / "turns"
+        self.process = MirrorProcess(Stuck(self._turns), folder, 0.0)
 
     @property
     def turns(self) -> int:

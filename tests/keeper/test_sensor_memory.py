@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,14 +13,11 @@ from appliance.keeper.records import mirrored_sensor_memory
 from appliance.sensor.memory import FILE_NAME, IMU_ID_BYTES, LARGEST, MOST_PROFILES, forget_memory
 from appliance.sensor.neutral import NeutralPose
 from appliance.stage.sensor_memory import SensorMemory
+from tests.logged import said
 
 POSE = NeutralPose((0.5, -0.5, 0.5, 0.5), 0.25, 0xFFFFFFFF)
 OTHER = NeutralPose((1.0, 0.0, 0.0, 0.0), -3.0, 7)
 IMU, OFFSETS = bytes(range(16)), bytes(range(100, 122))
-
-
-def silent(message: str) -> None:
-    raise AssertionError(message)
 
 
 class Box:
@@ -29,7 +25,7 @@ class Box:
 
     def __init__(self, folder: Path) -> None:
         self.runtime, self.state = folder / "runtime", folder / "state"
-        self.said: list[str] = []
+        self.said = said
         self.power_on()
 
     def power_on(self) -> None:
@@ -37,16 +33,16 @@ class Box:
         self.runtime.mkdir(exist_ok=True)
         for path in self.runtime.iterdir():
             path.unlink()
-        self.keeper = Mirror(mirrored_sensor_memory(self.runtime, self.state), self.said.append)
+        self.keeper = Mirror(mirrored_sensor_memory(self.runtime, self.state))
 
-    def memory(self, say: Callable[[str], None] = silent) -> SensorMemory:
+    def memory(self) -> SensorMemory:
         """As a stage that starts has it."""
-        return SensorMemory(self.state, say, self.runtime)
+        return SensorMemory(self.state, self.runtime)
 
     @property
     def on_disk(self) -> SensorMemory:
         """What a start after a power cut knows."""
-        return SensorMemory(self.state, silent)
+        return SensorMemory(self.state)
 
 
 @pytest.fixture
@@ -107,7 +103,7 @@ def test_memory_of_another_state_folder_is_not_taken(box: Box, tmp_path: Path) -
     memory = box.memory()
     memory.keep_neutral("left-wrist", {"lShldr": POSE})
     memory.close()
-    other = SensorMemory(tmp_path / "other", silent, box.runtime)
+    other = SensorMemory(tmp_path / "other", box.runtime)
     assert other.neutral("left-wrist", "lShldr") is None
     other.keep_neutral("left-wrist", {"lShldr": OTHER})
     box.keeper.turn(100.0)
@@ -152,7 +148,7 @@ def test_nothing_new_writes_nothing(box: Box) -> None:
     before = (box.state / FILE_NAME).stat()
     for turn in range(3):
         box.keeper.turn(102.0 + turn)
-    restarted = Mirror(mirrored_sensor_memory(box.runtime, box.state), silent)
+    restarted = Mirror(mirrored_sensor_memory(box.runtime, box.state))
     restarted.last_turn(105.0)  # it finds on the disk what memory has
     assert os.path.samestat((box.state / FILE_NAME).stat(), before)
     memory.close()
@@ -172,8 +168,7 @@ def test_a_box_that_ends_leaves_the_disks_word_to_count(box: Box) -> None:
 
 
 def test_more_than_a_file_may_hold_is_said_once(box: Box) -> None:
-    said: list[str] = []
-    memory = box.memory(said.append)
+    memory = box.memory()
     for number in range(30):
         memory.keep_neutral("a", {f"{number}" * 10_000: POSE})
         assert memory.neutral("a", f"{number}" * 10_000) == POSE
@@ -182,7 +177,7 @@ def test_more_than_a_file_may_hold_is_said_once(box: Box) -> None:
 
 
 def test_without_a_folder_it_remembers_for_the_run(tmp_path: Path) -> None:
-    memory = SensorMemory(None, silent)
+    memory = SensorMemory(None)
     memory.keep_neutral("a", {"b": POSE})
     memory.keep_profile(IMU, OFFSETS)
     assert memory.neutral("a", "b") == POSE
@@ -215,8 +210,7 @@ def test_without_a_folder_it_remembers_for_the_run(tmp_path: Path) -> None:
 def test_a_damaged_file_is_set_aside_and_said_once(box: Box, text: str) -> None:
     box.state.mkdir()
     (box.state / FILE_NAME).write_text(text)
-    said: list[str] = []
-    memory = box.memory(said.append)
+    memory = box.memory()
     assert memory.neutral("a", "b") is None
     [message] = said
     assert "damaged" in message
@@ -229,8 +223,7 @@ def test_a_damaged_file_is_set_aside_and_said_once(box: Box, text: str) -> None:
 
 def test_bytes_that_are_no_text_are_set_aside(tmp_path: Path) -> None:
     (tmp_path / FILE_NAME).write_bytes(b"\xff\xfe\x00")
-    said: list[str] = []
-    SensorMemory(tmp_path, said.append).close()
+    SensorMemory(tmp_path).close()
     assert len(said) == 1
 
 
@@ -282,8 +275,7 @@ def test_a_disk_that_is_mounted_late_gets_it_too(box: Box) -> None:
 def test_a_runtime_folder_without_room_is_said_once_and_the_show_goes_on(box: Box) -> None:
     box.runtime.rmdir()
     box.runtime.write_text("")
-    said: list[str] = []
-    memory = box.memory(said.append)
+    memory = box.memory()
     memory.keep_neutral("a", {"b": POSE})
     assert memory.neutral("a", "b") == POSE
     assert len(said) == 1 and "`runtime:` in the box file" in said[0]

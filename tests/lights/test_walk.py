@@ -22,6 +22,7 @@ from hw_sim.dmx.artnet import ArtNetReceiver
 from hw_sim.peers import HOST
 from tests.command import Command
 from tests.lights.rigs import lights
+from tests.logged import said
 
 PAR = {"name": "par", "profile": "led-par", "mode": "RGBW", "address": 1}
 HEAD = {"name": "head", "profile": "moving-wash", "address": 21, "place": [2, 4, 0]}
@@ -36,14 +37,14 @@ def patch_of(*fixtures: dict[str, Any]) -> Patch:
 def walked(patch: Patch, fixtures: tuple[str, ...] = (), attribute: str | None = None) -> Any:
     """All levels of a walk at 40 Hz, and what was said."""
     shown: list[dict[int, bytes]] = []
-    said: list[str] = []
+    said.clear()
 
     def show(levels: dict[int, bytes]) -> float:
         shown.append(levels)
         return len(shown) / 40.0
 
-    walk(patch, list(steps(patch, fixtures, attribute)), 1.0, 40.0, show, said.append, lambda: False)
-    return shown, said
+    walk(patch, list(steps(patch, fixtures, attribute)), 1.0, 40.0, show, lambda: False)
+    return shown, said.copy()
 
 
 def test_every_attribute_of_every_fixture_is_walked_in_the_order_of_the_patch() -> None:
@@ -94,7 +95,7 @@ def held_up(patch: Patch, attribute: str) -> Any:
         now += 0.025 if len(shown) % 10 else 1.0
         return now
 
-    walk(patch, list(steps(patch, (), attribute)), 0.4, 40.0, show, lambda _: None, lambda: False)
+    walk(patch, list(steps(patch, (), attribute)), 0.4, 40.0, show, lambda: False)
     return np.array(shown)
 
 
@@ -118,7 +119,7 @@ def test_a_walk_at_a_slow_rate_takes_no_longer() -> None:
         return len(shown) / 5.0
 
     patch = patch_of(PAR)
-    walk(patch, list(steps(patch, (), "red")), 2.0, 5.0, show, lambda _: None, lambda: False)
+    walk(patch, list(steps(patch, (), "red")), 2.0, 5.0, show, lambda: False)
     assert len(shown) == 2 + 10
 
 

@@ -29,6 +29,7 @@ from appliance.show.config_error import ConfigError
 from appliance.show.projector import MaskConfig, ProjectorConfig
 from appliance.show.show import load_show
 from tests.bundles import write_show
+from tests.logged import said
 from tests.projector.stage_double import pixels
 from tests.projector.test_loop import Evening
 
@@ -49,7 +50,7 @@ def show(gl: moderngl.Context, tmp_path: Path) -> Show:
     Image.new("RGBA", (30, 20), (*RED, 255)).save(tmp_path / "logo.png")
 
     def shown(cards: list[CardConfig], state: ShowState, now: float = 10.0, level: float = 1.0) -> np.ndarray:
-        made = Cards(gl, cards_by_name(cards), tmp_path, pytest.fail)
+        made = Cards(gl, cards_by_name(cards), tmp_path)
         gl.screen.clear(0.4 * level, 0.4 * level, 0.4 * level, 1.0)
         whole = np.array([[2.0, 0.0, -1.0], [0.0, 2.0, -1.0], [0.0, 0.0, 1.0]])
         made.draw(Wall(gl.screen, SIZE, SIZE, whole, level), state, now)
@@ -111,7 +112,7 @@ def test_lines_too_many_are_shrunk_into_the_picture(show: Show) -> None:
 def test_an_image_too_wide_is_shrunk(tmp_path: Path) -> None:
     Image.new("RGB", (9000, 500)).save(tmp_path / "wide.png")
     assert read_image(tmp_path / "wide.png").shape == (228, 4096, 4)
-    whole = content_of(CardConfig(name="w", image="wide.png", image_size=1.0), tmp_path, pytest.fail)
+    whole = content_of(CardConfig(name="w", image="wide.png", image_size=1.0), tmp_path)
     assert whole is not None and whole.shape[:2] == (228, 4096)
 
 
@@ -152,7 +153,7 @@ def test_a_font_that_was_saved_anew_is_taken_with_the_next_cards(show: Show, tmp
 
 
 def test_a_card_follows_the_corners(gl: moderngl.Context, tmp_path: Path) -> None:
-    made = Cards(gl, cards_by_name([CardConfig(name="w", background="#ffffff")]), tmp_path, pytest.fail)
+    made = Cards(gl, cards_by_name([CardConfig(name="w", background="#ffffff")]), tmp_path)
     corners = ((0.25, 0.2), (0.75, 0.2), (0.75, 0.8), (0.25, 0.8))
     y_up = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
     clip = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.0]]) @ homography(corners) @ y_up
@@ -165,14 +166,11 @@ def test_a_card_follows_the_corners(gl: moderngl.Context, tmp_path: Path) -> Non
 
 def test_a_broken_file_leaves_the_rest_of_the_card(gl: moderngl.Context, tmp_path: Path) -> None:
     (tmp_path / "logo.png").write_bytes(b"\x89PNG\r\n\x1a\nno more")
-    said: list[str] = []
-    Cards(
-        gl, {"t": CardConfig(name="t", image="logo.png", background="#ffffff")}, tmp_path, said.append
-    ).release()
+    Cards(gl, {"t": CardConfig(name="t", image="logo.png", background="#ffffff")}, tmp_path).release()
     assert len(said) == 1 and "The card 't' cannot be drawn whole" in said[0]
     (tmp_path / "own.ttf").write_bytes(b"no font")
     card = CardConfig(name="t", text="Hamlet", image="logo.png", font="own.ttf")
-    words = content_of(card, tmp_path, said.append)
+    words = content_of(card, tmp_path)
     assert words is not None and words[..., 3].any()
     assert len(said) == 3 and "cannot be drawn whole" in said[1] and "in another one" in said[2]
     Image.new("1", (MOST_PIXELS // 100 + 1, 100)).save(tmp_path / "huge.png")

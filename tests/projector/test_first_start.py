@@ -16,6 +16,7 @@ from appliance.projector.run import MARK, SHOWS_FOR_S, FirstStart, Options, Run
 from appliance.release.choice import Choice, Pair
 from appliance.show.box import BoxConfig
 from tests.bundles import write_show
+from tests.logged import said
 from tests.projector.stage_double import StageDouble
 
 UNUSED = -1, ShowState(show="One hand")
@@ -70,11 +71,10 @@ def test_a_box_with_a_show_of_its_own_has_no_first_start(
 def test_the_projector_shows_it_until_a_sensor_is_heard(tmp_path: Path) -> None:
     state = tmp_path / "state"
     state.mkdir()
-    said: list[str] = []
     box = BoxConfig(runtime=tmp_path / "run", state=state)
     options = Options("offscreen", (64, 36), card=lambda: ("pin 123456",), is_first=True)
     with (
-        closing(Run(box, options, said.append)) as run,
+        closing(Run(box, options)) as run,
         closing(StageDouble(tmp_path / "run", write_show(tmp_path / "show"))) as stage,
     ):
         stage.write(time.monotonic())

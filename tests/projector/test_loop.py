@@ -25,6 +25,7 @@ from appliance.projector.picture.image_file import read_image
 from appliance.show.look import STYLES
 from appliance.show.projector import ProjectorConfig
 from tests.bundles import write_show
+from tests.logged import said
 from tests.projector.stage_double import SIZE, StageDouble, TellingPainter, pixels
 
 PERIOD_S = 1 / 60
@@ -45,14 +46,14 @@ class Evening:
     ) -> None:
         TellingPainter.made = TellingPainter.released = 0
         self._gl, self.folder, self.show = gl, folder, show
-        self.said: list[str] = []
+        self.said = said
         self.controls = Controls(Alignment(), lambda _: None)
         self.show_state = ShowState()
         self._declared = ShowStateWriter(folder)
         self._reader, self._show_state = FrameReader(folder), ShowStateReader(folder)
         self.projector = Projector(
             *(gl, config or ProjectorConfig(), self._reader, self._show_state, self.controls),
-            *(self.said.append, TellingPainter),
+            TellingPainter,
         )
         self.now = self._ticked = 1000.0
         self.stage: StageDouble | None = None

@@ -14,6 +14,7 @@ import pytest
 from appliance.projector.stream.feed import AGAIN_S, Feed
 from appliance.show.stream import StreamConfig
 from hw_sim.peers import free_ports
+from tests.logged import said
 from tests.projector.test_stream import connected
 
 WITHIN_S = 60.0
@@ -63,10 +64,8 @@ def reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     [(False, "RGBX 25/1 1 1 ff000007000064"), (True, "RGBA 25/1 1 1 ff0000ff0000ff64")],
 )
 def test_receivers_get_the_upright_picture(reported: Path, has_alpha: bool, pixels: str) -> None:
-    feed = Feed(
-        StreamConfig(port=free_ports(1, socket.SOCK_STREAM)[0], ndi="Bunraku", ndi_alpha=has_alpha),
-        pytest.fail,
-    )
+    port = free_ports(1, socket.SOCK_STREAM)[0]
+    feed = Feed(StreamConfig(port=port, ndi="Bunraku", ndi_alpha=has_alpha))
     until = time.monotonic() + WITHIN_S
     lines: list[str] = []
     while len(lines) < 3:
@@ -75,7 +74,7 @@ def test_receivers_get_the_upright_picture(reported: Path, has_alpha: bool, pixe
         time.sleep(0.01)
         lines = reported.read_text().splitlines() if reported.exists() else []
     feed.close()
-    assert lines[0] == "Bunraku 00"
+    assert not said and lines[0] == "Bunraku 00"
     assert lines[1].startswith(f"1x2 {pixels}")
 
 
@@ -84,8 +83,7 @@ def test_a_library_that_never_returns_is_started_again_and_no_picture_waits(
 ) -> None:
     """The receiver's network is gone in the middle of a picture; later it is back."""
     monkeypatch.setenv("NDI_HANGS", "1")
-    said: list[str] = []
-    feed = Feed(StreamConfig(port=free_ports(1, socket.SOCK_STREAM)[0], ndi="Bunraku"), said.append)
+    feed = Feed(StreamConfig(port=free_ports(1, socket.SOCK_STREAM)[0], ndi="Bunraku"))
     until, longest_s = time.monotonic() + WITHIN_S, 0.0
     while not reported.exists() or reported.read_text().count("\n") < 3:
         began = time.monotonic()
@@ -103,8 +101,9 @@ def test_a_library_that_never_returns_is_started_again_and_no_picture_waits(
 @pytest.mark.skipif(find_library("ndi") is not None, reason="NDI's library is installed here")
 def test_without_the_library_it_is_told_and_http_goes_on(capfd: pytest.CaptureFixture[str]) -> None:
     port = free_ports(1, socket.SOCK_STREAM)[0]
-    feed = Feed(StreamConfig(port=port, ndi="Bunraku"), pytest.fail)
+    feed = Feed(StreamConfig(port=port, ndi="Bunraku"))
     feed.offer(time.monotonic(), (1, 1), lambda: bytes(4))
     connected(port, "/").close()  # it listens
     feed.close()
+    assert not said
     assert "does not go out by NDI: there is no libndi on this machine" in capfd.readouterr().err

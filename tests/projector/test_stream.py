@@ -10,7 +10,7 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from http.client import HTTPConnection
 from io import BytesIO
 from pathlib import Path
@@ -33,6 +33,7 @@ from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.stream import StreamConfig
 from hw_sim.peers import free_ports
+from tests.logged import said
 from tests.projector.golden_looks import AT_S, SIZE
 from tests.system.processes import BUNRAKU
 
@@ -56,8 +57,8 @@ def connected(port: int, path: str) -> HTTPConnection:
 class Shown:
     """A feed that is offered the newest picture from a thread of the test's, as a projector does."""
 
-    def __init__(self, port: int, said: Callable[[str], None] = pytest.fail) -> None:
-        self.feed = Feed(StreamConfig(port=port, rate=60.0, quality=95), said)
+    def __init__(self, port: int) -> None:
+        self.feed = Feed(StreamConfig(port=port, rate=60.0, quality=95))
         self.reads = 0
         self.worst_s = 0.0
         self.pixels, self.size = bytes(4), (1, 1)
@@ -212,9 +213,8 @@ def test_a_projector_serves_what_its_display_shows_and_takes_the_process_along(t
 
 
 def test_a_taken_port_is_told_once_and_the_projector_goes_on() -> None:
-    said: list[str] = []
     with socket.create_server((HOST, 0)) as taken:
-        shown = Shown(taken.getsockname()[1], said.append)
+        shown = Shown(taken.getsockname()[1])
         now = time.monotonic()
         shown.feed.offer(now, (1, 1), lambda: bytes(4))
         assert shown.feed._process is not None
@@ -232,7 +232,7 @@ def test_every_network_is_ipv4_and_ipv6_and_no_foreign_name_is_answered(host: st
         pytest.skip("this machine has no IPv6")
     (port,) = free_ports(1, socket.SOCK_STREAM)
     config = StreamConfig(host=host, port=port, viewers=["10.0.0.0/8"], names=["Hall.example"])
-    feed = Feed(config, pytest.fail)
+    feed = Feed(config)
     feed.offer(time.monotonic(), (1, 1), lambda: bytes(4))
     until, found = time.monotonic() + WITHIN_S, dict[str, int]()
     own = f"[{through}]" if ":" in through else through
@@ -274,7 +274,6 @@ def test_a_process_that_cannot_be_started_is_told_once_and_tried_again(
 ) -> None:
     """For lack of memory. The picture goes on."""
     tried: list[float] = []
-    said: list[str] = []
     clock = 0.0
 
     def refused(*_: object, **__: object) -> None:
@@ -283,7 +282,7 @@ def test_a_process_that_cannot_be_started_is_told_once_and_tried_again(
 
     monkeypatch.setattr("appliance.projector.stream.feed.start_child", refused)
     descriptors = len(list(Path("/proc/self/fd").iterdir()))
-    stream = Feed(StreamConfig(port=1), said.append)
+    stream = Feed(StreamConfig(port=1))
     for clock in np.arange(0.0, 11.0, 0.5).tolist():
         stream.offer(clock, (2, 1), lambda: bytes(8))
     stream.close()
@@ -292,9 +291,8 @@ def test_a_process_that_cannot_be_started_is_told_once_and_tried_again(
 
 
 def test_a_process_that_hangs_is_started_again() -> None:
-    said: list[str] = []
     (port,) = free_ports(1, socket.SOCK_STREAM)
-    feed = Feed(StreamConfig(port=port), said.append)
+    feed = Feed(StreamConfig(port=port))
     feed.offer(time.monotonic(), (1, 1), lambda: bytes(4))
     connected(port, "/nothing").close()
     first, begun = feed._process, feed._hangs_at

@@ -18,6 +18,7 @@ from appliance.projector.picture.renderer import Renderer
 from appliance.projector.picture.video import Video
 from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import LookConfig, looks_by_name
+from tests.logged import said
 from tests.projector.golden_looks import AT_S, SIZE, renderer
 
 WITHIN_S = 60.0
@@ -96,22 +97,19 @@ def test_it_stops_where_nobody_sees_it_and_begins_anew(
 
 
 def test_a_video_that_ends_is_told_and_its_last_picture_stays(
-    played: Video, ffmpeg: Callable[[int], Path], capsys: pytest.CaptureFixture[str]
+    played: Video, ffmpeg: Callable[[int], Path]
 ) -> None:
     ffmpeg(3)
     until(lambda: red(played.texture()) == 20)
-    said: list[str] = []
-    until(lambda: bool(said.append(capsys.readouterr().err) or "is played no further" in "".join(said)))
+    until(lambda: "is played no further" in "".join(said))
     assert red(played.texture()) == 20
 
 
-def test_without_ffmpeg_it_is_told_once(
-    played: Video, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_ffmpeg_it_is_told_once(played: Video, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(video, "FFMPEG", "no-such-program")
     for _ in range(3):
         assert played.texture().size == (1, 1)
-    assert capsys.readouterr().err.count("is not played") == 1
+    assert "".join(said).count("is not played") == 1
 
 
 def test_a_look_shows_its_video_behind_the_figure(

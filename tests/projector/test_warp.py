@@ -13,6 +13,7 @@ from appliance.projector.controls import Controls
 from appliance.projector.corners import WHOLE
 from appliance.projector.warp import FINE, NOT_WARPED, complaint, fine, moved
 from appliance.show.projector import ProjectorConfig
+from tests.logged import said
 
 MIDDLE = 12
 
@@ -47,22 +48,21 @@ def test_corners_are_the_corner_pins(point: int) -> None:
 
 
 def test_orders_pull_flatten_and_keep_it_over_a_restart(tmp_path: Path) -> None:
-    said: list[str] = []
-    file = AlignmentFile(tmp_path, ProjectorConfig(), said.append)
+    file = AlignmentFile(tmp_path, ProjectorConfig())
     controls = Controls(file.alignment, file.keep)
     assert controls.carry_out(Order("warp", (13.0, 0.05, -0.02)))[0]
     assert controls.carry_out(Order("warp", (13.0, 0.05, 0.0)))[0]
     assert not controls.carry_out(Order("warp", (1.0, 0.05, 0.0)))[0]
     assert not controls.carry_out(Order("warp", (13.0, 0.4, 0.0)))[0]
     file.close()
-    again = AlignmentFile(tmp_path, ProjectorConfig(), said.append)
+    again = AlignmentFile(tmp_path, ProjectorConfig())
     assert again.alignment.warp[MIDDLE] == (0.1, -0.02)
     assert again.overrides() == ["The picture is warped as it was last warped by hand."]
     controls = Controls(again.alignment, again.keep)
     assert controls.report()["warp"][MIDDLE] == (0.1, -0.02)
     assert controls.carry_out(Order("warp/reset", ()))[0]
     again.close()
-    assert AlignmentFile(tmp_path, ProjectorConfig(), said.append).alignment == Alignment()
+    assert AlignmentFile(tmp_path, ProjectorConfig()).alignment == Alignment()
     assert said == []
 
 

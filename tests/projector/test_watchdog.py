@@ -37,7 +37,7 @@ def hang(window):
 
 Window.show = hang
 place = Path(sys.argv[1])
-run = Run(BoxConfig(runtime=place / "run", state=place / "state"), Options("offscreen", (64, 36)), print)
+run = Run(BoxConfig(runtime=place / "run", state=place / "state"), Options("offscreen", (64, 36)))
 run.project(lambda: False)
 """
 

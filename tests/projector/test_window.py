@@ -28,6 +28,7 @@ from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
 from tests.bundles import write_show
+from tests.logged import said
 from tests.projector.stage_double import StageDouble
 from tests.virtual_display import virtual_display
 
@@ -156,7 +157,7 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
 
     monkeypatch.setattr(context_module, "reset_status", lambda: reset)
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
-    run = Run(box, Options("offscreen", (64, 36), seconds=20), print)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20))
     try:
         with pytest.raises(
             ProjectorError, match=r"was reset.*sees black.*Start the projector again"
@@ -170,8 +171,7 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
 
 def test_keys_and_a_closed_window_arrive(tmp_path: Path) -> None:
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
-    said: list[str] = []
-    run = Run(box, Options("offscreen", (64, 36), seconds=20), said.append)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20))
     try:
         for symbol, modifier in ((sdl2.SDLK_c, 0), (sdl2.SDLK_LEFT, sdl2.KMOD_LSHIFT), (sdl2.SDLK_q, 0)):
             event = sdl2.SDL_Event()
@@ -189,9 +189,8 @@ def test_smaller_pictures_are_reported_once_and_stand_in_the_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
-    said: list[str] = []
     shares: list[float] = []
-    run = Run(box, Options("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20, shows_info=True))
     monkeypatch.setattr(Resolution, "share", property(lambda _: 0.5))
     monkeypatch.setattr(Resolution, "note_picture", lambda *_: True)
     monkeypatch.setattr(Projector, "draw", lambda *arguments: shares.append(arguments[-1]))
@@ -222,7 +221,7 @@ def test_the_test_card_has_lines_of_the_box_and_the_picture_of_a_show_does_not(
         options = Options(
             "offscreen", (64, 36), seconds=3, shows_info=shows_info, card=lambda: ("pin 123456",)
         )
-        run = Run(box, options, print)
+        run = Run(box, options)
         try:
             run.project(lambda: any("pin 123456" in lines for lines in drawn))
         finally:
@@ -233,7 +232,7 @@ def test_the_test_card_has_lines_of_the_box_and_the_picture_of_a_show_does_not(
 def test_the_page_gets_a_picture_of_the_wall_but_none_with_the_pin(tmp_path: Path) -> None:
     for shows_info in (True, False):
         box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
-        run = Run(box, Options("offscreen", (64, 36), seconds=30, shows_info=shows_info), print)
+        run = Run(box, Options("offscreen", (64, 36), seconds=30, shows_info=shows_info))
         wall, pictures = tmp_path / "run" / WALL, 0
 
         def is_enough() -> bool:
@@ -251,7 +250,7 @@ def test_the_page_gets_a_picture_of_the_wall_but_none_with_the_pin(tmp_path: Pat
 
 def test_a_pause_of_the_whole_machine_is_not_reported_as_a_black_picture(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), Options("offscreen", (64, 36)), print)
+    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), Options("offscreen", (64, 36)))
     now = time.monotonic()
 
     def is_black_reported() -> bool:

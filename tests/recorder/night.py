@@ -26,20 +26,21 @@ from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.sharing import facts_of
 from appliance.stage.stage_parts import assemble
 from appliance.stage.tick import Tick
+from tests.logged import said
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
 LATEST_START_S = 0.005
 
 
 class Night:
-    """One start of the stage. `say`: what the keeper and the wearing said."""
+    """One start of the stage. said: what the keeper and the recorder logged."""
 
     def __init__(self, show: Path, runtime: Path, begins_at: float = 1000.0) -> None:
         runtime.mkdir(mode=0o700, exist_ok=True, parents=True)
-        self.runtime, self.show, self.said = runtime, load_show(show), list[str]()
+        self.runtime, self.show, self.said = runtime, load_show(show), said
         self.parts = assemble(self.show, BOX)
         self.heard = self.parts.link = _Heard()
-        self.wearing = SensorFit(self.parts, SensorMemory(None, self.said.append), self.said.append)
+        self.wearing = SensorFit(self.parts, SensorMemory(None))
         self.parts.led.iterations = Iterations(3, 2, 10)
         self.tick = Tick(self.parts, self.wearing, LATEST_START_S)
         self._declared = _Declared(self.show.config.name)
@@ -85,7 +86,7 @@ class Night:
 
     def mirror(self, folder: Path, minutes: float = 30.0) -> Mirror:
         """Keeps this night in a folder."""
-        return Mirror(MirroredJournal(self.runtime, folder, minutes, lambda: 1.8e9), self.said.append)
+        return Mirror(MirroredJournal(self.runtime, folder, minutes, lambda: 1.8e9))
 
     def saved(self, folder: Path) -> Path:
         """The folder, once all that was noted is in it."""

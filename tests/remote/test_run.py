@@ -28,23 +28,23 @@ from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show_control.midi_bindings import MidiBindings, checked
 from hw_sim.peers import HOST, free_ports
+from tests.logged import said
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
-def remote_of(folder: Path, text: str, said: list[str], fallbacks: Fallbacks) -> Remote:
+def remote_of(folder: Path, text: str, fallbacks: Fallbacks) -> Remote:
     (folder / "box.yaml").write_text(text)
-    return Remote(load_box(folder / "box.yaml"), folder, said.append, fallbacks)
+    return Remote(load_box(folder / "box.yaml"), folder, fallbacks)
 
 
 def test_what_cannot_be_heard_is_told(tmp_path: Path) -> None:
-    said: list[str] = []
     fallbacks = Fallbacks(OF_THE_REMOTE)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind((HOST, 0))
         port = taken.getsockname()[1]
         text = f"timecode: {{source: art-net, port: {port}}}\nmidi: {{devices: [nanoKONTROL]}}\n"
-        remote = remote_of(tmp_path, text, said, fallbacks)
+        remote = remote_of(tmp_path, text, fallbacks)
         remote.turn(100.0)
         reported = remote.report(100.0)
         assert (reported["timecode"], reported["state"], reported["midi"]) == ("", "absent", [])
@@ -69,7 +69,7 @@ def test_a_box_does_not_follow_the_code_that_it_sends_itself(tmp_path: Path) -> 
     """A broadcast comes back to the machine that sends it: the code never ended, and hid the desk's."""
     (port,) = free_ports(1)
     text = f"timecode: {{source: art-net, port: {port}, send: [{{host: {HOST}, port: {port}}}]}}\n"
-    remote = remote_of(tmp_path, text, [], Fallbacks(OF_THE_REMOTE))
+    remote = remote_of(tmp_path, text, Fallbacks(OF_THE_REMOTE))
     states = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as desk:
         for count in range(250):
@@ -92,7 +92,7 @@ def test_a_motor_fader_follows_its_lever_but_not_the_hand_on_it(tmp_path: Path) 
     bindings.bind(checked(fader))
     text = f"midi: {{devices: ['{tmp_path / 'midiC1D0'}']}}\nstate: .\n"
     with closing(ShowStateWriter(tmp_path)) as writer:
-        remote = remote_of(tmp_path, text, [], Fallbacks(OF_THE_REMOTE))
+        remote = remote_of(tmp_path, text, Fallbacks(OF_THE_REMOTE))
         writer.write(ShowState().to(MASTER, 0.5, 1.0))
         remote.turn(100.0)
         assert os.read(desk, 10) == b"\xb1\x07\x40"
@@ -120,7 +120,7 @@ def test_a_fader_that_is_plugged_in_later_is_moved_to_its_lever(tmp_path: Path) 
     text = f"midi: {{devices: ['{device}']}}\nstate: .\n"
     now = 100.0
     with closing(ShowStateWriter(tmp_path)) as writer:
-        remote = remote_of(tmp_path, text, [], Fallbacks(OF_THE_REMOTE))
+        remote = remote_of(tmp_path, text, Fallbacks(OF_THE_REMOTE))
         writer.write(ShowState().to(MASTER, 0.5, 1.0))
         for _ in range(2):
             remote.turn(now)
@@ -145,7 +145,7 @@ def test_midi_timecode_that_comes_by_two_devices_is_one_code(tmp_path: Path) -> 
         (tmp_path / f"midiC{place}D0").symlink_to(os.ttyname(own))
     devices = [str(tmp_path / f"midiC{place}D0") for place in range(2)]
     text = f"timecode: {{source: mtc}}\nmidi: {{devices: {devices}}}\nstate: .\n"
-    remote = remote_of(tmp_path, text, [], Fallbacks(OF_THE_REMOTE))
+    remote = remote_of(tmp_path, text, Fallbacks(OF_THE_REMOTE))
     remote.turn(100.0)
     pieces = [0x0A, 0x10, 0x25, 0x30, 0x40, 0x50, 0x61, 0x72]  # 01:00:05:10, 25 frames
     for turn in range(4):

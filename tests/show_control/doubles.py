@@ -29,6 +29,7 @@ from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
 from appliance.show_control.settings import Settings
 from tests.bundles import FIGURE
+from tests.logged import said
 from tests.outputs.small_stage import one_puppet
 
 HOST = "127.0.0.1"
@@ -189,13 +190,13 @@ class ControlInThread:
         replies: Sequence[tuple[str, int]] = (),
         feedback: Sequence[tuple[str, int]] = (),
     ) -> None:
-        self.said: list[str] = []
+        self.said = said
         bound = open_port(host, 0)
         settings = Settings(
             *(str(folder), bound.detach(), tuple(senders), tuple(heartbeat), str(key_file or "")),
             *(tuple(replies), tuple(feedback)),
         )
-        self.process = ControlProcess(settings, self.said.append)
+        self.process = ControlProcess(settings)
         self.port = self.process.port.number
         self._is_over = threading.Event()
         self._reading, self._writing = socket.socketpair()

@@ -20,6 +20,7 @@ from appliance.sensor.gestures import RATE_HZ
 from appliance.show_control.command import command
 from appliance.show_control.gestures import RECORD_S, Gestures
 from appliance.show_control.stage_observer import StageObserver
+from tests.logged import said
 from tests.outputs.small_stage import facts_of, one_puppet, small
 from tools.gestures import made_gestures, repeated
 
@@ -39,7 +40,7 @@ class Hand:
         self.frame: JointFrame = one_puppet(JOINTS)
         self.frame.hands = np.zeros((1, 4), np.float32)
         self.called: list[str] = []
-        self.said: list[str] = []
+        self.said = said
         self.now = time.monotonic()
         self.start()
 
@@ -47,7 +48,7 @@ class Hand:
         self._observer = StageObserver(self.runtime)
         self._observer.state(self.now)
         self.gestures = Gestures(
-            self.runtime, self.state, self._observer, lambda cue, _: self.called.append(cue), self.said.append
+            self.runtime, self.state, self._observer, lambda cue, _: self.called.append(cue)
         )
 
     def move(self, orientations: np.ndarray[Any, Any]) -> None:
@@ -110,7 +111,7 @@ def test_a_gesture_is_recorded_calls_its_cue_and_survives_restart_and_power_cut(
     hand.make("salute", rng)
     assert hand.called == ["storm"]
 
-    mirror = Mirror(mirrored_gestures(hand.runtime, hand.state), hand.said.append)
+    mirror = Mirror(mirrored_gestures(hand.runtime, hand.state))
     mirror.last_turn(0.0)
     assert (hand.state / FILE_NAME).stat().st_size > 1000
     hand.gestures.rename("lift", "up")

@@ -37,7 +37,7 @@ def process(folder: Path, clock: Clock) -> Iterator[ControlProcess]:
     settings = Settings(str(folder), open_port(HOST, 0).detach())
     with (
         closing(FrameWriter(folder, facts())),
-        closing(ControlProcess(settings, lambda message: None, clock)) as process,
+        closing(ControlProcess(settings, clock)) as process,
     ):
         yield process
 

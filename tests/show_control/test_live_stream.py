@@ -23,6 +23,7 @@ from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
 from appliance.show_control.settings import Settings
 from appliance.show_control.vmc_input import BONE, ROOT
+from tests.logged import said
 from tests.show_control.doubles import FIGURE, HOST, Asker, Clock, ControlInThread, StageDouble, facts, until
 from tests.show_control.fuzz import bundle, message
 
@@ -42,7 +43,7 @@ def process(folder: Path, clock: Clock) -> Iterator[ControlProcess]:
     settings = Settings(str(folder), open_port(HOST, 0).detach())
     with (
         closing(FrameWriter(folder, SHOW)),
-        closing(ControlProcess(settings, lambda message: None, clock)) as process,
+        closing(ControlProcess(settings, clock)) as process,
     ):
         yield process
 
@@ -112,8 +113,6 @@ def test_numbers_that_no_figure_has_are_refused_told_and_end_nothing(
 def test_an_error_of_this_program_ends_no_process_and_is_told_at_a_limited_rate(
     process: ControlProcess, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    said: list[str] = []
-    monkeypatch.setattr(process, "_say", said.append)
 
     def fails(*_: Any) -> None:
         raise ZeroDivisionError("of a test")
@@ -172,7 +171,7 @@ def test_panic_waits_for_a_few_figures_of_a_stream_and_not_for_all(
     settings = Settings(str(folder), open_port(HOST, 0).detach())
     with (
         closing(FrameWriter(folder, SHOW)),
-        closing(ControlProcess(settings, lambda message: None, clock)) as process,
+        closing(ControlProcess(settings, clock)) as process,
         closing(Asker(process.port.number)) as program,
     ):
         process.turn()

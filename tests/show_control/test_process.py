@@ -34,7 +34,7 @@ def test_a_signal_ends_it_and_what_is_in_force_stays(
 def test_it_loads_nothing_that_only_others_need() -> None:
     """It has to be there when everything else hangs: small, and started in a moment."""
     script = (
-        "import sys, appliance.show_control.__main__, appliance.show_control.run, appliance.box.log_writer\n"
+        "import sys, appliance.show_control.__main__, appliance.show_control.run, appliance.box.log\n"
         f"print(*({set(HEAVY)!r} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

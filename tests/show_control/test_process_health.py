@@ -109,7 +109,7 @@ def test_a_second_projector_says_nothing(folder: Path) -> None:
 
 
 def mirror(mirrored: Mirrored) -> Mirror:
-    return Mirror(mirrored, lambda message: None)
+    return Mirror(mirrored)
 
 
 def test_the_keeper_tells_that_the_journal_has_stopped(folder: Path) -> None:

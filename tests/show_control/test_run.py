@@ -29,7 +29,7 @@ def stage(folder: Path) -> Iterator[FrameWriter]:
 @pytest.fixture
 def process(folder: Path, clock: Clock, stage: FrameWriter) -> Iterator[ControlProcess]:
     settings = Settings(str(folder), open_port(HOST, 0).detach())
-    with closing(ControlProcess(settings, lambda message: None, clock)) as process:
+    with closing(ControlProcess(settings, clock)) as process:
         yield process
 
 

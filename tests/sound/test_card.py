@@ -20,6 +20,7 @@ from appliance.show.sound import SoundConfig
 from appliance.sound.card import Card
 from appliance.sound.fallback import OF_THE_SOUND
 from appliance.sound.run import Sound
+from tests.logged import said
 from tests.sound.stage_double import StageDouble
 
 PATIENCE_S = 60.0
@@ -75,9 +76,9 @@ def test_a_card_that_is_away_and_back(
         time.sleep(0.01)
         return np.zeros((frames, 2), np.float32)
 
-    fallbacks, said = Fallbacks(OF_THE_SOUND), []
+    fallbacks = Fallbacks(OF_THE_SOUND)
     state = SimpleNamespace(read=ShowState)
-    sound = Sound(SoundConfig(), StageDouble(tmp_path), state, said.append, fallbacks)  # type: ignore[arg-type]
+    sound = Sound(SoundConfig(), StageDouble(tmp_path), state, fallbacks)  # type: ignore[arg-type]
     card = Card(SoundConfig(), render)  # type: ignore[arg-type]
     card.look(0.0)
     sound.report(card, 0.0)
@@ -176,20 +177,21 @@ def test_without_the_library_the_strings_wait_for_it(
 def test_a_system_without_sound_is_no_end_of_the_process(tmp_path: Path, null_card: None) -> None:
     """In a process of its own: PortAudio would abort it."""
     program = """
-import os, sys, numpy, threading
+import logging, os, sys, numpy, threading
 from types import SimpleNamespace
 from appliance.box.fallback import Fallbacks
 from appliance.show.sound import SoundConfig
 from appliance.sound.card import Card
 from appliance.sound.fallback import OF_THE_SOUND
 from appliance.sound.run import Sound
+logging.basicConfig(level=logging.INFO, format="%(message)s", stream=sys.stdout)
 asked = threading.Event()
 def render(frames):
     asked.set()
     return numpy.zeros((frames, 2), numpy.float32)
 there = os.environ["ALSA_CONFIG_PATH"]
 card, fallbacks = Card(SoundConfig(), render), Fallbacks(OF_THE_SOUND)
-sound = Sound(SoundConfig(), None, None, print, fallbacks)
+sound = Sound(SoundConfig(), None, None, fallbacks)
 os.environ["ALSA_CONFIG_PATH"] = "/nonexistent"
 card.look(0.0)
 sound.report(card, 0.0)
@@ -214,7 +216,7 @@ def test_blocks_that_come_too_late_are_counted(null_card: None, tmp_path: Path) 
     card._fill(out, 256, None, SimpleNamespace(output_underflow=False))
     fallbacks = Fallbacks(OF_THE_SOUND)
     state = SimpleNamespace(read=ShowState)
-    sound = Sound(SoundConfig(), StageDouble(tmp_path), state, print, fallbacks)  # type: ignore[arg-type]
+    sound = Sound(SoundConfig(), StageDouble(tmp_path), state, fallbacks)  # type: ignore[arg-type]
     sound.report(card, 1.0)
     assert [(one.name, one.times) for one in fallbacks.happened(1.0)] == [("sound-dropouts", 1)]
     assert not out.any()

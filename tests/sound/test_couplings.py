@@ -158,7 +158,7 @@ def test_strings_hear_only_whose_motion_the_show_says(tmp_path: Path, of: str, s
     )
     for fill in (move_body, move_live, move_hand):
         stage, state = Stage(directory, fill), SimpleNamespace(read=ShowState)
-        sound = Sound(SoundConfig(), stage, state, print, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
+        sound = Sound(SoundConfig(), stage, state, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
         out = []
         for stage.tick in range(40):
             sound.look(10.0 + TICK_S * stage.tick)

@@ -19,6 +19,7 @@ from appliance.sound.fallback import OF_THE_SOUND
 from appliance.sound.render_file import render_file
 from appliance.sound.run import Entrance, Sound, require_sound
 from tests.bundles import swaying_phrase, write_show
+from tests.logged import said
 from tests.sound.stage_double import StageDouble
 
 PATIENCE_S = 60.0
@@ -49,16 +50,16 @@ def test_how_loud_the_strings_are(tmp_path: Path, state: ShowState, loud: float)
     show = write_show(tmp_path / "show", strings={"cues": ["strings"]}, cues=[{"name": "strings"}])
     declared = SimpleNamespace(read=lambda: state)
     fallbacks = Fallbacks(OF_THE_SOUND)
-    sound = Sound(SoundConfig(), StageDouble(show), declared, print, fallbacks)  # type: ignore[arg-type]
+    sound = Sound(SoundConfig(), StageDouble(show), declared, fallbacks)  # type: ignore[arg-type]
     sound.look(10.0)
     assert sound.instrument is not None and sound.instrument.level == pytest.approx(loud)
 
 
 def test_without_a_stage_the_strings_rest(tmp_path: Path) -> None:
     stage = StageDouble(write_show(tmp_path / "show", strings={}))
-    fallbacks, said = Fallbacks(OF_THE_SOUND), []
+    fallbacks = Fallbacks(OF_THE_SOUND)
     state = SimpleNamespace(read=ShowState)
-    sound = Sound(SoundConfig(), stage, state, said.append, fallbacks)  # type: ignore[arg-type]
+    sound = Sound(SoundConfig(), stage, state, fallbacks)  # type: ignore[arg-type]
     for tick in range(20):
         sound.look(10.0 + 0.02 * tick)
         sound.dance(stage, 10.0 + 0.02 * tick)  # type: ignore[arg-type]
@@ -82,7 +83,7 @@ def test_the_cards_thread_sees_to_panic_by_itself(tmp_path: Path, urgent: dict[s
     """Two blocks after it is declared nothing is left, also where `look` waits for a processor."""
     stage = StageDouble(write_show(tmp_path / "show", strings={}))
     state = SimpleNamespace(read=ShowState)
-    sound = Sound(SoundConfig(), stage, state, print, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
+    sound = Sound(SoundConfig(), stage, state, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
     for tick in range(20):
         sound.look(10.0 + 0.02 * tick)
         sound.dance(stage, 10.0 + 0.02 * tick)  # type: ignore[arg-type]
@@ -95,7 +96,7 @@ def test_the_cards_thread_sees_to_panic_by_itself(tmp_path: Path, urgent: dict[s
 def test_another_show_comes_in_when_the_strings_of_the_one_before_are_silent(tmp_path: Path) -> None:
     stage = StageDouble(write_show(tmp_path / "show", strings={}))
     state = SimpleNamespace(read=ShowState)
-    sound = Sound(SoundConfig(), stage, state, print, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
+    sound = Sound(SoundConfig(), stage, state, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
     sound.look(10.0)
     before = sound.instrument
     stage.facts.show_directory, stage.generation = write_show(tmp_path / "other", strings={"base_hz": 80}), 2
@@ -109,9 +110,9 @@ def test_another_show_comes_in_when_the_strings_of_the_one_before_are_silent(tmp
 
 
 def test_a_show_without_strings_is_silent(tmp_path: Path) -> None:
-    stage, said = StageDouble(write_show(tmp_path / "show")), []
+    stage = StageDouble(write_show(tmp_path / "show"))
     state = SimpleNamespace(read=ShowState)
-    sound = Sound(SoundConfig(), stage, state, said.append, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
+    sound = Sound(SoundConfig(), stage, state, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
     sound.look(10.0)
     assert sound.instrument is None and said == ["A test has no `strings:`, and is silent."]
 
@@ -143,7 +144,7 @@ def test_frames_of_another_skeleton_are_not_played(tmp_path: Path) -> None:
     """The card's own reader may see a new stage before `look` has built its strings."""
     stage = StageDouble(write_show(tmp_path / "show", strings={}))
     state = SimpleNamespace(read=ShowState)
-    sound = Sound(SoundConfig(), stage, state, print, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
+    sound = Sound(SoundConfig(), stage, state, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
     sound.dance(stage, 10.0)  # type: ignore[arg-type]  # no strings yet
     sound.look(10.0)
     other = SimpleNamespace(tick=1, frame_time=0.0, positions=np.zeros((3, 3), np.float32))

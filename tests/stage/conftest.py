@@ -110,7 +110,7 @@ def box(runtime: Path) -> BoxConfig:
 
 @pytest.fixture
 def memory() -> SensorMemory:
-    return SensorMemory(None, print)
+    return SensorMemory(None)
 
 
 @pytest.fixture

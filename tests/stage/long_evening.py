@@ -65,7 +65,7 @@ class Evening:
         keys = create_keys(folder / "sensors.keys", names)
         box_file = folder / "box.yaml"
         box_file.write_text(yaml.safe_dump(_settings(folder, port)))
-        self.stage = Stage(show, load_box(box_file), lambda _: None, box_file)
+        self.stage = Stage(show, load_box(box_file), box_file)
         self.stage.lead_s = 0.0  # nothing cools down where nothing waits
         self.begun = CLOCK.now
         self.faults: Counter[str] = Counter()

@@ -125,7 +125,7 @@ def test_commands_about_sensors_are_done_or_refused_in_words(
     worn: StageParts, order: Order, done: bool, message: str
 ) -> None:
     assert isinstance(worn.link, HeardLink)
-    wearing = SensorFit(worn, SensorMemory(None, print), print)
+    wearing = SensorFit(worn, SensorMemory(None))
     wearing.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, 99.6, 99.6, 90, 255))
     outcome = obey_for_sensors(order, worn, wearing, 100.0)
     assert outcome[0] == done
@@ -136,7 +136,7 @@ def test_commands_about_sensors_are_done_or_refused_in_words(
 
 def test_a_phone_that_needs_no_key_is_not_said_to_miss_one(worn: StageParts) -> None:
     worn.link = SensorLink({}, [], foreign={"head": SensorKey("head", 2, bytes(16), "phone")})
-    wearing = SensorFit(worn, SensorMemory(None, print), print)
+    wearing = SensorFit(worn, SensorMemory(None))
     order = Order("reload", keys={"left-wrist": (1, bytes(16))})
     assert obey_for_sensors(order, worn, wearing, 100.0) == (True, "The box knows 1 sensor now.")
 
@@ -146,7 +146,7 @@ def test_a_phone_that_needs_no_key_is_not_said_to_miss_one(worn: StageParts) -> 
 def test_whoever_asks_a_sensor_that_is_linked_and_not_heard_now_is_told_that_nothing_is_done(
     worn: StageParts, name: str, sensor: str
 ) -> None:
-    wearing = SensorFit(worn, SensorMemory(None, print), print)
+    wearing = SensorFit(worn, SensorMemory(None))
     wearing.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, 99.4, 99.4, 90, 255))
     done, message = obey_for_sensors(Order(name, text=sensor), worn, wearing, 100.0)
     assert not done
@@ -154,7 +154,7 @@ def test_whoever_asks_a_sensor_that_is_linked_and_not_heard_now_is_told_that_not
 
 
 def test_a_show_without_sensors_has_no_neutral_pose(parts: StageParts) -> None:
-    wearing = SensorFit(parts, SensorMemory(None, print), print)
+    wearing = SensorFit(parts, SensorMemory(None))
     assert obey_for_sensors(Order("neutral"), parts, wearing, 100.0) == (
         False,
         "No hand of this show is held by a sensor.",

@@ -52,7 +52,7 @@ def parts(tmp_path: Path, link: SensorLink) -> Iterator[StageParts]:
 
 
 def made(parts: StageParts, late_look_s: float) -> Tick:
-    fit = SensorFit(parts, SensorMemory(None, print), print)
+    fit = SensorFit(parts, SensorMemory(None))
     parts.led.iterations = Iterations(3, 2, 10)
     return Tick(parts, fit, latest_start_s=PATIENT_S, late_look_s=late_look_s)
 

@@ -86,7 +86,7 @@ def test_a_tick_gives_both_to_the_network(tmp_path: Path) -> None:
     """Into the rows of the batch that it runs on."""
     show = write_show(tmp_path / "show", puppets=[{"name": "a"}, {"name": "b", "x": 1.0}])
     parts = assemble(load_show(show), BOX)
-    tick = Tick(parts, SensorFit(parts, SensorMemory(None, print), print), 1.0)
+    tick = Tick(parts, SensorFit(parts, SensorMemory(None)), 1.0)
     for number in range(20):
         slot = Slot(number, 10 + 0.02 * number, 10 + 0.02 * number, 0)
         tick.run(slot)

@@ -23,6 +23,7 @@ from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import TRIES, Resumption
 from appliance.stage.run import Stage
 from appliance.stage.watch import Watch
+from tests.logged import said
 from tests.stage.places import PLACE, declare, put
 from tests.stage.shows import NOW
 from tests.stage.test_fallbacks import FITS
@@ -239,12 +240,11 @@ def show(walking_show: Show) -> Show:
 
 
 def test_the_whole_stage_goes_on_where_it_was(show: Show, box: BoxConfig) -> None:
-    stage = Stage(show, box, lambda message: None)
+    stage = Stage(show, box)
     with closing(stage), pytest.raises(ZeroDivisionError):
         stage.dance(None, lambda: stage.parts.led.motion.position_s > 0.3 and bool(1 / 0))  # late ticks stand
     was_at_s = stage.parts.led.motion.position_s
-    said: list[str] = []
-    again = Stage(show, box, said.append)
+    again = Stage(show, box)
     with closing(again):
         assert again.parts.led.motion.position_s == pytest.approx(was_at_s, abs=1e-3)
         assert any("After a restart of the stage the show goes on at" in message for message in said)
@@ -253,7 +253,7 @@ def test_the_whole_stage_goes_on_where_it_was(show: Show, box: BoxConfig) -> Non
             again.tick.frame.puppets[0].root, stage.tick.frame.puppets[0].root, atol=0.02
         )
         again.dance(0.1, lambda: False)
-    fresh = Stage(show, box, said.append)  # that one ended as it should
+    fresh = Stage(show, box)  # that one ended as it should
     with closing(fresh):
         assert fresh.parts.led.motion.position_s == 0.0
         assert not fresh.resuming.went_on
@@ -265,7 +265,7 @@ def test_a_place_goes_before_what_was_declared_before_it(show: Show, box: BoxCon
     declare(runtime, declared)
     place = moved(PLACE, excerpt=(1.0, 3.0), cue="storm", applied=declared.generation, boot=boot_id())
     put(runtime, place)
-    with closing(Stage(show, box, lambda message: None)) as stage:
+    with closing(Stage(show, box)) as stage:
         assert (stage.reconciler.cue, stage.parts.led.motion.phrase) == ("storm", "walk")
         assert stage.parts.led.motion.position_s == pytest.approx(2.0, abs=1e-3)
         stage.dance(0.1, lambda: False)
@@ -274,7 +274,7 @@ def test_a_place_goes_before_what_was_declared_before_it(show: Show, box: BoxCon
 
 def test_slots_are_not_needed_to_know_the_place(runtime: Path, show: Show, box: BoxConfig) -> None:
     """A late tick does not dance: the phrase stands, and so does its place."""
-    stage = Stage(show, box, lambda message: None)
+    stage = Stage(show, box)
     with closing(stage):
         for number in range(3):
             slot = Slot(number, 10.0 + number * TICK_S, 10.019 + number * TICK_S)

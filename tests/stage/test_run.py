@@ -29,6 +29,7 @@ from appliance.stage.run import Stage
 from appliance.stage.watch import Watch
 from tests.bundles import swaying_phrase, write_show
 from tests.fake_clock import FakeTime
+from tests.logged import said
 
 RAISED = (0.8, 0.6, 0.0, 0.0)
 
@@ -79,7 +80,7 @@ class Evening:
         self.time, self.cable = FakeTime(self._overshoot_s), Cable()
         self.stops: dict[int, float] = {}
         self.each_s = 0.0
-        self.said: list[str] = []
+        self.said = said
         self.weights: list[float] = []
         box = BoxConfig(
             sensors=SensorsConfig(udp=None),
@@ -90,7 +91,7 @@ class Evening:
         monkeypatch.setattr(
             run, "TickClock", lambda: TickClock(monotonic=self.time.monotonic, sleep=self.time.sleep)
         )
-        self.stage = Stage(load_show(bundle), box, self.said.append)
+        self.stage = Stage(load_show(bundle), box)
         self.stage.parts.link.close()
         self.stage.parts.link = self.cable
         self.stage.tick._monotonic = self.time.monotonic

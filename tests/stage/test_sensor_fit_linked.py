@@ -50,7 +50,7 @@ class Evening:
 
     def __init__(self, device: Device, folder: Path) -> None:
         self.device = device
-        self.memory = SensorMemory(None, print)
+        self.memory = SensorMemory(None)
         self.show = Show([device], VenueNetwork(PERFECT, 1), {KEY.name: KEY})
         hand = {"sensor": KEY.name, "joint": "lShldr", "at_neutral": list(HANGING)}
         self._bundle = load_show(write_show(folder / "show", [hand]))
@@ -65,7 +65,7 @@ class Evening:
         self.parts = assemble(self._bundle, box)
         self.parts.link = self.show.link
         self.said: list[str] = []
-        self.wearing = SensorFit(self.parts, self.memory, self.said.append)
+        self.wearing = SensorFit(self.parts, self.memory)
 
     def restart_box(self) -> None:
         self.close()
@@ -82,6 +82,7 @@ class Evening:
             led = self.parts.led
             led.hands.pull(self.show.now, led.puppet.select(led.motion.window()))
             self.wearing.look(self.show.now)
+            self.said += self.wearing.messages
             if self.newest is not None:
                 self.errors.append(self._error(self.newest, self.parts.led.hands.targets[0, place]))
             if self.lights[-1:] != [self.device.light]:

@@ -58,7 +58,7 @@ def stage(tmp_path: Path, receiver: OscReceiver) -> Iterator[Callable[..., Tick]
 
 
 def worn(parts: StageParts) -> SensorFit:
-    return SensorFit(parts, SensorMemory(None, print), print)
+    return SensorFit(parts, SensorMemory(None))
 
 
 def dance(tick: Tick, slots: range, late_s: float = 0.0, heard: tuple[float, ...] | None = None) -> None:

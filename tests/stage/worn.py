@@ -44,7 +44,7 @@ class Stage:
         self.said: list[str] = []
         self.parts = parts
         self.memory = memory
-        self.wearing = SensorFit(parts, memory, self.said.append)
+        self.wearing = SensorFit(parts, memory)
         self.now = 100.0
         self.sequence = 0
 
@@ -73,7 +73,11 @@ class Stage:
         self.wearing.hear(reading)
         self.parts.hear(reading)
         self.parts.led.hands.pull(self.now, self.parts.led.puppet.select(self.parts.led.motion.window()))
+        self._look()
+
+    def _look(self) -> None:
         self.wearing.look(self.now)
+        self.said += self.wearing.messages
 
     def stand(self, seconds: float, orientation: Orientation, **reading: int | str) -> None:
         for _ in range(round(seconds / TICK_S)):
@@ -88,7 +92,7 @@ class Stage:
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
             self.parts.led.hands.pull(self.now, self.parts.led.puppet.select(self.parts.led.motion.window()))
-            self.wearing.look(self.now)
+            self._look()
 
     def target(self, joint: str = "lShldr") -> np.ndarray:
         return self.parts.led.hands.targets[0, self.parts.led.puppet.joints.index(joint)].copy()

@@ -377,4 +377,4 @@ def test_a_full_disk_leaves_the_phrase_that_was_there(
 def test_recordings_too_short_to_go_on_from_are_refused() -> None:
     short = Steps(np.zeros((20, 8), np.float32), np.zeros((20, 4), np.float32))
     with pytest.raises(StudioError, match=r"No recording has 2\.8 s .* to go on from"):
-        phrase.improvise(Improviser(MovesShape(8, 6, 4, 4, 24), 12, 1, 2), [short], PhraseOptions(), print)
+        phrase.improvise(Improviser(MovesShape(8, 6, 4, 4, 24), 12, 1, 2), [short], PhraseOptions())

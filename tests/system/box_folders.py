@@ -91,14 +91,14 @@ def late(machine: Machine, uptime_s: float) -> list[str]:
     """As when a stick is plugged in; in a fork, where it may take its time: it asks for the lowest priority,
     at which other tests would leave it none.
     """
-    said: list[str] = []
 
     def in_a_fork() -> bytes:
         lowered: list[int] = []
         setattr(os, "nice", lowered.append)  # noqa: B010
         _give_time()
-        assert preflight(machine.options._replace(late=True), said.append, uptime_s) == 0
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            assert preflight(machine.options._replace(late=True), uptime_s) == 0
         assert lowered == [19], "it takes time from the dance"
-        return "\n".join(said).encode()
+        return out.getvalue().encode()
 
     return run_with_timeout(PATIENCE_S, in_a_fork).decode().splitlines()

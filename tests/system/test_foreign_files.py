@@ -43,14 +43,14 @@ def keys(path: Path) -> None:
 
 def memory(path: Path) -> None:
     path.rename(path.with_name("sensors.memory"))
-    SensorMemory(path.parent, print)
+    SensorMemory(path.parent)
 
 
 def alignment(path: Path) -> None:
-    saved = AlignmentFile(path.parent, ProjectorConfig(), print)
+    saved = AlignmentFile(path.parent, ProjectorConfig())
     path.rename(saved.path)
     saved.close()
-    AlignmentFile(path.parent, ProjectorConfig(), print).close()
+    AlignmentFile(path.parent, ProjectorConfig()).close()
 
 
 def identity(path: Path) -> None:
@@ -65,7 +65,7 @@ def fixture(path: Path) -> None:
 
 def choice(path: Path) -> None:
     assert Choice.read(path) is None
-    assert pair_to_dance(path, 0.0, print).good
+    assert pair_to_dance(path, 0.0).good
 
 
 def recording(path: Path) -> None:

@@ -27,6 +27,7 @@ from appliance.stage.recorder import FILE as JOURNAL_FILE
 from appliance.stage.recorder import FORMAT, KIND
 from tests.box import disks
 from tests.bundles import write_show
+from tests.logged import said
 from tests.recorder.night import Night
 from tests.system.processes import BUNRAKU, Process, children, is_running, wait_until
 
@@ -124,9 +125,8 @@ def test_the_rest_that_a_keeper_left_does_not_wait_for_a_disk_that_hangs(disk: P
     keeper.end()
     keeper.night.dance(10)
     keeper.place.write(Checkpoint("A show", (Standing("main", 7.5, (0.0, 30.0)),), ended=True))
-    said: list[str] = []
     with disks.frozen(disk):
-        keep_rest(load_box(keeper.box_file), keeper.runtime, keeper.journal, 1.0, said.append)
+        keep_rest(load_box(keeper.box_file), keeper.runtime, keeper.journal, 1.0)
         assert keeper.saved_place() == 7.5
     assert any("The journal: the disk does not answer" in message for message in said)
 

@@ -28,6 +28,7 @@ from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair
 from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
 from tests.bundles import FIGURE, write_show
+from tests.logged import said
 from tests.outputs.small_stage import one_puppet
 from tests.show_control.doubles import facts
 from tests.system.box_folders import PATIENCE_S, PREFLIGHT, Machine, choice_in, late
@@ -121,7 +122,7 @@ def test_with_nothing_new_nothing_heavy_is_imported(machine: Machine) -> None:
         "import sys\nfrom pathlib import Path\n"
         "from appliance.cli.preflight import Options, preflight\n"
         f"folders = [Path(one) for one in {[str(one) for one in machine.options[:4]]}]\n"
-        "assert preflight(Options(*folders), print, 10.0) == 0\n"
+        "assert preflight(Options(*folders), 10.0) == 0\n"
         f"print(*({HEAVY} & set(sys.modules)))\n"
     )
     done = run([sys.executable, "-c", code], check=True)
@@ -165,9 +166,7 @@ def put_aside(tmp_path: Path) -> Machine:
 def fail_to_start(machine: Machine) -> None:
     """Start the stage until it gives up: each process dies before its first frame."""
     for _ in range(STARTS):
-        run_with_timeout(
-            60.0, lambda: pair_to_dance(machine.run / CHOSEN, time.monotonic(), print).id.encode()
-        )
+        run_with_timeout(60.0, lambda: pair_to_dance(machine.run / CHOSEN, time.monotonic()).id.encode())
 
 
 def only_aside(machine: Machine) -> str:
@@ -279,7 +278,7 @@ class Evening:
         self.run, self.data = folder / "run", folder / "data"
         for one in (self.run, self.data):
             one.mkdir()
-        self.said: list[str] = []
+        self.said = said
         for name in ("new", "before"):
             (folder / name).mkdir()
             (folder / name / "show.yaml").touch()
@@ -295,7 +294,7 @@ class Evening:
         """Which pair a stage takes that dies after `danced_s` (None: before its first frame)."""
 
         def begin() -> bytes:
-            pair = pair_to_dance(self.run / CHOSEN, time.monotonic(), lambda message: None)
+            pair = pair_to_dance(self.run / CHOSEN, time.monotonic())
             if danced_s is not None:
                 self._leave_frames(danced_s)
             return pair.id.encode()
@@ -390,13 +389,12 @@ def test_a_torn_count_starts_over(evening: Evening, torn: bytes) -> None:
 
 
 def test_without_a_choice_what_comes_with_the_box_dances(tmp_path: Path) -> None:
-    said: list[str] = []
-    assert pair_to_dance(tmp_path / CHOSEN, 0.0, said.append) == Pair(good=True)
+    assert pair_to_dance(tmp_path / CHOSEN, 0.0) == Pair(good=True)
     assert "The audience sees the show that comes with the box" in said[0]
 
 
 def proof_of(evening: Evening) -> Mirror:
-    return Mirror(MirroredProof(evening.run, evening.run / CHOSEN), print)
+    return Mirror(MirroredProof(evening.run, evening.run / CHOSEN))
 
 
 def test_a_show_that_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(evening: Evening) -> None:
@@ -414,9 +412,7 @@ def test_a_show_that_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(
 
 def test_a_keeper_that_starts_while_the_show_dances_keeps_the_proof(evening: Evening) -> None:
     evening.dance(seconds=10.5)
-    process = MirrorProcess(
-        MirroredProof(evening.run, evening.run / CHOSEN), evening.run, end_s=0.0, say=print
-    )
+    process = MirrorProcess(MirroredProof(evening.run, evening.run / CHOSEN), evening.run, end_s=0.0)
     try:
         process.supervise(time.monotonic())
         wait_until(lambda: evening.saved.first.good)
@@ -506,7 +502,7 @@ def test_a_broken_chosen_show_gives_way_on_the_real_stage(evening: Evening, tmp_
 
 
 def test_the_show_that_danced_before_is_chosen_before_anything_new_is_read(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     machine.bring("Spring")
     machine.preflight()
@@ -518,23 +514,23 @@ def test_the_show_that_danced_before_is_chosen_before_anything_new_is_read(
         raise RecursionError("an unforeseen error")
 
     monkeypatch.setattr(commands, "look", broken)
-    said: list[str] = []
-    assert preflight(machine.options._replace(stick=machine.stick / "none"), said.append, 10.0) == 0
+    assert preflight(machine.options._replace(stick=machine.stick / "none"), 10.0) == 0
     assert seen[0] is not None and seen[0].first == machine.choice.first
     assert machine.dances == "Spring"
+    said = capsys.readouterr().out.splitlines()
     assert "an unforeseen error" in said[0] and said[0] in machine.choice.refused
 
 
 def test_a_preflight_that_never_ends_blocks_no_other(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     machine.bring("Spring")
     machine.preflight()
     (machine.run / CHOSEN).unlink()
     monkeypatch.setattr(commands, "TURN_S", 0.1)
-    said: list[str] = []
     with alone_in(machine.data):
-        assert preflight(machine.options, said.append, 10.0) == 0
+        assert preflight(machine.options, 10.0) == 0
+    said = capsys.readouterr().out.splitlines()
     assert "Another preflight has not ended" in said[0]
     assert machine.dances == "Spring"
 
@@ -603,12 +599,14 @@ def test_a_check_that_hangs_refuses_the_show(tmp_path: Path, monkeypatch: pytest
     assert "did not end within 0.3 s" in late_candidate_problems(tmp_path, APPLIANCE_BOX)[0]
 
 
-def test_a_stick_that_hangs_is_given_up(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stick_that_hangs_is_given_up(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     machine.bring("Spring")
     monkeypatch.setattr(commands, "look", lambda source, folder: time.sleep(60))
     monkeypatch.setattr(commands, "STICK_S", 0.2)
-    said: list[str] = []
-    assert preflight(machine.options, said.append, 10.0) == 0
+    assert preflight(machine.options, 10.0) == 0
+    said = capsys.readouterr().out.splitlines()
     assert "could not be read (not within 0.2 s)" in said[0]
     assert machine.choice.first.show == EMBEDDED_SHOW
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from appliance.projector.picture.image_file import LINES, MOST_WIDE, Image, read
 from appliance.projector.picture.lettering import forget_fonts, is_font, lettered, letters_without_font
 from appliance.projector.picture.wall import Wall
 from appliance.show.card import CardConfig
+
+_log = logging.getLogger(__name__)
 
 MARGIN = 0.03  # fraction of the picture's width that stays free on both sides
 _GAP = 0.4  # between image and words, in heights of a line
@@ -50,7 +53,6 @@ class Cards:
         gl: moderngl.Context,
         cards: Mapping[str, CardConfig],
         directory: Path,
-        say: Callable[[str], None],
     ) -> None:
         self._gl = gl
         forget_fonts()
@@ -60,7 +62,7 @@ class Cards:
         }
         self._cards = {}
         for name, config in cards.items():
-            content = content_of(config, directory, say)
+            content = content_of(config, directory)
             self._cards[name] = _Card(
                 None if content is None else texture_of(gl, content),
                 0.0 if content is None else content.shape[0] / LINES,
@@ -106,14 +108,14 @@ class Cards:
             drawing.release()
 
 
-def content_of(card: CardConfig, directory: Path, say: Callable[[str], None]) -> Image | None:
+def content_of(card: CardConfig, directory: Path) -> Image | None:
     """(height, width, 4) in pixels of a picture of LINES rows: the image above the words; None: neither."""
     parts: list[Image] = []
     for make in (_image_of, _words_of):
         try:
-            parts += make(card, directory, say)
+            parts += make(card, directory)
         except OSError as error:
-            say(
+            _log.warning(
                 f"The card '{card.name}' cannot be drawn whole ({error}). The audience sees it without that. "
                 "Save its image or font file anew."
             )
@@ -127,25 +129,25 @@ def _line_of(card: CardConfig) -> int:
     return max(1, round(card.size * LINES))
 
 
-def _image_of(card: CardConfig, directory: Path, _: Callable[[str], None]) -> list[Image]:
+def _image_of(card: CardConfig, directory: Path) -> list[Image]:
     """Its image, if it has one. Raises OSError."""
     if card.image is None:
         return []
     return [_sized(read_image(directory / card.image), round(card.image_size * LINES))]
 
 
-def _words_of(card: CardConfig, directory: Path, say: Callable[[str], None]) -> list[Image]:
+def _words_of(card: CardConfig, directory: Path) -> list[Image]:
     """Its words, if it has any. Raises OSError."""
     if not card.text.strip():
         return []
     font = None if card.font is None else directory / card.font
     if font is not None and not is_font(font):
-        say(
+        _log.warning(
             f"{font} cannot be read as a font. The audience sees the words of the card '{card.name}' "
             "in another one. Save it anew."
         )
     if lacking := letters_without_font(card.text, font):
-        say(
+        _log.warning(
             f"No font of this machine has '{lacking[:20]}' of the card '{card.name}'. The audience "
             "sees boxes there. Name a font file in the bundle under the card's `font`, or install "
             "one (Debian packages fonts-noto-core, fonts-noto-cjk)."

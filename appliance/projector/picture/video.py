@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import subprocess
-import sys
 import threading
 import time
 from typing import IO
@@ -12,6 +12,8 @@ from typing import IO
 import moderngl
 
 from appliance.projector.picture.image_file import LINES, MOST_WIDE
+
+_log = logging.getLogger(__name__)
 
 FFMPEG = "ffmpeg"
 UNSEEN_S = 2.0  # after which it stops; it begins anew when its look comes back
@@ -59,7 +61,7 @@ class Video:
             self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
         except OSError as error:
             self._is_unplayable = True
-            _say(
+            _log.warning(
                 f"{self._path} is not played: {FFMPEG} cannot be started ({error.strerror}). The audience "
                 "sees the figure before black. Install it: sudo apt install ffmpeg."
             )
@@ -73,7 +75,7 @@ class Video:
             if time.monotonic() - self._seen_at > UNSEEN_S:
                 self._stop()
         if process is self._process:
-            _say(
+            _log.warning(
                 f"{self._path} is played no further. The audience sees the figure before its last picture. "
                 f"{FFMPEG} says why above: save the video anew."
             )
@@ -94,7 +96,3 @@ def _ppm(pipe: IO[bytes]) -> _Picture | None:
     width, height = int(size[1]), int(size[2])
     pixels = pipe.read(3 * width * height)
     return ((width, height), pixels) if len(pixels) == 3 * width * height > 0 else None
-
-
-def _say(message: str) -> None:
-    print(message, file=sys.stderr)

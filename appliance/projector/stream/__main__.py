@@ -7,9 +7,12 @@ import os
 import sys
 from contextlib import suppress
 
+from appliance.box.log import process_log
 from appliance.box.parent_death import end_with_parent
 from appliance.projector.stream.server import serve
 from appliance.show.stream import StreamConfig
+
+_ERRORS = 2  # standard output has the wishes for pictures
 
 
 def main() -> None:
@@ -17,7 +20,7 @@ def main() -> None:
     end_with_parent()
     config = StreamConfig.model_validate_json(sys.argv[1])
     try:
-        with suppress(KeyboardInterrupt):
+        with process_log(_ERRORS), suppress(KeyboardInterrupt):
             asyncio.run(serve(config, sys.stdin.buffer, sys.stdout.buffer))
     except OSError as error:
         sys.exit(

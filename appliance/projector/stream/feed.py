@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import subprocess
@@ -14,6 +15,8 @@ from appliance.projector.stream.pipe import WANTED, head
 from appliance.projector.window import Size
 from appliance.show.stream import StreamConfig
 
+_log = logging.getLogger(__name__)
+
 AGAIN_S = 5.0  # before a process that ended is started once more
 HUNG_S = 5.0  # without a sign, of which it gives one a second
 _STARTS_WITHIN_S = 20.0
@@ -23,8 +26,8 @@ _LAST_OUTPUT_S = 1.0
 class Feed:
     """Runs the stream's process. It costs a picture nothing while nobody looks, and never waits."""
 
-    def __init__(self, config: StreamConfig, say: Callable[[str], None]) -> None:
-        self._config, self._say = config, say
+    def __init__(self, config: StreamConfig) -> None:
+        self._config = config
         self._process: subprocess.Popen[bytes] | None = None
         self._pictures: RawStream | None = None
         self._begun_at, self._hangs_at = -math.inf, 0.0
@@ -59,7 +62,7 @@ class Feed:
     def _begin(self, now: float) -> None:
         if self._process is not None and not self._is_said:
             self._is_said = True
-            self._say(
+            _log.warning(
                 f"The stream on port {self._config.port} has ended, or hung. The audience sees the picture; "
                 f"media servers and mixers do not. It is started again every {AGAIN_S:g} s: is the port "
                 "another program's?"
@@ -74,7 +77,7 @@ class Feed:
             os.close(into)
             if not self._is_said:
                 self._is_said = True
-                self._say(
+                _log.warning(
                     f"The stream's process cannot be started ({error.strerror}). The audience sees the "
                     "picture; media servers and mixers do not. It is tried again every "
                     f"{AGAIN_S:g} s: is the machine out of memory?"

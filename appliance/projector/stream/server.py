@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import ipaddress
+import logging
 import signal
 import socket
-import sys
 import threading
 from collections.abc import Awaitable, Callable
 from io import BytesIO
@@ -17,13 +17,14 @@ from aiohttp import web
 from PIL import Image
 
 from appliance.box.door import IDLE_S, Door
-from appliance.box.log_limit import limit_log
 from appliance.box.open_files import open_more_files
 from appliance.box.served import OwnNames, listening, plain_address
 from appliance.projector.stream.keying import keyed
 from appliance.projector.stream.ndi import NdiSource
 from appliance.projector.stream.pipe import ALIVE, WANTED, Picture, read_picture
 from appliance.show.stream import StreamConfig
+
+_log = logging.getLogger(__name__)
 
 BOUNDARY = "picture"
 MOST_CLIENTS = 8
@@ -93,7 +94,6 @@ class Newest:
 async def serve(config: StreamConfig, pictures: BinaryIO, asks: BinaryIO) -> None:
     """Listen, until the pictures end or the process is asked to stop. Raises OSError where it cannot."""
     open_more_files()
-    limit_log()
     ndi = _ndi_source(config)
     newest, loop = Newest(config, asks, ndi), asyncio.get_running_loop()
     over = asyncio.Event()
@@ -135,10 +135,9 @@ def _ndi_source(config: StreamConfig) -> NdiSource | None:
     try:
         return None if config.ndi is None else NdiSource(config.ndi, config.rate, config.ndi_alpha)
     except OSError as error:
-        print(
+        _log.warning(
             f"The picture does not go out by NDI: {error}. Programs that fetch it by HTTP see it. Install "
-            "the NDI runtime, or remove `ndi` from the box file.",
-            file=sys.stderr,
+            "the NDI runtime, or remove `ndi` from the box file."
         )
         return None
 
@@ -162,11 +161,9 @@ def png_of(picture: Picture) -> bytes:
 
 def _say_crowd(address: str) -> None:
     if address:
-        print(
+        _log.warning(
             f"{address} holds so many connections to the stream that the oldest are closed. Audience and "
-            "media servers get the picture. Leave that address out of `stream: viewers`.",
-            file=sys.stderr,
-            flush=True,
+            "media servers get the picture. Leave that address out of `stream: viewers`."
         )
 
 

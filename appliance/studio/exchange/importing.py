@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +27,8 @@ from appliance.studio.exchange.points_file import (
 )
 from appliance.studio.exchange.reading import read_as_given
 from appliance.studio.exchange.topology import directions_at_rest, parents_by_name
+
+_log = logging.getLogger(__name__)
 
 USUAL_FPS = 50.0
 _SHOWN_GAPS = 10
@@ -70,37 +73,35 @@ def _figures(errors: Array) -> str:
     return f"mean {cm.mean():.2f}, 95 % below {np.percentile(cm, 95):.2f}, largest {cm.max():.2f}"
 
 
-def import_points(source: Path, options: PointsOptions, say: Callable[[str], None]) -> Imported:
+def import_points(source: Path, options: PointsOptions) -> Imported:
     """Read points, fit a skeleton, find its poses. Raises ExchangeError or BvhError."""
     listed = None if options.names is None else read_names(options.names)
     names, read, given_fps, notes = read_points(source, listed)
     for note in notes:
-        say(f"{source.name}: {note}.")
+        _log.info(f"{source.name}: {note}.")
     fps = options.fps or given_fps or USUAL_FPS
     if options.fps is None:
         why = "by the column of times" if given_fps else "as nothing else is given"
-        say(f"Rate: {fps:g} frames a second, {why}. If that is wrong: --fps.")
+        _log.info(f"Rate: {fps:g} frames a second, {why}. If that is wrong: --fps.")
     given = None if listed is None or listed.parents is None else listed.parents
-    read = _with_zeros_as_gaps(names, given, read, say)
+    read = _with_zeros_as_gaps(names, given, read)
     _require_seen(source, names, read)
     unit = options.unit or guess_unit(read)
     if options.unit is None:
-        say(f"Unit: {unit}, by the size of the figure. If that is wrong: --unit {' | '.join(UNITS)}.")
+        _log.info(f"Unit: {unit}, by the size of the figure. If that is wrong: --unit {' | '.join(UNITS)}.")
     points = with_y_up(UNITS[unit] * read, options.up)
-    say(f"Points: {len(names)}, frames: {len(points)}, {len(points) / fps:.1f} s.")
+    _log.info(f"Points: {len(names)}, frames: {len(points)}, {len(points) / fps:.1f} s.")
     if options.model is not None:
-        skeleton, points = _as_model(source, options.model, names, points, say)
+        skeleton, points = _as_model(source, options.model, names, points)
     else:
         skeleton, points = _fitted(source, names, given, points)
     recording, too_long = pose_frames(skeleton, points, fps, options.longest_gap_s)
-    _say_gaps(gaps_of(points), too_long, skeleton.names, fps, say)
+    _log_gaps(gaps_of(points), too_long, skeleton.names, fps)
     places, _ = skeleton.forward_kinematics(recording.poses, recording.roots)
     return Imported(recording, np.linalg.norm(places - points, axis=-1))
 
 
-def _with_zeros_as_gaps(
-    names: Sequence[str], parents: Sequence[str] | None, points: Array, say: Callable[[str], None]
-) -> Array:
+def _with_zeros_as_gaps(names: Sequence[str], parents: Sequence[str] | None, points: Array) -> Array:
     """Points (N, P, 3) where one that is exactly 0, 0, 0 for a while is a gap: it was not seen.
 
     A point that is there always is the origin of the others if it is the root; any other was never seen. A
@@ -126,9 +127,9 @@ def _with_zeros_as_gaps(
                     frames = place_text(range(gap.first, gap.last + 1), "frame")
                     unseen.append(f"{names[joint]} is 0, 0, 0 in {frames}: taken as not seen.")
     for line in unseen[:_SHOWN_GAPS]:
-        say(line)
+        _log.info(line)
     if len(unseen) > _SHOWN_GAPS:
-        say(f"And {len(unseen) - _SHOWN_GAPS} more such points and times.")
+        _log.info(f"And {len(unseen) - _SHOWN_GAPS} more such points and times.")
     return found
 
 
@@ -139,17 +140,15 @@ def _require_seen(source: Path, names: Sequence[str], points: Array) -> None:
         raise ExchangeError(source, f"{', '.join(never)}: never seen. Leave the point out, of the names too.")
 
 
-def _as_model(
-    source: Path, model: Path, names: Sequence[str], points: Array, say: Callable[[str], None]
-) -> tuple[Skeleton, Array]:
+def _as_model(source: Path, model: Path, names: Sequence[str], points: Array) -> tuple[Skeleton, Array]:
     reading = ReadingOptions(true_fps={"*": USUAL_FPS})  # its dance is not asked for
     recording, guesses = read_as_given(model, reading)
     figure = recording.skeleton
     for guess in guesses:
-        say(f"{model.name}: {guess.sentence()}.")
+        _log.info(f"{model.name}: {guess.sentence()}.")
     others = [name for name in names if name not in figure.names]
     if others:
-        say(f"Points that are no joints of {model.name} left out: {', '.join(others)}.")
+        _log.info(f"Points that are no joints of {model.name} left out: {', '.join(others)}.")
     missing = [name for name in figure.names if name not in names]
     if missing:
         raise ExchangeError(
@@ -200,12 +199,11 @@ def _parents_first(source: Path, names: Sequence[str], parents: Sequence[int]) -
     return order
 
 
-def _say_gaps(
+def _log_gaps(
     gaps: Sequence[Gap],
     too_long: Sequence[Gap],
     names: Sequence[str],
     fps: float,
-    say: Callable[[str], None],
 ) -> None:
     def text(gap: Gap) -> str:
         return f"{names[gap.joint]} in {place_text(range(gap.first, gap.last + 1), 'frame')}"
@@ -215,12 +213,12 @@ def _say_gaps(
         longest = max(gap.last - gap.first + 1 for gap in short) / fps
         more = f" and {len(short) - _SHOWN_GAPS} more" if len(short) > _SHOWN_GAPS else ""
         shown = ", ".join(text(gap) for gap in short[:_SHOWN_GAPS])
-        say(f"Gaps: {len(short)} of up to {longest:.2f} s, crossed in straight lines: {shown}{more}.")
+        _log.info(f"Gaps: {len(short)} of up to {longest:.2f} s, crossed in straight lines: {shown}{more}.")
     for gap in too_long[:_SHOWN_GAPS]:
         seconds = (gap.last - gap.first + 1) / fps
-        say(
+        _log.info(
             f"{text(gap)} was not seen for {seconds:.2f} s, from {gap.first / fps:.2f} s on: its bone turns "
             "evenly from the pose before to the pose after. Look whether that can be danced."
         )
     if len(too_long) > _SHOWN_GAPS:
-        say(f"And {len(too_long) - _SHOWN_GAPS} more such gaps.")
+        _log.info(f"And {len(too_long) - _SHOWN_GAPS} more such gaps.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import shutil
 import tempfile
@@ -40,7 +41,10 @@ from appliance.studio.export import packing
 from appliance.studio.export.chosen_phrase import choose_phrase
 from appliance.studio.export.export import export
 from appliance.studio.export.gate import judge, median_ms, sample_windows
+from appliance.studio.progress import logged
 from appliance.studio.studio_error import StudioError
+
+_log = logging.getLogger(__name__)
 
 EQUALITY = 1e-4  # in any component of any quaternion after 10 iterations
 EQUALITY_WINDOWS = 16
@@ -80,7 +84,8 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     with tempfile.TemporaryDirectory(prefix=_MADE, dir=request.out) as folder:
         made = Path(folder) / "show"
         made.mkdir()
-        report = _make(request, dataset, made, console)
+        with logged(console):
+            report = _make(request, dataset, made, console)
         put_in_place(made, request.out.resolve())
     print_answer(console, report["puppetry"])
     return report
@@ -88,10 +93,6 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
 
 def _make(request: Request, dataset: Dataset, folder: Path, console: Console) -> dict[str, Any]:
     """Write what is new in the bundle into a folder; its report."""
-
-    def say(message: str) -> None:
-        console.print(message, highlight=False)
-
     coder, state = load_puppet(request.checkpoint)
     name = request.name or request.out.resolve().name
     missing = [name for name in coder.joints if name not in dataset.skeleton.names]
@@ -110,16 +111,16 @@ def _make(request: Request, dataset: Dataset, folder: Path, console: Console) ->
         coders = {precision: OnnxCoder(file) for precision, file in files.items()}
         windows = sample_windows(judged_on, places)
         difference = _difference(coder, coders["fp32"], windows)
-        say(f"The network file computes what was trained (to {difference:.0e} after 10 iterations).")
+        _log.info(f"The network file computes what was trained (to {difference:.0e} after 10 iterations).")
         verdict = judge(coders["fp32"], coders["int8"], windows)
-        say(verdict.sentence())
+        _log.info(verdict.sentence())
         times = {precision: median_ms(one, windows[0]) for precision, one in coders.items()}
         files[verdict.precision].replace(folder / "puppet.onnx")
     evaluation = evaluate(coder, judged_on, fitting_hop(coder, judged_on))
     names = sorted(take.name for take in judged_on)
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
     report[KEY] = reading_facts(request.source.catalogue)
-    say("Measuring whether the body answers a hand.")
+    _log.info("Measuring whether the body answers a hand.")
     error = report["degrees"]["1"]["mean"]
     report["puppetry"] = own_answer(coder, dataset, folder / ANSWER, error, state["step"], console)
     packing.write_skeleton(folder, dataset.skeleton, _shown_pose(dataset))
@@ -130,11 +131,11 @@ def _make(request: Request, dataset: Dataset, folder: Path, console: Console) ->
     elif not (request.out / packing.PHRASE).exists():
         phrase, about, report["phrase"] = _own_phrase(dataset)
         packing.write_phrase(folder, phrase)
-        say(f"phrase.bvh is {about}. The bundle contains a recording. {_PHRASE_OF_ITS_OWN}")
+        _log.info(f"phrase.bvh is {about}. The bundle contains a recording. {_PHRASE_OF_ITS_OWN}")
         about = f"{about}. {_PHRASE_OF_ITS_OWN}"
     if not (request.out / packing.SHOW).exists():
         if doubt:
-            say(doubt)
+            _log.info(doubt)
         hand: dict[str, Any] = {"sensor": "left-wrist", "joint": joint}
         hanging = hanging_orientation(dataset.skeleton, hand["joint"])
         if hanging is not None:
@@ -142,7 +143,7 @@ def _make(request: Request, dataset: Dataset, folder: Path, console: Console) ->
         thanks, has_feet = request.source.catalogue.acknowledgement, bool(dataset.skeleton.feet)
         packing.write_show_yaml(folder, name, [hand], thanks, about, has_feet)
     elif request.name or request.hand:
-        say(f"{request.out / packing.SHOW} stays as it is: --name and --hand are for a new one.")
+        _log.info(f"{request.out / packing.SHOW} stays as it is: --name and --hand are for a new one.")
     write_report(folder / "report.json", report)
     shown = _longest_sound_take(judged_on)
     draw_report(folder / "report.png", name, report, evaluation, coder, shown)

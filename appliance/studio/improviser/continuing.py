@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -20,10 +20,12 @@ from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
 from appliance.studio.opened_model import open_show, say_if_dead
+from appliance.studio.progress import logged
 from appliance.studio.standing_dance import excerpt_of, only_in, standing
 from appliance.studio.studio_error import StudioError
 
-Say = Callable[[str], None]
+_log = logging.getLogger(__name__)
+
 PROMPT_S = 3.0  # seconds of a recording, where an improviser that makes no endless phrase gets no prompt
 
 
@@ -34,14 +36,11 @@ def continue_of_show(options: ImproviseOptions) -> None:
     network = opened.network
     assert isinstance(network, ImproviserNetwork)
     say_if_dead(network, opened.dataset, console)
-
-    def say(message: str) -> None:
-        console.print(message, highlight=False, soft_wrap=True)
-
     if options.regions and options.prompt is None:
         options = replace(options, prompt=opened.phrase, prompt_end=options.prompt_end or PROMPT_S)
     follower = MovesFollower(network, network)
-    continue_prompt(options, follower, network, opened.dataset, say, is_quick=True)
+    with logged(console):
+        continue_prompt(options, follower, network, opened.dataset, is_quick=True)
 
 
 def continue_prompt(
@@ -49,7 +48,6 @@ def continue_prompt(
     follower: Follower,
     moves: MovedJoints,
     dataset: Dataset,
-    say: Say,
     is_quick: bool = False,
 ) -> None:
     """The prompt and what the improviser dances after it, with a report and a picture.
@@ -64,7 +62,7 @@ def continue_prompt(
         else excerpt_of(options.prompt, 0.0, end, moves, dataset, options.reading)
     )
     asked = options.phrase
-    say("dancing on after the prompt, and planting the feet ...")
+    _log.info("dancing on after the prompt, and planting the feet ...")
     made = continued(follower, dataset, prompt, asked.seconds, asked.temperature, asked.seed, is_quick)
     figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
     dance, message = made.dance, f"the prompt ends at {made.joined_s:.1f} s"
@@ -73,7 +71,7 @@ def continue_prompt(
         figures, message = {}, f"{' and '.join(options.regions)} only, from {made.joined_s:.1f} s on"
     elif options.prompt is None:
         dance, figures, message = dance.excerpt(made.joined_s), {}, "after a recorded moment"
-    say("measuring the dance and the recordings, and drawing the strip ...")
+    _log.info("measuring the dance and the recordings, and drawing the strip ...")
     natural = measure(dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
     report = {"phrase": asdict(asked), **figures, "naturalness": natural.as_json()}
     write_dance(options.out, dance, f"{options.out.stem}: {message}", report, rows=3)
@@ -82,7 +80,7 @@ def continue_prompt(
         "in the prompt."
     )
     Console().print(naturalness_table({options.out.stem: natural}))
-    say(f"{options.out}: {dance.seconds:.1f} s; {message}.{seam if figures else ''}")
+    _log.info(f"{options.out}: {dance.seconds:.1f} s; {message}.{seam if figures else ''}")
 
 
 def _in_regions(

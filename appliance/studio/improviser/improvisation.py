@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -36,21 +36,23 @@ from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSetti
 from appliance.studio.improviser.prompt import MovesFollower
 from appliance.studio.improviser.steps import WindowCoder
 from appliance.studio.model_uses import IMPROVISER
+from appliance.studio.progress import logged
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
 
-Say = Callable[[str], None]
+_log = logging.getLogger(__name__)
 
 
 def run(options: ImproviseOptions) -> bool:
     """Train if no model is given, improvise, write. False if stopped before the end; raises StudioError."""
     console = Console(stderr=True)
+    with logged(console):
+        return _run(options, console)
+
+
+def _run(options: ImproviseOptions, console: Console) -> bool:
     if options.threads:
         torch.set_num_threads(options.threads)
-
-    def say(message: str) -> None:
-        console.print(message, highlight=False, soft_wrap=True)
-
     state = None if options.model is None else _improviser_state(options.model)
     if state is not None and state["settings"]["network"] == PoseMixturesSettings.network:
         assert options.model is not None
@@ -59,7 +61,7 @@ def run(options: ImproviseOptions) -> bool:
         dataset = trained_on(
             options.model, published.joints, state, options.recordings, console, options.reading
         )
-        continue_prompt(options, published, published, dataset, say)
+        continue_prompt(options, published, published, dataset)
         return True
     coder, puppet_state, puppet = _puppet(options, state)
     require_room(options.out.parent)
@@ -68,18 +70,18 @@ def run(options: ImproviseOptions) -> bool:
     if state is not None and options.model is not None:
         improviser, settings, learned = load_improviser(options.model)[0], state["settings"], state["step"]
     else:
-        training = _training(options, coder.autoencoder, dataset, steps, say)
+        training = _training(options, coder.autoencoder, dataset, steps)
         file = improviser_file(options.out)
         if not train_until_done(training, file, file.with_suffix(".png"), console):
-            say("Stopped; nothing is lost. The same command continues.")
+            _log.info("Stopped; nothing is lost. The same command continues.")
             return False
         improviser, settings, learned = training.averaged, asdict(training.settings), training.step
     if options.prompt is not None:
         continue_prompt(
-            options, MovesFollower(WindowCoder(coder.autoencoder), Networks(improviser)), coder, dataset, say
+            options, MovesFollower(WindowCoder(coder.autoencoder), Networks(improviser)), coder, dataset
         )
         return True
-    phrase, natural = make_phrase(coder.autoencoder, improviser, dataset, steps, options.phrase, say)
+    phrase, natural = make_phrase(coder.autoencoder, improviser, dataset, steps, options.phrase)
     report: dict[str, Any] = {
         "phrase": asdict(options.phrase),
         "improviser": {"settings": settings, "steps": learned},
@@ -89,7 +91,7 @@ def run(options: ImproviseOptions) -> bool:
     title = f"{options.out.stem}: {phrase.seconds:.0f} s, seed {options.phrase.seed}"
     write_dance(options.out, phrase, title, report, rows=3)
     Console().print(naturalness_table({options.out.stem: natural}))
-    say(f"{options.out}: {verdict(natural)}")
+    _log.info(f"{options.out}: {verdict(natural)}")
     return True
 
 
@@ -136,7 +138,7 @@ def _puppet(
 
 
 def _training(
-    options: ImproviseOptions, autoencoder: Autoencoder, dataset: Dataset, steps: list[Steps], say: Say
+    options: ImproviseOptions, autoencoder: Autoencoder, dataset: Dataset, steps: list[Steps]
 ) -> ImproviserTraining:
     """The training stored beside the phrase, if it is for the same autoencoder; else a new one."""
     settings = ImproviserSettings(seed=options.phrase.seed, minutes=options.minutes, steps=options.steps)
@@ -146,10 +148,10 @@ def _training(
         return training
     state = load_state(file)
     if state["origin"] != training.origin or state["shape"] != asdict(training.improviser.shape):
-        say(f"{file} belongs to another autoencoder and is replaced.")
+        _log.info(f"{file} belongs to another autoencoder and is replaced.")
         return training
     training.restore(state)
     # The phrase may have another seed than the improviser's training.
     training.settings = replace(settings, seed=state["settings"]["seed"])
-    say(f"{file} continues at {100 * training.fraction:.0f} %.")
+    _log.info(f"{file} continues at {100 * training.fraction:.0f} %.")
     return training

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +28,8 @@ from appliance.studio.improviser.steps import WindowCoder
 from appliance.studio.improviser.stretches import best_stretches
 from appliance.studio.studio_error import StudioError
 
+_log = logging.getLogger(__name__)
+
 SEAM_S = 0.8  # length of the crossfade from the end to the start
 STAGE_M = 3.6  # width and depth of the root's path; arms and steps need the rest of 4 m
 STROLL_FRAMES = 401  # slower motion than this is the way over the stage, not steps
@@ -38,7 +41,6 @@ def make_phrase(
     dataset: Dataset,
     recorded: Sequence[Steps],
     options: PhraseOptions,
-    say: Callable[[str], None] = lambda message: None,
 ) -> tuple[Recording, Naturalness]:
     """Improvise several dances, take the stretches that close best, make them endless, keep the best.
 
@@ -46,9 +48,7 @@ def make_phrase(
     """
     moving, still = dataset.moving, dataset.still_pose()
     coder = WindowCoder(autoencoder)
-    dances = [
-        _motion(coder, dance, dataset, still) for dance in improvise(improviser, recorded, options, say)
-    ]
+    dances = [_motion(coder, dance, dataset, still) for dance in improvise(improviser, recorded, options)]
     yardstick = Yardstick.of(dataset.training, moving)
     stretches = best_stretches(dances, yardstick, options.seconds, STAGE_M, SEAM_S, options.finalists)
     if not stretches:
@@ -59,7 +59,7 @@ def make_phrase(
         again = replace(closed, poses=danced_again(coder, closed.poses, moving, cyclic=True))
         phrase = on_stage(plant_feet(on_stage(again), options.settling))
         natural = measure(phrase, yardstick)
-        say(f"candidate {number} of {len(stretches)}: {verdict(natural)}")
+        _log.info(f"candidate {number} of {len(stretches)}: {verdict(natural)}")
         faults = faultiness(natural) + stretch.cost
         if best is None or faults < best[0]:
             best = faults, phrase, natural
@@ -67,9 +67,7 @@ def make_phrase(
     return best[1], best[2]
 
 
-def improvise(
-    improviser: Improviser, recorded: Sequence[Steps], options: PhraseOptions, say: Callable[[str], None]
-) -> list[Steps]:
+def improvise(improviser: Improviser, recorded: Sequence[Steps], options: PhraseOptions) -> list[Steps]:
     """Dances, each of which continues another recorded stretch. Raises StudioError without a long one."""
     rng = np.random.default_rng(options.seed)
     long = [stretch for stretch in recorded if len(stretch) >= PRIMER]
@@ -83,7 +81,7 @@ def improvise(
         first = int(rng.integers(len(long[number]) - PRIMER + 1))
         starts.append(torch.tensor(long[number].features[first : first + PRIMER]))
     moves = int(np.ceil(options.minutes * 60 * STEPS_S / MOVE))
-    say(f"improvising {options.dances} dances of {options.minutes:g} minutes")
+    _log.info(f"improvising {options.dances} dances of {options.minutes:g} minutes")
     danced = improviser.improvise(torch.stack(starts), moves, options.temperature, options.seed)
     return [Steps.of_features(dance.numpy()) for dance in danced]
 
