@@ -310,6 +310,15 @@ def test_the_keyboard_opens_the_other_pages_and_comes_back(tab: Tab) -> None:
     assert more.get_attribute("aria-current") is None
 
 
+def test_an_address_that_names_a_page_begins_at_its_top(tab: Tab, venue: tuple[Box, Page]) -> None:
+    """Browsers scroll to what an address names: the tabs would be out of view."""
+    press(tab, '[data-page="device"]')
+    tab.goto(f"{venue[1].origin}/#tonight")
+    expect(tab.locator("#tonight")).to_be_visible()
+    tab.wait_for_timeout(500)
+    assert tab.evaluate("[scrollY, document.documentElement.scrollHeight > innerHeight]") == [0, True]
+
+
 @ON_A_LAPTOP
 def test_the_keyboard_reaches_panic(tab: Tab, venue: tuple[Box, Page]) -> None:
     box, page = venue
