@@ -11,7 +11,6 @@ import logging
 import os
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from queue import SimpleQueue
@@ -46,8 +45,7 @@ class LogWriter(logging.Handler):
         self._records: SimpleQueue[tuple[str, int] | None] = SimpleQueue()
         self.dropped = self._reported = 0
         self._file: Path | None = None
-        self._last: deque[str] = deque(maxlen=MOST_SAID)
-        self._since_whole = 0  # lines since the file was written as a whole
+        self._in_file = 0  # records
         self._thread = threading.Thread(target=self._write_all, name="log writer", daemon=True)
         self._thread.start()
 
@@ -96,13 +94,16 @@ class LogWriter(logging.Handler):
             os.write(self._descriptor, f"{text}\n".encode(errors="backslashreplace"))
 
     def _keep(self, line: str) -> None:
-        self._last.append(line)
         if self._file is None:
             return
-        self._since_whole = (self._since_whole + 1) % MOST_SAID
-        said, mode = (line, "ab") if self._since_whole else ("".join(self._last), "wb")
-        with contextlib.suppress(OSError), self._file.open(mode) as stream:
-            stream.write(said.encode(errors="backslashreplace"))
+        with contextlib.suppress(OSError):
+            if self._in_file >= 2 * MOST_SAID:
+                self._in_file = MOST_SAID
+                last = self._file.read_bytes().splitlines(keepends=True)[-MOST_SAID:]
+                self._file.write_bytes(b"".join(last))
+            with self._file.open("ab") as stream:
+                stream.write(line.encode(errors="backslashreplace"))
+            self._in_file += 1
 
 
 class LibraryLimit(logging.Filter):

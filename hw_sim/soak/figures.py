@@ -119,7 +119,8 @@ def limits_of(soak: Soak) -> list[Limit]:
             Limit(
                 f"own memory and handles of {one.name}",
                 f"{message} in {_time(one.lived_s)}",
-                f"at most {MOST_GROWTH_MB:g} MB more after the first minute, no more handles or threads",
+                f"the last quarter has at most {MOST_GROWTH_MB:g} MB more than the first half, and no more "
+                "handles or threads",
                 one.own_mb <= MOST_GROWTH_MB and one.handles <= 0 and one.threads <= 0,
             )
         )

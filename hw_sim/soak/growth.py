@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from statistics import median
+from typing import TypeVar
 
 from hw_sim.soak.unit import Unit
 from hw_sim.soak.vitals import Vitals
@@ -11,27 +12,27 @@ from hw_sim.soak.vitals import Vitals
 FIRST_MINUTE_S = 60.0
 WINDOW_S = 10.0  # figures of memory are medians over this window
 _SHORTEST_LIFE_S = 3.0
+N = TypeVar("N", int, float)
 
 
 @dataclass(frozen=True)
 class Growth:
     """Resources of one process after its first minute, and at the end; it has lived for `lived_s`.
 
-    Memory is a median over some seconds. Handles and threads come and go, with receivers or for an instant:
-    what the last quarter has more than the first half, at its least and at its most, was not given back.
+    Memory is a median over some seconds. Handles and threads come and go, with receivers or for an instant,
+    and a generator has twice the memory while it makes a phrase: what the last quarter has more than the
+    first half, at its least and at its most, was not given back.
+
+    own_mb: memory that no file backs; of mapped motions that stay, the handles tell.
     """
 
     name: str
     lived_s: float
     first: Vitals
     last: Vitals
+    own_mb: float
     handles: int
     threads: int
-
-    @property
-    def own_mb(self) -> float:
-        """Memory that no file backs; of mapped motions that stay, the handles tell."""
-        return self.last.anonymous_mb - self.first.anonymous_mb
 
 
 def growth(unit: Unit, run_s: float) -> Growth | None:
@@ -53,13 +54,23 @@ def growth(unit: Unit, run_s: float) -> Growth | None:
     half, quarter = after[: len(after) // 2 + 1], after[-(len(after) // 4 + 1) :]
     return Growth(
         *(unit.name, history[-1][0] - history[0][0], _summary(early, half), _summary(late, quarter)),
+        _more(_medians(half), _medians(quarter)),
         _more([held.handles for held in half], [held.handles for held in quarter]),
         _more([held.threads for held in half], [held.threads for held in quarter]),
     )
 
 
-def _more(before: list[int], after: list[int]) -> int:
+def _more(before: list[N], after: list[N]) -> N:
     return min(min(after) - min(before), max(after) - max(before))
+
+
+def _medians(held: list[Vitals]) -> list[float]:
+    """Own memory over windows of about WINDOW_S, MB."""
+    window = min(len(held), round(WINDOW_S))
+    return [
+        median(one.anonymous_mb for one in held[first : first + window])
+        for first in range(0, len(held) - window + 1, window)
+    ]
 
 
 def _summary(window: list[Vitals], while_: list[Vitals]) -> Vitals:

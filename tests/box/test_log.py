@@ -16,7 +16,16 @@ from typing import Any
 
 import pytest
 
-from appliance.box.log import LINES, OURS, PERIOD_S, WAITING_LINES, LibraryLimit, LogWriter, process_log
+from appliance.box.log import (
+    LINES,
+    MOST_SAID,
+    OURS,
+    PERIOD_S,
+    WAITING_LINES,
+    LibraryLimit,
+    LogWriter,
+    process_log,
+)
 
 
 @pytest.fixture
@@ -107,6 +116,24 @@ def test_the_page_still_gets_the_lines_when_the_terminal_is_gone(
     _ended()
     kept = (tmp_path / "said").read_text().splitlines()
     assert [line.partition(" ")[2] for line in kept] == ["The show begins.", "The show goes on."]
+
+
+def test_the_file_for_the_page_stays_small_and_is_there_again_when_it_was_removed(
+    tmp_path: Path, pipe: tuple[FileIO, int]
+) -> None:
+    """A stage of an evening has no memory for each line that it logged."""
+    pipe[0].close()
+    writer, file = LogWriter(pipe[1]), tmp_path / "said"
+    writer.keep_in(file)
+    for number in range(2 * MOST_SAID + 2):
+        writer._write(f"line {number}", logging.INFO)
+    lines = file.read_text().splitlines()
+    assert len(lines) == MOST_SAID + 2 and lines[-1].endswith(f" line {2 * MOST_SAID + 1}")
+    file.unlink()
+    for number in range(MOST_SAID):
+        writer._write(f"line {number}", logging.INFO)
+    assert file.read_text().endswith(f" line {MOST_SAID - 1}\n")
+    writer.close()
 
 
 def test_the_tick_hands_a_line_over_without_a_lock(

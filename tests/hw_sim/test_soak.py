@@ -223,7 +223,7 @@ def lived(tmp_path: Path, megabytes: list[float], handles: list[int]) -> Unit:
 
 def test_growth_counts_from_the_first_minute_on(tmp_path: Path) -> None:
     start = [50.0 + second for second in range(60)]
-    unit = lived(tmp_path, [*start, *[110.0] * 240, *[110.7] * 20], [9] * 320)
+    unit = lived(tmp_path, [*start, *[110.0] * 180, *[110.7] * 80], [9] * 320)
     grown = growth(unit, 320.0)
     assert grown is not None
     assert grown.own_mb == pytest.approx(0.7)
@@ -240,8 +240,18 @@ def test_handles_that_come_and_go_are_no_leak_and_more_each_time_are(tmp_path: P
     assert leaking.handles > 0
 
 
+def test_memory_that_comes_and_goes_is_no_leak_and_more_each_time_is(tmp_path: Path) -> None:
+    """As a generator's: it is small until it makes its first phrase."""
+    makes = [30.0] * 100 + [60.0 + 15.0 * (second // 20 % 3) for second in range(500)]
+    steady = growth(lived(tmp_path, makes, [9] * 600), 600.0)
+    leaking = growth(lived(tmp_path, [mb + 0.01 * s for s, mb in enumerate(makes)], [9] * 600), 600.0)
+    assert steady is not None and leaking is not None
+    assert steady.own_mb <= 0.0
+    assert leaking.own_mb > 2.0
+
+
 def test_the_longest_life_is_judged(tmp_path: Path) -> None:
-    unit = lived(tmp_path, [50.0] * 200 + [53.0] * 200, [9] * 400)
+    unit = lived(tmp_path, [50.0] * 240 + [53.0] * 160, [9] * 400)
     unit.longest, unit.history = unit.history, unit.history[:5]
     grown = growth(unit, 400.0)
     assert grown is not None
