@@ -6,20 +6,17 @@ process can be left behind: the kernel ends it as soon as the disk answers.
 
 from __future__ import annotations
 
-import gc
 import json
 import logging
 import os
 import signal
 import socket
-import traceback
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
-from typing import NoReturn
 
 from appliance.box.checkpoint import CheckpointReader
 from appliance.box.pace import Pace
-from appliance.box.parent_death import end_with
+from appliance.box.parent_death import forked
 from appliance.keeper.mirror import LOOK_S, RETRY_S, TURN_S, Mirror, Mirrored, mirror_until
 
 _log = logging.getLogger(__name__)
@@ -101,10 +98,7 @@ class MirrorProcess:
                 ours, theirs = map(
                     failing.enter_context, socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
                 )
-                parent = os.getpid()
-                self._process = os.fork()
-                if not self._process:
-                    self._run(theirs, parent)
+                self._process = forked(lambda: self._run(theirs))
                 theirs.close()
                 failing.pop_all()
         except OSError as error:
@@ -163,26 +157,19 @@ class MirrorProcess:
             _log.warning(trouble)
         self._trouble = trouble
 
-    def _run(self, channel: socket.socket, parent: int) -> NoReturn:
-        """In the new process; does not return."""
-        status = 1
-        try:
-            _detach(channel, parent)
-            logging.getLogger().handlers = [_ToParent(channel)]  # the parent's has no thread here
-            mirror = Mirror(self._mirrored)
-            with closing(CheckpointReader(self._runtime)) as place:
-                mirror_until(
-                    lambda: _is_closed(channel),
-                    mirror,
-                    place.goes_on,
-                    self._end_s,
-                    lambda: _send(channel, _TURN, mirror.complaint),
-                )
-            status = 0
-        except Exception:
-            traceback.print_exc()
-        finally:
-            os._exit(status)
+    def _run(self, channel: socket.socket) -> None:
+        """In the new process."""
+        _detach(channel)
+        logging.getLogger().handlers = [_ToParent(channel)]  # the parent's has no thread here
+        mirror = Mirror(self._mirrored)
+        with closing(CheckpointReader(self._runtime)) as place:
+            mirror_until(
+                lambda: _is_closed(channel),
+                mirror,
+                place.goes_on,
+                self._end_s,
+                lambda: _send(channel, _TURN, mirror.complaint),
+            )
 
 
 class _ToParent(logging.Handler):
@@ -196,12 +183,10 @@ class _ToParent(logging.Handler):
         _send(self._channel, record.levelno, self.format(record))
 
 
-def _detach(channel: socket.socket, parent: int) -> None:
+def _detach(channel: socket.socket) -> None:
     """End only with the parent, and hold none of its locks, files and sockets."""
-    gc.freeze()  # unused objects of the parent would close descriptors that are others by then
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):  # systemd and a terminal send them to all
         signal.signal(number, signal.SIG_IGN)
-    end_with(parent, signal.SIGKILL)
     own = channel.fileno()
     os.closerange(3, own)
     os.closerange(own + 1, os.sysconf("SC_OPEN_MAX"))

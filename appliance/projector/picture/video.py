@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+import signal
 import subprocess
 import threading
 import time
@@ -11,6 +12,7 @@ from typing import IO
 
 import moderngl
 
+from appliance.box.child import end_child, start_child
 from appliance.projector.picture.image_file import LINES, MOST_WIDE
 
 _log = logging.getLogger(__name__)
@@ -58,7 +60,7 @@ class Video:
         fits = f"scale=min(iw\\,{MOST_WIDE}):min(ih\\,{LINES}):force_original_aspect_ratio=decrease"
         command += ["-vf", f"{fits},vflip", "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]
         try:
-            self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
+            self._process = start_child(command, stdout=subprocess.PIPE)
         except OSError as error:
             self._is_unplayable = True
             _log.warning(
@@ -83,8 +85,7 @@ class Video:
     def _stop(self) -> None:
         process, self._process = self._process, None
         if process is not None:
-            process.kill()
-            process.wait()
+            end_child(process, 0.0, signal.SIGKILL)
 
 
 def _ppm(pipe: IO[bytes]) -> _Picture | None:
