@@ -89,7 +89,7 @@ class Stage:
                 *_network_of_a_pair(box),
             )
             opened.callback(self.parts.close)
-            if self.parts.led.live is not None:
+            if self.parts.has_live:
                 self.parts.live_inbox = LivePoseReader(self.sharing.folder)
             self.inbox = _open_inbox(self.sharing.folder)
             opened.callback(self.inbox.close)

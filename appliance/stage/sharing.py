@@ -136,7 +136,7 @@ class Sharing:
         parts = reconciler.parts
         reported = health.snapshot(now)
         reported |= {
-            "state": "dancing" if parts.led.motion.rate else "stopped",
+            "state": "dancing" if parts.rate else "stopped",
             "sensor_age_s": None if sensor_age_s in (None, float("inf")) else sensor_age_s,
             "locked": locked,
             "liveliness": parts.liveliness.level,
