@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from appliance.box.durable import alone_in, private_folder, write_beside, write_whole
 from appliance.box.served import is_loopback
 from appliance.cli.preflight import LATE_TURN_S, late_candidate_problems, publish
-from appliance.release.adoption import Outcome, Places, adopt, read_choice
+from appliance.release.adoption import BoxFolders, Outcome, adopt, read_choice
 from appliance.release.arrivals import BOX, SHOW, Arrival, look
 from appliance.release.choice import CHOSEN, Choice
 from appliance.release.packed_show import require_known_maker, unpack_show
@@ -102,7 +102,7 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
     if not wanted.sure and (asks := list(_questions(_before(place), config))):
         return {"problems": [], "asks": asks}
     if chosen is not None:
-        arrival = _places(chosen).data / FROM_PAGE
+        arrival = _box_folders(chosen).data / FROM_PAGE
         arrival.mkdir(mode=0o700, exist_ok=True)
         write_whole(arrival / BOX, text.encode())
         return _adopt(chosen, look(FROM_PAGE, arrival), "box file", wanted.now)
@@ -143,15 +143,15 @@ def dance_again(chosen: Path, show: str) -> dict[str, Any]:
     here = Choice.read(chosen)
     if here is None:
         raise StageError("The show that this box chose at power-on cannot be read. Run bunraku doctor.")
-    places = Places(here.data, chosen.parent)
-    with _alone(places):
-        saved = read_choice(places.data)
+    folders = BoxFolders(here.data, chosen.parent)
+    with _alone(folders):
+        saved = read_choice(folders.data)
         pair = next((one for one in (*saved.pairs, *here.pairs) if one.id == show and one.is_there), None)
         if pair is None or not pair.id:
             raise StageError("This show is not kept on the box any more. Bring it on a stick.")
         choice = saved.with_newest(pair)
-        choice._replace(data=places.data).write(places.data / CHOSEN)
-        publish(places, Outcome(choice, True, ()), True, _AT_ONCE, restarts=False)
+        choice._replace(data=folders.data).write(folders.data / CHOSEN)
+        publish(folders, Outcome(choice, True, ()), True, _AT_ONCE, restarts=False)
     return {"message": f"The {pair.source} dances again, and after the next power-on too.", "anew": True}
 
 
@@ -211,26 +211,26 @@ def _questions(before: BoxConfig, after: BoxConfig) -> Iterator[str]:
 
 
 @contextlib.contextmanager
-def _alone(places: Places) -> Iterator[None]:
+def _alone(folders: BoxFolders) -> Iterator[None]:
     """No preflight meanwhile. Raises StageError where one does not end: it may check a show from a stick."""
     try:
-        with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
+        with alone_in(folders.data, LATE_TURN_S), alone_in(folders.run, LATE_TURN_S):
             yield
     except BlockingIOError:
         raise StageError("The box is checking a show from a stick. Try again in a few minutes.") from None
 
 
-def _places(chosen: Path) -> Places:
-    return Places((Choice.read(chosen) or Choice()).data, chosen.parent)
+def _box_folders(chosen: Path) -> BoxFolders:
+    return BoxFolders((Choice.read(chosen) or Choice()).data, chosen.parent)
 
 
 def _adopt(chosen: Path, arrival: Arrival, what: str, now: bool) -> dict[str, Any]:
     """As from a stick: on the shelf under its content's id, the one before it kept, then tried."""
-    places = _places(chosen)
-    with _alone(places):
-        outcome = adopt(places, [arrival], late_candidate_problems, late=True)
+    folders = _box_folders(chosen)
+    with _alone(folders):
+        outcome = adopt(folders, [arrival], late_candidate_problems, late=True)
         if outcome.taken:
-            publish(places, outcome, True, _AT_ONCE if now else _LATER, restarts=False)
+            publish(folders, outcome, True, _AT_ONCE if now else _LATER, restarts=False)
     if not outcome.taken and outcome.choice.refused:
         return {"problems": [{"line": 0, "message": message} for message in outcome.choice.refused]}
     if not outcome.taken:

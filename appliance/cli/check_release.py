@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from appliance.box.realtime import prepare_environment
-from appliance.release.choice import Pair
+from appliance.release.choice import ShowAndBox
 
 prepare_environment()
 
@@ -27,7 +27,7 @@ def check_release(data: Path) -> int:
     if not problems:
         from appliance.release.adoption import read_choice
 
-        for pair in (Pair(), *read_choice(data).pairs[:1]):
+        for pair in (ShowAndBox(), *read_choice(data).pairs[:1]):
             problems += _undanced(pair)
     for message in problems:
         print(message, file=sys.stderr)
@@ -51,7 +51,7 @@ def _missing() -> Iterator[str]:
                 print(f"{found.name} cannot be imported ({error}): no picture on this machine.")
 
 
-def _undanced(pair: Pair) -> list[str]:
+def _undanced(pair: ShowAndBox) -> list[str]:
     """Why this release does not dance a show in time; empty if it does."""
     try:
         usual_ms, budget_ms = _danced(pair)
@@ -63,7 +63,7 @@ def _undanced(pair: Pair) -> list[str]:
     return []
 
 
-def _danced(pair: Pair) -> tuple[float, float]:
+def _danced(pair: ShowAndBox) -> tuple[float, float]:
     """The usual cost of a tick in processor time, and its budget, ms: the stage's own tick, without ports."""
     from appliance.box.clock import TICK_S, Slot
     from appliance.cli.check import verified_parts, without_ports

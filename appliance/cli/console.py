@@ -29,7 +29,7 @@ from appliance.cli.options import (
 from appliance.cli.page_address import address, address_of, open_console_port
 from appliance.cli.phones import offer_phones, out_of_phones_reach, phone_names
 from appliance.console.devices import Devices
-from appliance.console.settings import WHERE, Settings
+from appliance.console.settings import WHERE, ConsoleSettings
 from appliance.console.update_code import pending_code
 from appliance.show.config_error import NotAskedForError, Problem
 from appliance.stage.stage_error import StageError
@@ -221,7 +221,7 @@ def console_command(
         host, port = opened.getsockname()[:2]
         (folder / WHERE).write_text(f"{devices}\n{host}\n{port}\n{'https' * console.https}\n")
     write_report_settings(folder, console.report)
-    settings = Settings(
+    settings = ConsoleSettings(
         folder=str(folder),
         descriptor=descriptor,
         devices=str(devices),

@@ -23,7 +23,7 @@ from appliance.show.foreign_sensors import ForeignSensorConfig
 from appliance.show_control.foreign_sensors import ForeignPort
 from appliance.show_control.packet import datagram
 from appliance.show_control.port import open_port
-from appliance.show_control.settings import Settings
+from appliance.show_control.settings import ControlSettings
 from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
     Raises RuntimeFolderError.
     """
     control = box.control or ControlConfig()
-    settings = Settings(
+    settings = ControlSettings(
         folder=str(runtime_folder(box)),
         descriptor=descriptor,
         senders=tuple(control.senders),

@@ -16,7 +16,7 @@ import yaml
 from appliance.box.child import BUNRAKU, environment, finished
 from appliance.recorder.export import export_stretch
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.show.config_error import ConfigError
 from appliance.show.yaml_file import read_yaml
 

@@ -20,7 +20,7 @@ from appliance.release.installed_box import box_here
 from appliance.show_control.packet import readable
 
 if TYPE_CHECKING:
-    from appliance.recorder.reading import Run
+    from appliance.recorder.journal_reader import Run
 
 STICK = Path("/media/bunraku")
 _TROUBLES = ("late", "skipped", "failed")
@@ -42,7 +42,7 @@ def list_journal(
     ] = False,
 ) -> None:
     """List the runs in a journal: when, how long, what was late, how often the network failed."""
-    from appliance.recorder.reading import read_journal
+    from appliance.recorder.journal_reader import read_journal
     from appliance.recorder.timeline import message_of
 
     for number, run in enumerate(read_journal(_recorded(box, chosen, recorded)).runs, 1):
@@ -60,7 +60,7 @@ def show_timeline(
     as_json: Annotated[bool, typer.Option("--json", help="As JSON, for programs.")] = False,
 ) -> None:
     """Show minute by minute what was late or skipped, and how long the slowest tick took."""
-    from appliance.recorder.reading import read_journal
+    from appliance.recorder.journal_reader import read_journal
     from appliance.recorder.timeline import timeline
 
     read = read_journal(_recorded(box, chosen, recorded)).runs
@@ -115,7 +115,7 @@ def export_journal(
         if to is not None or bvh is not None or glb is not None:
             raise typer.BadParameter("--training writes a folder: leave the others out")
         from appliance.exchange.training_set import write_training_set
-        from appliance.recorder.reading import read_journal
+        from appliance.recorder.journal_reader import read_journal
 
         typer.echo(write_training_set(read_journal(source), training).sentence())
         return

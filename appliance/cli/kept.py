@@ -33,14 +33,14 @@ def kept(
     """
     from appliance.exchange.exchange_error import ExchangeError
     from appliance.exchange.formats import known_ending, write_recording
-    from appliance.release.installed_box import pair_here
+    from appliance.release.installed_box import show_and_box_here
     from appliance.show.box import load_box
     from appliance.show.bundle import default_show_path
     from appliance.show.show import load_show
 
     if name is None:
         refuse_idle(context, ("out",), "without the NAME of a motion")
-    show, box = pair_here(show, box)
+    show, box = show_and_box_here(show, box)
     skeleton, state = load_show(show or default_show_path()).skeleton, load_box(box).state_folder
     if state is None:
         print(

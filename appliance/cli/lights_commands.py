@@ -55,9 +55,9 @@ def walk_through(
 ) -> None:
     """Walk through the rig, fixture by fixture, attribute by attribute, and say what should be seen."""
     from appliance.lights.rig_walk import walk_rig
-    from appliance.release.installed_box import pair_here
+    from appliance.release.installed_box import show_and_box_here
 
-    show, box = pair_here(show, box)
+    show, box = show_and_box_here(show, box)
     with _named_options():
         walk_rig(show, box, fixture or [], attribute, seconds)
 

@@ -103,7 +103,7 @@ def use_rehearsal(journal: str, into: str) -> Any:
 
     from appliance.exchange.training_set import write_training_set
     from appliance.recorder.journal_error import JournalError
-    from appliance.recorder.reading import read_journal
+    from appliance.recorder.journal_reader import read_journal
 
     written = write_training_set(read_journal(Path(journal)), Path(into))
     if not written.recordings:
@@ -152,7 +152,7 @@ def help_file(
 
 def timelines(journal: str) -> Any:
     """All runs of a journal."""
-    from appliance.recorder.reading import read_journal
+    from appliance.recorder.journal_reader import read_journal
     from appliance.recorder.timeline import timeline
 
     return [timeline(number, run) for number, run in enumerate(read_journal(Path(journal)).runs, 1)]
@@ -165,7 +165,7 @@ def stretch(journal: str, run: int, start: float, seconds: float, out: str | Non
     from appliance.pose.recording import Recording
     from appliance.recorder.export import export_stretch
     from appliance.recorder.journal_error import JournalError
-    from appliance.recorder.reading import EXPORTED, read_journal
+    from appliance.recorder.journal_reader import EXPORTED, read_journal
     from appliance.recorder.timeline import stretch
 
     runs = read_journal(Path(journal)).runs

@@ -17,7 +17,7 @@ from appliance.pose.file_trouble import sentence
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, read_upright
 from appliance.pose.recording import Recording
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.recorder.record import holds_of
 from appliance.show.bundle import named_show
 from appliance.show.look import looks_by_name

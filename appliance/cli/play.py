@@ -75,7 +75,7 @@ def play_show(
     Raises ConfigError, StageError.
     """
     if chosen is not None:
-        directory, box_file = _pair_to_dance(chosen, directory, box_file)
+        directory, box_file = _chosen_to_dance(chosen, directory, box_file)
     show, box = load_show(named_show(directory) or default_show_path()), load_box(box_file)
     if phone:
         from appliance.cli.phones import with_phone
@@ -159,15 +159,15 @@ def play_show(
     return 0
 
 
-def _pair_to_dance(chosen: Path, directory: Path | None, box_file: Path | None) -> tuple[Path, Path]:
+def _chosen_to_dance(chosen: Path, directory: Path | None, box_file: Path | None) -> tuple[Path, Path]:
     """Show and box file that the preflight chose; their start is counted."""
     from appliance.release.choice import require_no
-    from appliance.release.trial import pair_to_dance
+    from appliance.release.trial import chosen_to_dance
 
     require_no("--show", directory, chosen)
     require_no("--box", box_file, chosen)
     with process_log():
-        pair = pair_to_dance(chosen, time.monotonic())
+        pair = chosen_to_dance(chosen, time.monotonic())
     return pair.show, pair.box
 
 

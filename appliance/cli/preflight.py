@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from appliance.box.durable import alone_in
 from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, run_with_timeout
-from appliance.release.adoption import Outcome, Places, adopt, built_in_box, chosen_before
+from appliance.release.adoption import BoxFolders, Outcome, adopt, built_in_box, chosen_before
 from appliance.release.arrivals import look
 from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice
 
@@ -39,38 +39,38 @@ class Options(NamedTuple):
 
 def preflight(options: Options, uptime_s: float) -> int:
     """Write chosen.json into the run folder; 0 once it is there, 1 if it cannot be written."""
-    places = Places(options.data, options.run)
+    folders = BoxFolders(options.data, options.run)
     if options.late:
         with contextlib.suppress(OSError):  # the unit has set it already and allows no change
             os.nice(19)
     try:
         if not options.late:  # this dances even if the new show ends this process
-            _say(publish(places, Outcome(chosen_before(places), False, ()), False, uptime_s))
+            _say(publish(folders, Outcome(chosen_before(folders), False, ()), False, uptime_s))
         patience_s = LATE_TURN_S if options.late else TURN_S
         with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
-            outcome = _found(options, places)
+            outcome = _found(options, folders)
             for message in outcome.messages:
                 _say(message)
-            _say(publish(places, outcome, options.late, uptime_s))
+            _say(publish(folders, outcome, options.late, uptime_s))
     except BlockingIOError:
         _say("Another preflight has not ended. The show before goes on. Plug the stick in again.")
     except OSError as error:
         _say(
-            f"{places.run}: what was chosen cannot be written there ({error.strerror}). The audience "
+            f"{folders.run}: what was chosen cannot be written there ({error.strerror}). The audience "
             "sees the show that comes with the box. Check the owner of this folder."
         )
         return _NOT_WRITTEN
     return 0
 
 
-def _found(options: Options, places: Places) -> Outcome:
+def _found(options: Options, folders: BoxFolders) -> Outcome:
     """The choice; a stick is read in a process that can be killed."""
     boot = options.boot or next((one for one in BOOTS if _is_folder(one)), BOOTS[-1])
 
     def chosen() -> Outcome:
         arrivals = [look("stick", options.stick), look("boot", boot)]
         check = late_candidate_problems if options.late else candidate_problems
-        return adopt(places, arrivals, check, options.late)
+        return adopt(folders, arrivals, check, options.late)
 
     try:
         if _is_folder(options.stick):
@@ -81,7 +81,7 @@ def _found(options: Options, places: Places) -> Outcome:
         message = f"The stick could not be read ({error}). The show before goes on. Try another stick."
     except Exception as error:
         message = f"The new show cannot be checked ({error!r}). The show before goes on. Copy it again."
-    outcome = adopt(places, [], candidate_problems)
+    outcome = adopt(folders, [], candidate_problems)
     return Outcome(outcome.choice._replace(refused=(message, *outcome.choice.refused)), False, (message,))
 
 
@@ -93,25 +93,25 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def publish(places: Places, outcome: Outcome, late: bool, uptime_s: float, restarts: bool = True) -> str:
+def publish(folders: BoxFolders, outcome: Outcome, late: bool, uptime_s: float, restarts: bool = True) -> str:
     """Write the choice where all processes look for it; when it dances, in a sentence or none.
 
     A show that has run for long is not interrupted.
 
     restarts: the units start anew with it; else the caller sees to that.
     """
-    path = places.run / CHOSEN
+    path = folders.run / CHOSEN
     before = Choice.read(path) if late else None
     if before is not None and (not outcome.taken or uptime_s >= _AT_ONCE_S):
         before._replace(refused=outcome.choice.refused).write(path)
         if outcome.taken:
             return "The running show goes on. The new one dances after the next power-on."
         return ""
-    choice = outcome.choice.complete(built_in_box(places))._replace(data=places.data)
+    choice = outcome.choice.complete(built_in_box(folders))._replace(data=folders.data)
     aside = () if before is None else before.aside  # also what the stage put aside during the checks
     choice.without(Choice(aside=tuple(one for one in aside if one.id != choice.first.id))).write(path)
     if before is not None and restarts:
-        (places.run / ANEW).touch()
+        (folders.run / ANEW).touch()
         return "The box was switched on only just now: the new show dances at once."
     return ""
 

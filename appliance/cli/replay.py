@@ -10,7 +10,7 @@ import typer
 
 from appliance.recorder.environment import differing_files, differing_software, environment
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import Run, read_journal
+from appliance.recorder.journal_reader import Run, read_journal
 from appliance.show.bundle import bundled_shows, default_show_path, named_show
 from appliance.show.show import load_show
 from appliance.show_control.packet import readable

@@ -15,9 +15,9 @@ def main() -> int:
     end_with_parent()
     from appliance.box.log import process_log
     from appliance.console.run import run_console
-    from appliance.console.settings import Settings
+    from appliance.console.settings import ConsoleSettings
 
-    settings = Settings.unpacked(sys.argv[1])
+    settings = ConsoleSettings.unpacked(sys.argv[1])
     with process_log():
         try:
             return run_console(settings)

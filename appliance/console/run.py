@@ -26,13 +26,13 @@ from appliance.box.show_state import ShowStateReader
 from appliance.console import certificate
 from appliance.console.about import About
 from appliance.console.box_view import BoxView
+from appliance.console.browser_hands import BrowserHands
 from appliance.console.certificate import certificate_in, https_context
 from appliance.console.desk import Desk
 from appliance.console.devices import Devices
 from appliance.console.fallback import OF_THE_PAGE, note_crowd
 from appliance.console.fleet import Fleet
 from appliance.console.guard import Guard
-from appliance.console.hands import Hands
 from appliance.console.happened import Happened
 from appliance.console.help import Help
 from appliance.console.learn import Learn
@@ -49,7 +49,7 @@ from appliance.console.rig import Rig
 from appliance.console.seen_stage import SeenStage
 from appliance.console.sensor_changes import SensorChanges
 from appliance.console.server import Server
-from appliance.console.settings import WHERE, Settings
+from appliance.console.settings import WHERE, ConsoleSettings
 from appliance.console.stage_view import StageView
 from appliance.console.update import Update
 from appliance.console.venue import Venue
@@ -65,7 +65,7 @@ _WAITING_CONNECTIONS = 256
 _NAMED_S = 5.0  # how often the certificate is looked at: a network may come after the page
 
 
-def run_console(settings: Settings) -> int:
+def run_console(settings: ConsoleSettings) -> int:
     """Serve the page until SIGTERM or Ctrl-C; the exit status. Raises OSError where it has no place."""
     give_way(_NICER)
     open_more_files()
@@ -73,7 +73,7 @@ def run_console(settings: Settings) -> int:
         return asyncio.run(_serve(settings))
 
 
-async def _serve(settings: Settings) -> int:
+async def _serve(settings: ConsoleSettings) -> int:
     stopped = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
@@ -94,7 +94,7 @@ async def _serve(settings: Settings) -> int:
     learn = Learn(state, settings.journal, settings.box, settings.is_installed, stage)
     night = Night(stage, box, Path(settings.devices).parent, folder)
     helping = Help(box, logs, folder, settings.journal, settings.box)
-    hands, rig = Hands(guard, desk, folder), Rig(folder)
+    hands, rig = BrowserHands(guard, desk, folder), Rig(folder)
     phones = Phones(guard, door, settings.phones, folder, fallbacks)
     others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes(), *phones.routes()]
     update = Update(folder, settings.is_installed, show_goes)
@@ -159,11 +159,11 @@ def _reporting(folder: Path, box: BoxView, fallbacks: Fallbacks) -> list[asyncio
     return [] if wanted is None else [asyncio.create_task(watch(wanted, lambda: box.value, fallbacks))]
 
 
-def _https(settings: Settings) -> ssl.SSLContext:
+def _https(settings: ConsoleSettings) -> ssl.SSLContext:
     return https_context(_certificate(settings))
 
 
-def _certificate(settings: Settings) -> Path:
+def _certificate(settings: ConsoleSettings) -> Path:
     """The file, made anew where it lacks an address or a name that the box has now. Raises OSError."""
     host = socket.gethostname()
     private = (one for _, one in addresses() if ipaddress.ip_address(one).is_private)
@@ -171,7 +171,7 @@ def _certificate(settings: Settings) -> Path:
     return certificate_in(Path(settings.devices).parent, names)
 
 
-async def _renew(context: ssl.SSLContext, settings: Settings, door: Door) -> None:
+async def _renew(context: ssl.SSLContext, settings: ConsoleSettings, door: Door) -> None:
     """For the connections from now on; where none can be made, the one before goes on.
 
     Not while a browser has the page open: it may have accepted that one, and would refuse another, PANIC too.

@@ -11,7 +11,7 @@ WHERE = "console.path"  # in the runtime folder: PIN and devices, host and port 
 
 
 @dataclass(frozen=True)
-class Settings:
+class ConsoleSettings:
     """The port's socket is open already: `descriptor`. control: where commands arrive; None: nowhere.
 
     journal: its folder; None: none is kept. box: the path of its box file as `box`, or of what the preflight
@@ -38,6 +38,6 @@ class Settings:
         return json.dumps(asdict(self))
 
     @classmethod
-    def unpacked(cls, text: str) -> Settings:
+    def unpacked(cls, text: str) -> ConsoleSettings:
         """From that argument."""
         return cls(**with_tuples(json.loads(text)))

@@ -19,7 +19,7 @@ from appliance.pose.counted import counted
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import JournalRecording, Run
+from appliance.recorder.journal_reader import JournalRecording, Run
 from appliance.recorder.timeline import message_of
 
 PUPPET = "puppet"  # folder of what the puppet danced: train does not look into it

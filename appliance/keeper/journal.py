@@ -13,7 +13,7 @@ from appliance.keeper.mirror import RETRY_S
 from appliance.keeper.run_memory import Piece, RunMemory
 from appliance.recorder import chunks, log
 from appliance.recorder.environment import environment, fingerprints
-from appliance.recorder.reading import last_saved
+from appliance.recorder.journal_reader import last_saved
 from appliance.recorder.segments import Segments
 from appliance.show.bundle import default_show_path
 from appliance.stage.recorder import FILE

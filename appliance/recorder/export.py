@@ -15,7 +15,7 @@ from pathlib import Path
 from appliance.box.durable import replacing
 from appliance.recorder import chunks, log
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import EXPORTED, Run, header_of, segments_of
+from appliance.recorder.journal_reader import EXPORTED, Run, header_of, segments_of
 from appliance.recorder.record import DAMAGED
 from appliance.recorder.segments import SUFFIX
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from appliance.outputs.frame_layout import BROWSER_HEAD
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import Run
+from appliance.recorder.journal_reader import Run
 from appliance.recorder.record import LATE, NOT_FINITE, holds_of
 
 MOST_BINS, MOST_EVENTS = 240, 400

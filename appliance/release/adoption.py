@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from appliance.box.durable import write_whole
 from appliance.pose.foreign_file import stored_json
 from appliance.release.arrivals import Arrival
-from appliance.release.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, Pair, appliance_box
+from appliance.release.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, ShowAndBox, appliance_box
 
 if TYPE_CHECKING:
     from appliance.release.shelf import Shelf
@@ -22,7 +22,7 @@ SEEN = "seen.json"
 _GOES_ON = "It is not danced; what danced before goes on."
 
 
-class Places(NamedTuple):
+class BoxFolders(NamedTuple):
     """data: what is kept over power-off; run: in memory, where all processes of the box look."""
 
     data: Path = DATA
@@ -60,19 +60,19 @@ def read_choice(data: Path) -> Choice:
     return choice._replace(pairs=tuple(one for one in pairs if one.is_there))
 
 
-def chosen_before(places: Places) -> Choice:
+def chosen_before(folders: BoxFolders) -> Choice:
     """The same, without pairs that did not dance since power-on: the keeper may not have noted that yet."""
-    return read_choice(places.data).without(Choice.read(places.run / CHOSEN) or Choice())
+    return read_choice(folders.data).without(Choice.read(folders.run / CHOSEN) or Choice())
 
 
-def adopt(places: Places, arrivals: list[Arrival], check: Check, late: bool = False) -> Outcome:
+def adopt(folders: BoxFolders, arrivals: list[Arrival], check: Check, late: bool = False) -> Outcome:
     """Take what is new and sound. The newest arrival counts; the stick goes before the boot partition.
 
     late: while a show runs, when a check may fail because time or memory is short: anything refused then is
     checked once more at the next power-on.
     """
-    before, seen = chosen_before(places), _read_seen(places.data)
-    lost = _lost(places.data, seen)
+    before, seen = chosen_before(folders), _read_seen(folders.data)
+    lost = _lost(folders.data, seen)
     fresh = [one for one in arrivals if one.listing and _is_new(one, seen, lost)]
     refused = [
         message
@@ -89,32 +89,32 @@ def adopt(places: Places, arrivals: list[Arrival], check: Check, late: bool = Fa
         if not lacking.listing:
             seen[arrival.source] = _seen(arrival, [], "")
             continue
-        newest, problems, is_final = _take(places, lacking, choice, check)
+        newest, problems, is_final = _take(folders, lacking, choice, check)
         refused += problems
         said += problems
         looked_at = arrival if is_final and (newest or not late) else arrival._replace(listing=[])
         seen[arrival.source] = _seen(looked_at, problems, newest.id if newest else "")
         if newest is not None:
-            taken = taken or newest.id != (choice.pairs or (Pair(),))[0].id
+            taken = taken or newest.id != (choice.pairs or (ShowAndBox(),))[0].id
             choice, brought = choice.with_newest(newest), brought | lacking.parts
             said.append(f"{newest.source[0].upper()}{newest.source[1:]}: its show is checked and dances.")
-    said += _write_choice(places.data, choice, seen)
+    said += _write_choice(folders.data, choice, seen)
     return Outcome(choice._replace(refused=tuple(refused)), taken, tuple(said))
 
 
 def _take(
-    places: Places, arrival: Arrival, choice: Choice, check: Check
-) -> tuple[Pair | None, list[str], bool]:
+    folders: BoxFolders, arrival: Arrival, choice: Choice, check: Check
+) -> tuple[ShowAndBox | None, list[str], bool]:
     """The pair to dance from now on, what is wrong, and whether that is the arrival's fault for good."""
     from appliance.release.shelf import NoRoomError, Shelf, UnreadableError
 
     no_room = ""
     # In memory where the disk takes nothing: then a stick may be pulled in mid-show.
-    for root in (places.data, places.run):
+    for root in (folders.data, folders.run):
         shelf = Shelf(root)
         try:
-            shelf.sweep((choice, Choice.read(places.run / CHOSEN) or Choice()))
-            newest, problems = _on_shelf(shelf, places, arrival, choice, check)
+            shelf.sweep((choice, Choice.read(folders.run / CHOSEN) or Choice()))
+            newest, problems = _on_shelf(shelf, folders, arrival, choice, check)
         except UnreadableError as error:
             cure = "Was it pulled? Plug it in again, or copy the show again."
             return None, [_printable(f"{arrival.label.capitalize()}: {error} {_GOES_ON} {cure}")], False
@@ -123,14 +123,14 @@ def _take(
                 f"{arrival.label.capitalize()}: no room for its show ({error}). {_GOES_ON} Free some room."
             )
         else:
-            return newest, problems, root == places.data
+            return newest, problems, root == folders.data
     return None, [_printable(no_room)], False
 
 
 def _on_shelf(
-    shelf: Shelf, places: Places, arrival: Arrival, choice: Choice, check: Check
-) -> tuple[Pair | None, list[str]]:
-    before = (choice.pairs or (Pair(),))[0]
+    shelf: Shelf, folders: BoxFolders, arrival: Arrival, choice: Choice, check: Check
+) -> tuple[ShowAndBox | None, list[str]]:
+    before = (choice.pairs or (ShowAndBox(),))[0]
     show_id, show = shelf.take_show(arrival) if arrival.show else (before.show_id, before.show)
     box_id, original = shelf.take_box(arrival) if arrival.box else (before.box_id, before.box)
     copies = {str(show): str(arrival.show), str(original): str(arrival.box)}
@@ -142,9 +142,9 @@ def _on_shelf(
             first_problems = first_problems or [_as_on_the_stick(message, copies) for message in problems]
             continue
         if with_box:
-            boxed = (box_id, shelf.furnish(original, places.moved))
+            boxed = (box_id, shelf.furnish(original, folders.moved))
         source = _named(arrival, with_show, with_box)
-        return Pair(danced[1], boxed[1], f"{danced[0]}+{boxed[0]}", source), first_problems
+        return ShowAndBox(danced[1], boxed[1], f"{danced[0]}+{boxed[0]}", source), first_problems
     named = _named(arrival, arrival.show is not None, arrival.box is not None)
     return None, [*first_problems, f"Refused: {named}. {_GOES_ON}"]
 
@@ -233,10 +233,10 @@ def _read_seen(data: Path) -> dict[str, Any]:
         return {}
 
 
-def built_in_box(places: Places) -> Path:
+def built_in_box(folders: BoxFolders) -> Path:
     """The box file for a box without one: as it comes, or with its folders elsewhere. Raises OSError."""
-    if not places.moved:
+    if not folders.moved:
         return APPLIANCE_BOX
-    path = places.run / "box.yaml"
-    write_whole(path, appliance_box(places.moved).encode())
+    path = folders.run / "box.yaml"
+    write_whole(path, appliance_box(folders.moved).encode())
     return path

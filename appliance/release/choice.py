@@ -19,7 +19,7 @@ CHOSEN = "chosen.json"
 _MOST_REMEMBERED = 2  # the newest and the last good one; what comes with the box is always there
 
 
-class Pair(NamedTuple):
+class ShowAndBox(NamedTuple):
     """A show and a box file that were checked together.
 
     id: of their contents, `show+box`, where nothing stands for what comes with the box; source: where they
@@ -42,7 +42,7 @@ class Pair(NamedTuple):
         """Only about the box file."""
         return self.id.partition("+")[2]
 
-    def here(self, box: Path = APPLIANCE_BOX) -> Pair:
+    def here(self, box: Path = APPLIANCE_BOX) -> ShowAndBox:
         """With what comes with the box as it comes with this release, which may be another one now."""
         return self._replace(
             show=self.show if self.show_id else EMBEDDED_SHOW, box=self.box if self.box_id else box
@@ -71,13 +71,13 @@ class Choice(NamedTuple):
     data: the folder in which it is kept over power-off.
     """
 
-    pairs: tuple[Pair, ...] = (Pair(good=True),)
+    pairs: tuple[ShowAndBox, ...] = (ShowAndBox(good=True),)
     refused: tuple[str, ...] = ()
     aside: tuple[Aside, ...] = ()
     data: Path = DATA
 
     @property
-    def first(self) -> Pair:
+    def first(self) -> ShowAndBox:
         """The current choice."""
         return self.pairs[0]
 
@@ -96,7 +96,7 @@ class Choice(NamedTuple):
         try:
             refused = tuple(map(str, values["refused"]))
             aside = tuple(Aside(*map(str, one)) for one in values["aside"])
-            pairs = tuple(_pair(one) for one in values["pairs"])
+            pairs = tuple(_show_and_box(one) for one in values["pairs"])
             return Choice(pairs, refused, aside, Path(values["data"]))
         except (KeyError, TypeError) as error:
             raise ValueError(f"This is no choice of a show ({error}).") from error
@@ -114,7 +114,7 @@ class Choice(NamedTuple):
         values = self.plain()
         write_whole(path, (json.dumps({**values["pairs"][0], **values}, indent=1) + "\n").encode())
 
-    def with_newest(self, pair: Pair) -> Choice:
+    def with_newest(self, pair: ShowAndBox) -> Choice:
         """To remember: this one first, then the newest of those that have danced."""
         others = [one for one in self.pairs if one.id and one.id != pair.id]
         good = [one for one in others if one.good] or others
@@ -137,7 +137,7 @@ class Choice(NamedTuple):
         if not aside:
             return self
         pairs = tuple(one for one in self.pairs if not one.id or one.id not in aside)
-        return self._replace(pairs=pairs or (Pair(good=True),), aside=tuple(aside.values()))
+        return self._replace(pairs=pairs or (ShowAndBox(good=True),), aside=tuple(aside.values()))
 
     def complete(self, box: Path = APPLIANCE_BOX) -> Choice:
         """With what comes with the box at the end, on the venue's box files first: never nothing on stage.
@@ -148,8 +148,9 @@ class Choice(NamedTuple):
         pairs = {identity: one for identity, one in pairs.items() if one.is_there}
         for one in list(pairs.values()):
             if one.box_id:
-                pairs.setdefault(f"+{one.box_id}", Pair(box=one.box, id=f"+{one.box_id}", good=one.good))
-        return self._replace(pairs=(*pairs.values(), Pair(box=box, good=True)))
+                name = f"+{one.box_id}"
+                pairs.setdefault(name, ShowAndBox(box=one.box, id=name, good=one.good))
+        return self._replace(pairs=(*pairs.values(), ShowAndBox(box=box, good=True)))
 
 
 def box_of(box: Path | None, chosen: Path | None) -> Path | None:
@@ -178,6 +179,6 @@ def appliance_box(places: dict[str, str]) -> str:
     return text
 
 
-def _pair(values: dict[str, Any]) -> Pair:
+def _show_and_box(values: dict[str, Any]) -> ShowAndBox:
     show, box = Path(values["show"]), Path(values["box"])
-    return Pair(show, box, str(values["id"]), str(values["source"]), bool(values["good"]))
+    return ShowAndBox(show, box, str(values["id"]), str(values["source"]), bool(values["good"]))

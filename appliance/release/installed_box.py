@@ -7,7 +7,7 @@ import pwd
 from pathlib import Path
 
 from appliance.release import choice
-from appliance.release.choice import Choice, Pair, box_of
+from appliance.release.choice import Choice, ShowAndBox, box_of
 
 
 def box_here(box: Path | None, chosen: Path | None = None) -> Path | None:
@@ -20,14 +20,14 @@ def box_here(box: Path | None, chosen: Path | None = None) -> Path | None:
     return box_of(box, chosen)
 
 
-def pair_here(show: Path | None, box: Path | None) -> tuple[Path | None, Path | None]:
+def show_and_box_here(show: Path | None, box: Path | None) -> tuple[Path | None, Path | None]:
     """The same for show and box file; root goes on as the box's own user, for its processes meet in private.
 
     Raises ConfigError where the installed box is closed to this user.
     """
     if show is not None or box is not None or not _is_installed():
         return show, box
-    pair = (Choice.read(choice.RUN / choice.CHOSEN) or Choice((Pair(),))).first
+    pair = (Choice.read(choice.RUN / choice.CHOSEN) or Choice((ShowAndBox(),))).first
     _become_owner_of(choice.RUN)
     return pair.show, pair.box
 

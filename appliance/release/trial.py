@@ -14,7 +14,7 @@ from appliance.keeper.fallback import CHOICE_NOT_SAVED
 from appliance.keeper.mirror import reason_of
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.foreign_file import stored_json
-from appliance.release.choice import CHOSEN, Aside, Choice, Pair
+from appliance.release.choice import CHOSEN, Aside, Choice, ShowAndBox
 
 _log = logging.getLogger(__name__)
 
@@ -31,7 +31,7 @@ class Tries(NamedTuple):
     pid: int = 0
 
 
-def pair_to_dance(chosen: Path, now: float) -> Pair:
+def chosen_to_dance(chosen: Path, now: float) -> ShowAndBox:
     """The choice to dance in this start, which is counted; never raises, because something always dances.
 
     A new pair has to dance for PROVEN_S within three starts. A proven one may be killed any number of times,
@@ -43,7 +43,7 @@ def pair_to_dance(chosen: Path, now: float) -> Pair:
             f"{chosen} is missing or broken: what was chosen is not known. The audience sees the show that "
             "comes with the box. Look what the preflight says: systemctl status bunraku-preflight."
         )
-        return Pair(good=True)
+        return ShowAndBox(good=True)
     folder = chosen.parent
     choice = _found_again(chosen, choice)
     tries = _read_tries(folder, choice.first, now)
@@ -123,7 +123,7 @@ class MirroredProof:
         return True
 
 
-def _read_tries(folder: Path, pair: Pair, now: float) -> Tries | None:
+def _read_tries(folder: Path, pair: ShowAndBox, now: float) -> Tries | None:
     """The result of the starts before this one; None while another process still dances."""
     try:
         tries = Tries(*stored_json(folder / TRIES))
@@ -180,5 +180,5 @@ def _publish(chosen: Path, before: Choice, after: Choice, message: str) -> Choic
     return after
 
 
-def _source(pair: Pair) -> str:
+def _source(pair: ShowAndBox) -> str:
     return pair.source if not pair.id else f"came before it ({pair.source})"

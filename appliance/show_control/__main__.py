@@ -15,9 +15,9 @@ def main() -> int:
     end_with_parent()
     from appliance.box.log import process_log
     from appliance.show_control.run import control
-    from appliance.show_control.settings import Settings
+    from appliance.show_control.settings import ControlSettings
 
-    settings = Settings.unpacked(sys.argv[1])
+    settings = ControlSettings.unpacked(sys.argv[1])
     with process_log():
         try:
             return control(settings)

@@ -32,7 +32,7 @@ from appliance.show_control.live_input import LiveInput
 from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.packet import Message
 from appliance.show_control.port import Address, Port
-from appliance.show_control.settings import Settings
+from appliance.show_control.settings import ControlSettings
 from appliance.show_control.stage_observer import StageObserver
 
 _log = logging.getLogger(__name__)
@@ -51,7 +51,7 @@ _REST_S = 0.002  # after as many: a flood leaves the processor to others
 class ControlProcess:
     """Everything open. Raises OSError where the folder takes no file, or another one is at work there."""
 
-    def __init__(self, settings: Settings, monotonic: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, settings: ControlSettings, monotonic: Callable[[], float] = time.monotonic) -> None:
         folder, now = Path(settings.folder), monotonic()
         self._monotonic = monotonic
         with ExitStack() as opened:
@@ -206,7 +206,7 @@ class ControlProcess:
         return max(min(*due, now + longest_s) - now, 0.0)
 
 
-def control(settings: Settings) -> int:
+def control(settings: ControlSettings) -> int:
     """Show control until SIGTERM, Ctrl-C or a closed terminal; the exit status."""
     with _waking_stop_signals() as (ended, wake):
         process = ControlProcess(settings)

@@ -13,7 +13,7 @@ Listener = tuple[str, int]  # address and port
 
 
 @dataclass(frozen=True)
-class Settings:
+class ControlSettings:
     """The port's socket is open already: `descriptor`. `key_file`, `state` (the box's folder on the disk):
     empty for none.
     """
@@ -33,7 +33,7 @@ class Settings:
         return json.dumps(asdict(self))
 
     @classmethod
-    def unpacked(cls, text: str) -> Settings:
+    def unpacked(cls, text: str) -> ControlSettings:
         """From that argument."""
         values = with_tuples(json.loads(text))
         foreign = tuple(

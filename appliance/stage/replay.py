@@ -10,7 +10,7 @@ import numpy as np
 
 from appliance.box.snapshot import restore
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import Run
+from appliance.recorder.journal_reader import Run
 from appliance.recorder.record import DAMAGED, ORDER, hands_of, puppets_of
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show

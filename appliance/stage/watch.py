@@ -12,7 +12,7 @@ from appliance.levers.sources import LIVE
 from appliance.sensor import wire
 from appliance.sensor.link import FOREIGN
 from appliance.sensor.state import LOW_BATTERY, SensorState
-from appliance.stage import fallback as rows
+from appliance.stage import fallback
 from appliance.stage.admission import Admission
 from appliance.stage.health import Health
 from appliance.stage.made_motions import MadeMotions
@@ -34,7 +34,7 @@ class Watch:
 
     def __init__(self, parts: StageParts, admission: Admission, made: Sequence[MadeMotions] = ()) -> None:
         self._parts, self._made = parts, made
-        self.fallbacks = Fallbacks(rows.OF_THE_STAGE)
+        self.fallbacks = Fallbacks(fallback.OF_THE_STAGE)
         self._worn = [joints[0] for joints in parts.worn.values()]
         self._silent = [False] * len(self._worn)
         self._fell_silent = [False] * len(self._worn)  # since the last check
@@ -43,10 +43,10 @@ class Watch:
         self._dropped: dict[str, int] = {}
         self._ways: dict[str, str] = {}
         self._said: set[tuple[str, str]] = set()  # what is so, and was said
-        self.fallbacks.set(rows.ITERATIONS_LOWERED.name, "" if admission.fits else admission.sentence())
-        self.fallbacks.concern(rows.NOT_LET_IN.name, parts.not_let_in)
+        self.fallbacks.set(fallback.ITERATIONS_LOWERED.name, "" if admission.fits else admission.sentence())
+        self.fallbacks.concern(fallback.NOT_LET_IN.name, parts.not_let_in)
         self._missing = parts.not_let_in
-        self.fallbacks.set(rows.NOT_LET_IN.name, self._why_not_let_in())
+        self.fallbacks.set(fallback.NOT_LET_IN.name, self._why_not_let_in())
 
     def count_silences(self, now: float) -> None:
         """At each tick: sensors, and a live dancer, that have just fallen silent. Allocates nothing."""
@@ -57,7 +57,7 @@ class Watch:
         for made in self._made:
             late |= made.is_late
         if late and not self._is_source_late:
-            self.fallbacks.count(rows.SOURCE_LATE.name, now)
+            self.fallbacks.count(fallback.SOURCE_LATE.name, now)
         self._is_source_late = late
         for place, worn in enumerate(self._worn):
             silent = HOLD_S < worn.silent_s(now) < math.inf
@@ -65,28 +65,28 @@ class Watch:
                 self._silent[place] = silent
                 if silent:
                     self._fell_silent[place] = True
-                    self.fallbacks.count(rows.SENSOR_SILENT.name, now)
+                    self.fallbacks.count(fallback.SENSOR_SILENT.name, now)
 
     def note_start(self, now: float, resuming: Resumption, not_shared: str, is_recorded: bool) -> None:
         """Right before the first tick: how it came to this start, and what the stage could not get.
 
         `not_shared`: why no frames can be shared, else "".
         """
-        self.fallbacks.follow(rows.STAGE_RESTARTED.name, resuming.restarts, now)
-        self.fallbacks.follow(rows.POWER_CUT.name, resuming.power_cuts, now)
-        self.fallbacks.set(rows.PLACE_NOT_NOTED.name, resuming.complaint)
+        self.fallbacks.follow(fallback.STAGE_RESTARTED.name, resuming.restarts, now)
+        self.fallbacks.follow(fallback.POWER_CUT.name, resuming.power_cuts, now)
+        self.fallbacks.set(fallback.PLACE_NOT_NOTED.name, resuming.complaint)
         if resuming.dropped:
-            self.fallbacks.count(rows.PLACE_DROPPED.name, now)
-        self.fallbacks.set(rows.NOT_SHARED.name, not_shared)
-        self.fallbacks.set(rows.NOT_RECORDED.name, not is_recorded)
+            self.fallbacks.count(fallback.PLACE_DROPPED.name, now)
+        self.fallbacks.set(fallback.NOT_SHARED.name, not_shared)
+        self.fallbacks.set(fallback.NOT_RECORDED.name, not is_recorded)
 
     def note_missing_rights(self, missing: Sequence[str]) -> None:
         """Which real-time rights the stage did not get, sentences."""
-        self.fallbacks.set(rows.NOT_REALTIME.name, " ".join(missing))
+        self.fallbacks.set(fallback.NOT_REALTIME.name, " ".join(missing))
 
     def note_second_look(self, most: int) -> str:
         """Iterations that admission lowered fit after all: up to `most`. The sentence about it."""
-        self.fallbacks.set(rows.ITERATIONS_LOWERED.name, "")
+        self.fallbacks.set(fallback.ITERATIONS_LOWERED.name, "")
         return (
             f"Up to {most} coding iterations fit by now. The dancer dances the show's own iterations again."
         )
@@ -94,17 +94,17 @@ class Watch:
     def note_folder(self, now: float, lost: str | None) -> str:
         """Once a second, as renew_lost told it; a sentence where that is news."""
         if lost is None:
-            self.fallbacks.set(rows.FOLDER_LOST.name, False)
+            self.fallbacks.set(fallback.FOLDER_LOST.name, False)
             return ""
         if not lost:
-            self.fallbacks.count(rows.FOLDER_LOST.name, now)
-            return Trouble(rows.FOLDER_LOST.message)
+            self.fallbacks.count(fallback.FOLDER_LOST.name, now)
+            return Trouble(fallback.FOLDER_LOST.message)
         message = Trouble(
             f"The folder where the box's processes meet was deleted, or files in it: {lost} The dance goes "
             "on, but commands, lights and picture may not come back once they end. Start the box again: "
             "systemctl restart bunraku.target, or `bunraku play`."
         )
-        self.fallbacks.set(rows.FOLDER_LOST.name, message)
+        self.fallbacks.set(fallback.FOLDER_LOST.name, message)
         return message if self._changes("folder", lost, True) else ""
 
     def check(self, now: float, health: Health, sensors: Sequence[SensorState] = ()) -> list[str]:
@@ -132,25 +132,25 @@ class Watch:
         every, link = self.fallbacks, self._parts.link
         counts = link.counts
         self._name_them(now, gone)
-        every.hold(rows.SENSOR_SILENT.name, any(self._silent))
-        every.hold(rows.SOURCE_LATE.name, self._is_source_late)
-        every.follow(rows.READING_REFUSED.name, counts.get("norm", 0), now)
-        every.follow(rows.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in FOREIGN), now)
-        every.follow(rows.POSE_REFUSED.name, self._parts.live_refused, now)
+        every.hold(fallback.SENSOR_SILENT.name, any(self._silent))
+        every.hold(fallback.SOURCE_LATE.name, self._is_source_late)
+        every.follow(fallback.READING_REFUSED.name, counts.get("norm", 0), now)
+        every.follow(fallback.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in FOREIGN), now)
+        every.follow(fallback.POSE_REFUSED.name, self._parts.live_refused, now)
         puppets = self._parts.puppets
         jumps = max(one.live.jumps if one.live is not None else 0 for one in puppets)
-        every.follow(rows.SOURCE_JUMPED.name, jumps, now)
-        every.follow(rows.FIGURE_REFUSED.name, sum(one.figures_refused for one in puppets), now)
-        every.follow(rows.TICK_LATE.name, health.late, now)
-        every.follow(rows.TICK_SKIPPED.name, health.skipped, now)
-        every.follow(rows.OVER_BUDGET.name, health.over_budget, now)
-        every.follow(rows.NETWORK_FAILED.name, health.not_finite, now)
+        every.follow(fallback.SOURCE_JUMPED.name, jumps, now)
+        every.follow(fallback.FIGURE_REFUSED.name, sum(one.figures_refused for one in puppets), now)
+        every.follow(fallback.TICK_LATE.name, health.late, now)
+        every.follow(fallback.TICK_SKIPPED.name, health.skipped, now)
+        every.follow(fallback.OVER_BUDGET.name, health.over_budget, now)
+        every.follow(fallback.NETWORK_FAILED.name, health.not_finite, now)
         cables = filter(None, (getattr(one, "trouble", None) for one in link.intakes))
-        every.set(rows.CABLE_AWAY.name, " ".join(cables))
+        every.set(fallback.CABLE_AWAY.name, " ".join(cables))
         is_absent = any(getattr(one, "address_is_absent", False) for one in link.intakes)
-        every.set(rows.ADDRESS_ABSENT.name, is_absent)
-        every.set(rows.RECEIVER_GONE.name, bool(gone))
-        every.set(rows.NOT_LET_IN.name, self._why_not_let_in())
+        every.set(fallback.ADDRESS_ABSENT.name, is_absent)
+        every.set(fallback.RECEIVER_GONE.name, bool(gone))
+        every.set(fallback.NOT_LET_IN.name, self._why_not_let_in())
 
     def _why_not_let_in(self) -> bool | str:
         """As at the start, or that keys were removed or added since."""
@@ -161,23 +161,23 @@ class Watch:
         """The subjects of each fallback: the sensors, cables, addresses and receivers by name."""
         every, link = self.fallbacks, self._parts.link
         silences = zip(self._parts.worn, self._silent, self._fell_silent, strict=True)
-        every.concern(rows.SENSOR_SILENT.name, [name for name, is_so, fell in silences if is_so or fell])
+        every.concern(fallback.SENSOR_SILENT.name, [name for name, is_so, fell in silences if is_so or fell])
         self._fell_silent[:] = [False] * len(self._fell_silent)
         refused = link.refused()
         grown = [name for name, count in refused.items() if count > self._refused.get(name, 0)]
         self._refused = refused
-        every.concern(rows.READING_REFUSED.name, grown)
-        every.concern(rows.PACKET_REFUSED.name, filter(None, [link.stranger]))
+        every.concern(fallback.READING_REFUSED.name, grown)
+        every.concern(fallback.PACKET_REFUSED.name, filter(None, [link.stranger]))
         away = [one.name for one in link.intakes if getattr(one, "trouble", None)]
-        every.concern(rows.CABLE_AWAY.name, away)
+        every.concern(fallback.CABLE_AWAY.name, away)
         absent = [one.name for one in link.intakes if getattr(one, "address_is_absent", False)]
-        every.concern(rows.ADDRESS_ABSENT.name, absent)
-        every.concern(rows.RECEIVER_GONE.name, sorted(gone))
-        every.concern(rows.NOT_LET_IN.name, self._parts.not_let_in)
+        every.concern(fallback.ADDRESS_ABSENT.name, absent)
+        every.concern(fallback.RECEIVER_GONE.name, sorted(gone))
+        every.concern(fallback.NOT_LET_IN.name, self._parts.not_let_in)
         chosen = [one.live for one in self._parts.puppets if one.live is not None and one.live.is_chosen]
         late = [LIVE for live in chosen if LIVE_SILENT_S < live.silent_s(now) < math.inf]
         late += [one.wanted for one in self._made if one.is_late]
-        every.concern(rows.SOURCE_LATE.name, dict.fromkeys(late))
+        every.concern(fallback.SOURCE_LATE.name, dict.fromkeys(late))
 
     def _changes(self, what: str, name: str, is_so: bool) -> bool:
         """Whether this is news: it was not so at the last call and is now, or the reverse."""

@@ -13,7 +13,7 @@ import pytest
 from appliance.box import served
 from appliance.box.served import OwnNames, name_in_network
 from appliance.cli.announce import TYPE, announce, main
-from appliance.release.choice import Choice, Pair
+from appliance.release.choice import Choice, ShowAndBox
 from appliance.show.box import BoxConfig, load_box
 
 
@@ -46,7 +46,7 @@ def test_a_page_that_nobody_else_can_open_is_not_announced(tmp_path: Path, conso
 
 def test_the_unit_announces_what_was_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     box(tmp_path, "{host: '::', port: 8081, viewers: [10.0.0.0/8]}")
-    Choice((Pair(box=tmp_path / "box.yaml"),)).write(tmp_path / "chosen.json")
+    Choice((ShowAndBox(box=tmp_path / "box.yaml"),)).write(tmp_path / "chosen.json")
     monkeypatch.setattr(announce, "__defaults__", (tmp_path / "told",))
     main(["--chosen", str(tmp_path / "chosen.json")])
     assert "<port>8081</port>" in (tmp_path / "told").read_text()

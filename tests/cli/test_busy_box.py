@@ -9,7 +9,7 @@ import pytest
 from appliance.box.durable import alone_in
 from appliance.cli import box_file
 from appliance.cli.app import refuse
-from appliance.release.choice import CHOSEN, Choice, Pair
+from appliance.release.choice import CHOSEN, Choice, ShowAndBox
 
 
 @pytest.mark.parametrize("busy", ["data", "run"])
@@ -19,7 +19,7 @@ def test_a_change_while_a_stick_is_checked_says_what_to_wait_for(
     for name in ("data", "run", "rehearsed"):
         (tmp_path / name).mkdir()
     chosen = tmp_path / "run" / CHOSEN
-    Choice((Pair(),), data=tmp_path / "data").write(chosen)
+    Choice((ShowAndBox(),), data=tmp_path / "data").write(chosen)
     monkeypatch.setattr(box_file, "LATE_TURN_S", 0.0)
     for change in (
         lambda: box_file.dance_again(chosen, "a+b"),

@@ -19,7 +19,7 @@ from appliance.cli.app import parser, plug_ins
 from appliance.dancer.material import map_reach
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.export import export
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.sensor.keys import create_keys
 from appliance.show.bundle import bundled_shows, write_checksums
 from appliance.show.show import load_show

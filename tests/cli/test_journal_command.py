@@ -12,7 +12,7 @@ import pytest
 
 from appliance.cli import journal, pictures
 from appliance.pose import quaternion
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.release import choice
 from appliance.studio.exchange.reading import read_as_given
 from tests.bundles import write_show
@@ -123,7 +123,7 @@ def test_on_a_box_it_is_the_journal_of_what_was_chosen(
     monkeypatch.setattr(choice, "RUN", recorded.parent)
     box = recorded.with_name("box.yaml")
     box.write_text("journal: {folder: journal}\n")
-    choice.Choice((choice.Pair(box=box),), (), ()).write(choice.RUN / choice.CHOSEN)
+    choice.Choice((choice.ShowAndBox(box=box),), (), ()).write(choice.RUN / choice.CHOSEN)
     assert "A test: 1 s, 20 late" in bunraku("journal", "list").out
     bunraku("journal", "export")
     (exported,) = stick.iterdir()

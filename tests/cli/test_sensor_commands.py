@@ -17,7 +17,7 @@ from appliance.box.orders import Order
 from appliance.cli.sensors import box_keys
 from appliance.cli.sensors.control_client import ControlClient, NoBoxError, Reply
 from appliance.release import choice
-from appliance.release.choice import Choice, Pair
+from appliance.release.choice import Choice, ShowAndBox
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.show_control.packet import Message, datagram
 from tests.bundles import write_show
@@ -273,7 +273,7 @@ def test_a_box_that_is_off_still_knows_the_sensors_of_its_show(
     settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}
     box_file.write_text(yaml.safe_dump({**settings, "control": {"port": 1}}))
     show = write_show(tmp_path / "show")  # left-wrist holds a joint of it
-    Choice((Pair(show, box_file),)).write(tmp_path / choice.CHOSEN)
+    Choice((ShowAndBox(show, box_file),)).write(tmp_path / choice.CHOSEN)
     monkeypatch.setattr(choice, "RUN", tmp_path)
     _, err = bunraku("sensors", "revoke", "left-wrist", "--box", box_file, status=2)
     assert "left-wrist is a sensor of this show (the box does not run now)" in err

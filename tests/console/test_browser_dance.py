@@ -17,7 +17,7 @@ from playwright.sync_api import expect
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.bvh import read_bvh
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import Run, read_journal
+from appliance.recorder.journal_reader import Run, read_journal
 from tests.bundles import FIGURE
 from tests.console.browser import ON_A_LAPTOP, await_true, press
 from tests.console.page import Page

@@ -25,7 +25,7 @@ from appliance.console.metrics import metrics
 from appliance.console.push import PASSES, REFUSED, Pass, Passes, push
 from appliance.console.venue import Venue
 from appliance.levers.status import Status
-from appliance.release.choice import CHOSEN, Choice, Pair
+from appliance.release.choice import CHOSEN, Choice, ShowAndBox
 from appliance.release.packed_show import pack_show, require_known_maker, unpack_show
 from appliance.show.bundle import CHECKSUMS, SIGNATURE, write_checksums
 from appliance.stage.stage_error import StageError
@@ -200,7 +200,7 @@ def installed(folder: Path, **console: object) -> Iterator[Installed]:
     settings = {"console": {"port": port, **console}, "control": None}
     box_file.write_text(yaml.safe_dump(settings | {"runtime": str(run), "state": str(data / "state")}))
     show = packed_bundle(data / "shows" / "before", "before")
-    choice = Choice((Pair(show, box_file, "before+hall", "show from the stick", True),), data=data)
+    choice = Choice((ShowAndBox(show, box_file, "before+hall", "show from the stick", True),), data=data)
     for place in (data, run):
         choice.write(place / CHOSEN)
     with Process(folder / "page.txt", [*BUNRAKU, "console", "--chosen", run / CHOSEN]) as process:

@@ -17,7 +17,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recorded_minutes import recorded_minutes
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.studio.data.catalogue import read_catalogue
 from tests.bundles import FIGURE, write_show
 from tests.command import Command

@@ -24,7 +24,7 @@ from appliance.keeper.fallback import JOURNAL_STOPPED, SAVED_IN_MEMORY
 from appliance.keeper.keeper import END_S, KeeperHealth, keep_rest
 from appliance.keeper.mirror import RETRY_S, TURN_S, Mirror, mirror_until
 from appliance.keeper.mirror_process import HANGS_S, STUCK_S, MirrorProcess
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.recorder.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
 from appliance.show.box import BoxConfig
 from appliance.stage.recorder import FILE, FORMAT, KIND

@@ -13,7 +13,7 @@ from appliance.cli.app import parser
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import CUE
 from appliance.projector.run import MARK, SHOWS_FOR_S, FirstStart, Options, Run
-from appliance.release.choice import Choice, Pair
+from appliance.release.choice import Choice, ShowAndBox
 from appliance.show.box import BoxConfig
 from tests.bundles import write_show
 from tests.logged import said
@@ -62,7 +62,7 @@ def test_a_box_with_a_show_of_its_own_has_no_first_start(
     chosen, command = tmp_path / "chosen.json", parser("project").commands["project"]
     box = write_show(tmp_path / "show") / "box.yaml"
     box.write_text("{}")
-    for one in (Pair(box=box), Pair(box=box, id="+b"), Pair(tmp_path, box, "s+b")):
+    for one in (ShowAndBox(box=box), ShowAndBox(box=box, id="+b"), ShowAndBox(tmp_path, box, "s+b")):
         Choice((one,)).write(chosen)
         command.main(["--chosen", str(chosen)], standalone_mode=False)
     assert [options.is_first for options in asked] == [True, True, False]

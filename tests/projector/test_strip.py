@@ -14,7 +14,7 @@ from appliance.cli.rehearsal import has_display, rehearsal_picture
 from appliance.pictures.filmstrip import held_throughout
 from appliance.projector import strip
 from appliance.projector.strip import COLUMNS, PICTURE, ROWS, render_strip
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.show.look import looks_by_name
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError

@@ -20,7 +20,7 @@ from appliance.recorder import chunks, log
 from appliance.recorder.environment import fingerprints
 from appliance.recorder.export import export
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import last_saved, read_journal
+from appliance.recorder.journal_reader import last_saved, read_journal
 from appliance.recorder.record import EVENT, TICK
 from appliance.recorder.segments import segment_paths
 from appliance.show.show import load_show

@@ -10,7 +10,7 @@ import pytest
 from appliance.cli.pictures import load_dance
 from appliance.cli.replay import TOLERANCE_DEGREES
 from appliance.cli.replay import replay as replay_journal
-from appliance.recorder.reading import Run, read_journal
+from appliance.recorder.journal_reader import Run, read_journal
 from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison

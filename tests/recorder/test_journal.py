@@ -15,8 +15,8 @@ from appliance.box.clock import TICK_S
 from appliance.recorder import chunks
 from appliance.recorder.export import export
 from appliance.recorder.journal_error import JournalError
+from appliance.recorder.journal_reader import read_journal
 from appliance.recorder.log import Entry, Pieces, pieces_of
-from appliance.recorder.reading import read_journal
 from appliance.recorder.record import PIECE
 from appliance.recorder.segments import segment_paths
 from appliance.stage.recorder import EVENT_BYTES, FILE, LOG_SLOTS, LONGEST_EVENT

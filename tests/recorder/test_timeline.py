@@ -12,7 +12,7 @@ import pytest
 from appliance.cli import page_calls
 from appliance.recorder.export import export_stretch
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import Run, read_journal, segments_of
+from appliance.recorder.journal_reader import Run, read_journal, segments_of
 from appliance.recorder.segments import SEGMENT_TICKS
 from appliance.recorder.timeline import EVERY, MOST_BINS, stretch, timeline
 from tests.bundles import write_show

@@ -15,14 +15,14 @@ from appliance.box import served as module
 from appliance.box.served import addresses
 from appliance.release import choice
 from appliance.release.about import about, releases
-from appliance.release.choice import Aside, Choice, Pair
-from appliance.release.installed_box import box_here, pair_here
+from appliance.release.choice import Aside, Choice, ShowAndBox
+from appliance.release.installed_box import box_here, show_and_box_here
 from appliance.show.config_error import ConfigError
 
 
 def test_the_shows_stand_in_the_order_in_which_they_are_tried(tmp_path: Path) -> None:
     venue = tmp_path / "venue.yaml"
-    pairs = Pair(box=venue, id="a+b", source="from the stick"), Pair(good=True)
+    pairs = ShowAndBox(box=venue, id="a+b", source="from the stick"), ShowAndBox(good=True)
     chosen = tmp_path / "chosen.json"
     Choice(pairs, ("show.yaml:3: wrong.",), (Aside("c+", "It did not dance."),)).write(chosen)
     reported = about(chosen, None, tmp_path)
@@ -82,30 +82,30 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_without_an_installed_box_nothing_is_meant(run: Path) -> None:
     assert box_here(None) is None
-    assert pair_here(None, None) == (None, None)
+    assert show_and_box_here(None, None) == (None, None)
 
 
 def test_what_was_chosen_at_power_on_is_meant_unless_a_file_is_given(run: Path, tmp_path: Path) -> None:
     show, box, other = tmp_path / "show", tmp_path / "box.yaml", tmp_path / "other.yaml"
-    Choice((Pair(show, box),)).write(run / choice.CHOSEN)
+    Choice((ShowAndBox(show, box),)).write(run / choice.CHOSEN)
     assert box_here(None) == box
     assert box_here(other) == other
-    assert pair_here(None, None) == (show, box)
-    assert pair_here(None, other) == (None, other)
+    assert show_and_box_here(None, None) == (show, box)
+    assert show_and_box_here(None, other) == (None, other)
 
 
 def test_both_are_refused(run: Path, tmp_path: Path) -> None:
-    Choice((Pair(),)).write(run / choice.CHOSEN)
+    Choice((ShowAndBox(),)).write(run / choice.CHOSEN)
     with pytest.raises(ConfigError, match="not both"):
         box_here(tmp_path / "box.yaml", run / choice.CHOSEN)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
 def test_root_goes_on_as_the_user_of_the_box_and_others_are_told_to_be_root(run: Path) -> None:
-    Choice((Pair(),)).write(run / choice.CHOSEN)
+    Choice((ShowAndBox(),)).write(run / choice.CHOSEN)
     for path in (run, run / choice.CHOSEN):
         os.chown(path, NOBODY, NOBODY)
-    assert "uid 65534" in _said(run, "pair_here(None, None); print('uid', os.geteuid())")
+    assert "uid 65534" in _said(run, "show_and_box_here(None, None); print('uid', os.geteuid())")
     closed = _said(run, "os.setuid(12345); box_here(None)")
     assert "closed to this user. Put sudo before the command" in closed
 
@@ -113,7 +113,7 @@ def test_root_goes_on_as_the_user_of_the_box_and_others_are_told_to_be_root(run:
 def _said(run: Path, message: str) -> str:
     program = (
         "import os, pathlib\n"
-        "from appliance.release.installed_box import box_here, pair_here\n"
+        "from appliance.release.installed_box import box_here, show_and_box_here\n"
         "from appliance.release import choice\n"
         "from appliance.show import config_error\n"
         f"choice.RUN = pathlib.Path({str(run)!r})\n{message}"

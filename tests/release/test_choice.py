@@ -20,7 +20,7 @@ from appliance.release.choice import (
     EMBEDDED_SHOW,
     Aside,
     Choice,
-    Pair,
+    ShowAndBox,
     box_of,
     write_whole,
 )
@@ -32,7 +32,7 @@ from tests.release.venue import BROKEN, Venue, dancing
 
 def test_without_anything_the_show_that_comes_with_the_box_dances(venue: Venue) -> None:
     outcome = venue.look()
-    assert outcome.choice.complete().first == Pair(EMBEDDED_SHOW, APPLIANCE_BOX, good=True)
+    assert outcome.choice.complete().first == ShowAndBox(EMBEDDED_SHOW, APPLIANCE_BOX, good=True)
     assert (outcome.taken, outcome.messages, venue.checked) == (False, (), [])
 
 
@@ -58,12 +58,12 @@ def test_the_show_before_is_kept_once_it_has_danced(venue: Venue) -> None:
     for text in ("spring", "summer"):
         venue.bring(venue.stick, text)
         choice = venue.look().choice
-        choice.with_good(choice.first.id).write(venue.places.data / CHOSEN)
+        choice.with_good(choice.first.id).write(venue.folders.data / CHOSEN)
     venue.bring(venue.stick, "autumn")
     pairs = venue.look().choice.complete().pairs
     assert [(pair.show / "show.yaml").read_text() for pair in pairs[:2]] == ["autumn", "summer"]
     assert pairs[-1].show == EMBEDDED_SHOW
-    kept = {path.name for path in (venue.places.data / "shows").iterdir()}
+    kept = {path.name for path in (venue.folders.data / "shows").iterdir()}
     assert {pair.show_id for pair in pairs[:2]} <= kept
 
 
@@ -71,7 +71,7 @@ def test_a_show_before_that_never_danced_is_better_than_none(venue: Venue) -> No
     for text in ("spring", "summer"):
         venue.bring(venue.stick, text)
         venue.look()
-    pairs = read_choice(venue.places.data).pairs
+    pairs = read_choice(venue.folders.data).pairs
     assert [(pair.show / "show.yaml").read_text() for pair in pairs] == ["summer", "spring"]
 
 
@@ -84,7 +84,7 @@ def test_a_broken_show_is_refused_with_its_line_on_the_stick_and_the_last_good_o
     outcome = venue.look()
     assert dancing(outcome) == "spring"
     assert f"{venue.stick}/show/show.yaml:1: It says broken. Mend it." in outcome.choice.refused
-    refused = (venue.places.data / "refusals" / "stick.txt").read_text()
+    refused = (venue.folders.data / "refusals" / "stick.txt").read_text()
     assert "what danced before goes on" in refused
     checked = len(venue.checked)
     again = venue.look()
@@ -97,7 +97,7 @@ def test_a_mended_show_is_taken_and_the_refusal_is_gone(venue: Venue) -> None:
     venue.look()
     venue.bring(venue.stick, "mended")
     assert dancing(venue.look()) == "mended"
-    assert not (venue.places.data / "refusals" / "stick.txt").exists()
+    assert not (venue.folders.data / "refusals" / "stick.txt").exists()
 
 
 def test_a_broken_box_file_does_not_hold_up_a_sound_show(venue: Venue) -> None:
@@ -125,7 +125,7 @@ def test_a_box_file_gets_from_the_box_what_it_leaves_out(venue: Venue) -> None:
     }
     venue.bring(venue.stick, "", box=yaml.safe_dump(said))
     box = load_box(venue.look().choice.first.box)
-    data, run = venue.places
+    data, run = venue.folders
     assert box.sensors.udp is None
     assert [one.host for one in box.outputs.osc] == ["10.0.0.9"]
     assert (box.sensors.keys, box.state) == (data / "keys/sensors.keys", data / "state")
@@ -155,9 +155,9 @@ def test_a_broken_stick_lets_the_boot_partition_have_its_turn(venue: Venue) -> N
 def test_a_torn_file_costs_another_look_at_the_stick_alone(venue: Venue, name: str, torn: bytes) -> None:
     venue.bring(venue.stick, "spring")
     venue.look()
-    (venue.places.data / name).write_bytes(torn)
+    (venue.folders.data / name).write_bytes(torn)
     assert dancing(venue.look()) == "spring"
-    assert Choice.read(venue.places.data / CHOSEN) is not None
+    assert Choice.read(venue.folders.data / CHOSEN) is not None
 
 
 def test_a_show_that_is_gone_from_the_disk_is_not_chosen(venue: Venue) -> None:
@@ -171,16 +171,16 @@ def test_a_show_that_is_gone_from_the_disk_is_not_chosen(venue: Venue) -> None:
 def test_what_comes_with_the_box_follows_the_release(venue: Venue, tmp_path: Path) -> None:
     venue.bring(venue.stick, "", box="outputs: {osc: []}")
     venue.look()
-    path = venue.places.data / CHOSEN
+    path = venue.folders.data / CHOSEN
     path.write_text(path.read_text().replace(str(EMBEDDED_SHOW), str(tmp_path / "an older release")))
-    assert read_choice(venue.places.data).first.show == EMBEDDED_SHOW
+    assert read_choice(venue.folders.data).first.show == EMBEDDED_SHOW
 
 
 def test_a_pair_put_aside_is_not_taken_again_from_the_same_stick(venue: Venue) -> None:
     venue.bring(venue.stick, "spring")
     choice = venue.look().choice
     aside = Choice(aside=(Aside(choice.first.id, "It did not dance."),))
-    choice.without(aside).write(venue.places.data / CHOSEN)
+    choice.without(aside).write(venue.folders.data / CHOSEN)
     again = venue.look()
     assert again.choice.complete().first.show == EMBEDDED_SHOW
     assert (again.choice.refused, again.choice.aside) == ((), aside.aside)
@@ -189,8 +189,9 @@ def test_a_pair_put_aside_is_not_taken_again_from_the_same_stick(venue: Venue) -
 
 
 def test_a_choice_is_read_as_it_was_written(tmp_path: Path) -> None:
-    pair = Pair(tmp_path / "show", tmp_path / "box.yaml", "a+b", "show from the stick", True)
-    choice = Choice((pair, Pair(good=True)), ("refused",), (Aside("c+", "It did not dance."),), tmp_path)
+    pair = ShowAndBox(tmp_path / "show", tmp_path / "box.yaml", "a+b", "show from the stick", True)
+    aside = (Aside("c+", "It did not dance."),)
+    choice = Choice((pair, ShowAndBox(good=True)), ("refused",), aside, tmp_path)
     choice.write(tmp_path / CHOSEN)
     assert Choice.read(tmp_path / CHOSEN) == choice
     top = json.loads((tmp_path / CHOSEN).read_text())
@@ -219,7 +220,7 @@ NO_TEXT = os.fsdecode(b"\xff\xfe.bvh")
 def _power_on(venue: Venue) -> str:
     """What dances, and is good from then on."""
     choice = venue.look().choice
-    choice.with_good(choice.first.id).write(venue.places.data / CHOSEN)
+    choice.with_good(choice.first.id).write(venue.folders.data / CHOSEN)
     return (choice.first.show / "show.yaml").read_text()
 
 
@@ -251,7 +252,7 @@ def test_a_show_put_aside_does_not_come_back_once_another_one_is_there(venue: Ve
     venue.bring(venue.boot, "never danced")
     choice = venue.look().choice
     aside = Choice(aside=(Aside(choice.first.id, "It did not dance."),))
-    choice.without(aside).write(venue.places.data / CHOSEN)
+    choice.without(aside).write(venue.folders.data / CHOSEN)
     venue.bring(venue.stick, "spring")
     assert [_power_on(venue) for _ in range(3)] == ["spring"] * 3
 
@@ -265,7 +266,7 @@ def test_a_show_that_was_lost_comes_back_also_after_a_pulled_stick(venue: Venue)
     arrival = look("stick", venue.stick)
     network = venue.stick / "show" / "puppet.onnx"
     network.rename(venue.stick / "away")
-    assert adopt(venue.places, [arrival], venue._check).choice.first.id != first.id
+    assert adopt(venue.folders, [arrival], venue._check).choice.first.id != first.id
     (venue.stick / "away").rename(network)
     assert dancing(venue.look()) == "spring"
 
@@ -273,11 +274,11 @@ def test_a_show_that_was_lost_comes_back_also_after_a_pulled_stick(venue: Venue)
 def test_what_is_refused_beside_a_running_show_is_checked_again_at_power_on(venue: Venue) -> None:
     venue.bring(venue.stick, "spring")
     arrivals = [look("stick", venue.stick)]
-    late = adopt(venue.places, arrivals, lambda show, box: ["It did not end in time."], late=True)
+    late = adopt(venue.folders, arrivals, lambda show, box: ["It did not end in time."], late=True)
     assert not late.taken
-    assert "did not end" in (venue.places.data / "refusals" / "stick.txt").read_text()
+    assert "did not end" in (venue.folders.data / "refusals" / "stick.txt").read_text()
     assert dancing(venue.look()) == "spring"
-    assert not (venue.places.data / "refusals" / "stick.txt").exists()
+    assert not (venue.folders.data / "refusals" / "stick.txt").exists()
 
 
 def test_the_same_show_again_is_as_good_as_before(venue: Venue) -> None:
@@ -288,7 +289,7 @@ def test_the_same_show_again_is_as_good_as_before(venue: Venue) -> None:
 
 
 def test_a_good_show_that_does_not_dance_tonight_is_tried_again_after_power_off(tmp_path: Path) -> None:
-    good, new = Pair(id="good+", good=True), Pair(id="new+")
+    good, new = ShowAndBox(id="good+", good=True), ShowAndBox(id="new+")
     aside = (Aside("good+", "Not danced."), Aside("new+", "Nor this."))
     kept = Choice((good, new)).without(Choice(aside=aside))
     assert (kept.pairs, kept.aside) == ((good,), aside[1:])
@@ -299,7 +300,7 @@ def test_a_name_that_is_no_text_stops_nobody(venue: Venue, content: str) -> None
     venue.bring(venue.stick, content)
     (venue.stick / "show" / NO_TEXT).write_bytes(b"1")
     said = adopt(
-        venue.places, [look("stick", venue.stick)], lambda show, box: [f"{show / NO_TEXT}: what is this?"]
+        venue.folders, [look("stick", venue.stick)], lambda show, box: [f"{show / NO_TEXT}: what is this?"]
     )
     for message in (*said.messages, *said.choice.refused):
         message.encode()
@@ -327,16 +328,16 @@ def test_a_file_that_goes_on_for_ever_is_left_early(venue: Venue) -> None:
     with (venue.stick / "show" / "puppet.onnx").open("ab") as grown:
         grown.truncate(1 << 40)
     with pytest.raises(UnreadableError, match="goes on after all of 300000 bytes"):
-        Shelf(venue.places.data).take_show(arrival)
-    assert not list((venue.places.data / "shows").iterdir())
+        Shelf(venue.folders.data).take_show(arrival)
+    assert not list((venue.folders.data / "shows").iterdir())
 
 
 @pytest.mark.programs
 def test_memory_is_never_filled_by_a_show(venue: Venue) -> None:
     """The place, the journal and the choice itself have to find room there."""
-    run, shm = venue.places.run, ["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs"]
-    venue.places.data.rmdir()
-    venue.places.data.symlink_to("/nowhere/at/all")
+    run, shm = venue.folders.run, ["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs"]
+    venue.folders.data.rmdir()
+    venue.folders.data.symlink_to("/nowhere/at/all")
     if subprocess.run([*shm, str(run)], capture_output=True, check=False).returncode:
         pytest.skip("this user may not mount a file system")
     try:

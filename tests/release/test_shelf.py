@@ -27,10 +27,10 @@ def test_a_stick_that_is_pulled_while_it_is_read_is_looked_at_again(venue: Venue
     venue.bring(venue.stick, "spring")
     arrival = look("stick", venue.stick)
     (venue.stick / "show" / "puppet.onnx").unlink()
-    outcome = adopt(venue.places, [arrival], venue._check)
+    outcome = adopt(venue.folders, [arrival], venue._check)
     assert outcome.choice.complete().first.show == EMBEDDED_SHOW
     assert "Plug it in again" in " ".join(outcome.choice.refused)
-    assert not list((venue.places.data / "shows").iterdir()), "a copy was left half-done"
+    assert not list((venue.folders.data / "shows").iterdir()), "a copy was left half-done"
     venue.bring(venue.stick, "spring")
     assert dancing(venue.look()) == "spring"
 
@@ -40,15 +40,15 @@ def test_a_file_that_ends_too_early_is_no_copy(venue: Venue) -> None:
     arrival = look("stick", venue.stick)
     os.truncate(venue.stick / "show" / "puppet.onnx", 1000)
     with pytest.raises(UnreadableError, match="ends after 1000 of 300000 bytes"):
-        Shelf(venue.places.data).take_show(arrival)
-    assert not list((venue.places.data / "shows").iterdir())
+        Shelf(venue.folders.data).take_show(arrival)
+    assert not list((venue.folders.data / "shows").iterdir())
 
 
 def test_a_damaged_copy_gives_way_to_a_whole_one_in_one_step(
     venue: Venue, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     venue.bring(venue.stick, "spring")
-    shelf, arrival = Shelf(venue.places.data), look("stick", venue.stick)
+    shelf, arrival = Shelf(venue.folders.data), look("stick", venue.stick)
     identity, place = shelf.take_show(arrival)
     (place / "puppet.onnx").write_bytes(b"damaged")
     monkeypatch.setattr(Path, "rename", lambda *_: pytest.fail("a power cut would leave no show"))
@@ -62,7 +62,7 @@ def test_a_stick_that_gives_errors_is_unreadable(venue: Venue) -> None:
     (venue.stick / "show" / "show.yaml").symlink_to("/proc/self/mem")  # its first page: EIO
     arrival = Arrival("stick", venue.stick, [["show/show.yaml", 10, 0]])
     with pytest.raises(UnreadableError, match=r"cannot be read \(Input/output error\)"):
-        Shelf(venue.places.data).take_show(arrival)
+        Shelf(venue.folders.data).take_show(arrival)
 
 
 def test_links_on_a_stick_lead_nowhere(venue: Venue) -> None:
@@ -74,7 +74,7 @@ def test_links_on_a_stick_lead_nowhere(venue: Venue) -> None:
 @pytest.fixture
 def small_data(venue: Venue) -> Iterator[Path]:
     """A data partition of half a megabyte."""
-    data = venue.places.data
+    data = venue.folders.data
     mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "tmpfs", str(data)]
     if subprocess.run(mount, capture_output=True, check=False).returncode:
         pytest.skip("this user may not mount a file system")
@@ -86,7 +86,7 @@ def test_a_full_disk_the_show_dances_from_memory(venue: Venue, small_data: Path)
     venue.bring(venue.stick, "spring")
     outcome = venue.look()
     assert dancing(outcome) == "spring"
-    assert outcome.choice.first.show.is_relative_to(venue.places.run)
+    assert outcome.choice.first.show.is_relative_to(venue.folders.run)
     with pytest.raises(NoRoomError):
         Shelf(small_data).take_show(look("stick", venue.stick))
 
@@ -96,13 +96,13 @@ def test_a_read_only_disk_the_show_dances_from_memory(venue: Venue, small_data: 
     venue.bring(venue.stick, "spring", box="outputs: {osc: []}")
     outcome = venue.look()
     assert dancing(outcome) == "spring"
-    assert outcome.choice.first.box.is_relative_to(venue.places.run)
+    assert outcome.choice.first.box.is_relative_to(venue.folders.run)
     assert "nothing can be kept there" in " ".join(outcome.messages)
 
 
 def test_without_a_data_partition_the_show_dances_from_memory(venue: Venue) -> None:
-    venue.places.data.rmdir()
-    venue.places.data.symlink_to("/nowhere/at/all")
+    venue.folders.data.rmdir()
+    venue.folders.data.symlink_to("/nowhere/at/all")
     venue.bring(venue.stick, "spring")
     assert dancing(venue.look()) == "spring"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.release.choice import CHOSEN, Choice, Pair
+from appliance.release.choice import CHOSEN, Choice, ShowAndBox
 from appliance.release.shows_here import shows_here
 from appliance.show.bundle import CHECKSUMS, bundled_shows, default_show_path
 
@@ -29,10 +29,10 @@ def test_the_newest_comes_first_and_those_of_the_box_last(tmp_path: Path) -> Non
     old = show(data / "shows" / "a", "Old", 100.0, "old")
     waits = show(data / "shows" / "b", "Waits", 300.0, "waits")
     learned = show(tmp_path / "learning" / "show", "Learned", 200.0, "learned")
-    gone = Pair(tmp_path / "gone", id="c+")
+    gone = ShowAndBox(tmp_path / "gone", id="c+")
     for folder, pairs in (
-        (data, (Pair(waits, id="b+"), Pair(old, id="a+"))),
-        (run, (Pair(old, id="a+"), gone)),
+        (data, (ShowAndBox(waits, id="b+"), ShowAndBox(old, id="a+"))),
+        (run, (ShowAndBox(old, id="a+"), gone)),
     ):
         folder.mkdir(exist_ok=True)
         Choice(pairs, data=data).write(folder / CHOSEN)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from appliance.release.adoption import Outcome, Places, adopt
+from appliance.release.adoption import BoxFolders, Outcome, adopt
 from appliance.release.arrivals import look
 
 BROKEN = "broken"
@@ -16,9 +16,9 @@ class Venue:
 
     def __init__(self, folder: Path) -> None:
         self.stick, self.boot = folder / "stick", folder / "boot"
-        self.places = Places(folder / "data", folder / "run")
+        self.folders = BoxFolders(folder / "data", folder / "run")
         self.checked: list[tuple[Path, Path]] = []
-        for one in (self.stick, self.boot, *self.places):
+        for one in (self.stick, self.boot, *self.folders):
             one.mkdir()
 
     def bring(self, where: Path, text: str, box: str | None = None) -> None:
@@ -32,7 +32,7 @@ class Venue:
             (where / "box.yaml").write_text(box)
 
     def look(self) -> Outcome:
-        return adopt(self.places, [look("stick", self.stick), look("boot", self.boot)], self._check)
+        return adopt(self.folders, [look("stick", self.stick), look("boot", self.boot)], self._check)
 
     def _check(self, show: Path, box: Path) -> list[str]:
         self.checked.append((show, box))

@@ -27,7 +27,7 @@ from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show_control.packet import datagram
 from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
-from appliance.show_control.settings import Settings
+from appliance.show_control.settings import ControlSettings
 from tests.bundles import FIGURE
 from tests.logged import said
 from tests.outputs.small_stage import one_puppet
@@ -192,7 +192,7 @@ class ControlInThread:
     ) -> None:
         self.said = said
         bound = open_port(host, 0)
-        settings = Settings(
+        settings = ControlSettings(
             *(str(folder), bound.detach(), tuple(senders), tuple(heartbeat), str(key_file or "")),
             *(tuple(replies), tuple(feedback)),
         )
@@ -275,7 +275,7 @@ def control_process(folder: Path, output: Path) -> Iterator[tuple[subprocess.Pop
     """Show control as the process that a box runs, and its port."""
     bound = open_port(HOST, 0)
     os.set_inheritable(bound.fileno(), True)
-    settings = Settings(str(folder), bound.fileno())
+    settings = ControlSettings(str(folder), bound.fileno())
     with output.open("wb") as out:
         process = subprocess.Popen(
             [sys.executable, "-m", "appliance.show_control", settings.packed()],

@@ -14,7 +14,7 @@ from appliance.show_control.intake import WAITING as DATAGRAMS_WAITING
 from appliance.show_control.packet import URGENT, messages_in
 from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
-from appliance.show_control.settings import Settings
+from appliance.show_control.settings import ControlSettings
 from tests.show_control.doubles import HOST, Asker, Clock, facts
 from tests.show_control.fuzz import bundle, message
 
@@ -34,7 +34,7 @@ NOISE = {
 
 @pytest.fixture
 def process(folder: Path, clock: Clock) -> Iterator[ControlProcess]:
-    settings = Settings(str(folder), open_port(HOST, 0).detach())
+    settings = ControlSettings(str(folder), open_port(HOST, 0).detach())
     with (
         closing(FrameWriter(folder, facts())),
         closing(ControlProcess(settings, clock)) as process,

@@ -21,7 +21,7 @@ from appliance.show_control.intake import LIVE_WAITING
 from appliance.show_control.live_input import POSITIONS, ROTATIONS
 from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
-from appliance.show_control.settings import Settings
+from appliance.show_control.settings import ControlSettings
 from appliance.show_control.vmc_input import BONE, ROOT
 from tests.logged import said
 from tests.show_control.doubles import FIGURE, HOST, Asker, Clock, ControlInThread, StageDouble, facts, until
@@ -40,7 +40,7 @@ def stage(folder: Path) -> Iterator[StageDouble]:
 
 @pytest.fixture
 def process(folder: Path, clock: Clock) -> Iterator[ControlProcess]:
-    settings = Settings(str(folder), open_port(HOST, 0).detach())
+    settings = ControlSettings(str(folder), open_port(HOST, 0).detach())
     with (
         closing(FrameWriter(folder, SHOW)),
         closing(ControlProcess(settings, clock)) as process,
@@ -168,7 +168,7 @@ def test_panic_waits_for_a_few_figures_of_a_stream_and_not_for_all(
 ) -> None:
     """50 bones in a bundle take a millisecond: 64 of them held panic up by 270 ms."""
     clock = Clock()
-    settings = Settings(str(folder), open_port(HOST, 0).detach())
+    settings = ControlSettings(str(folder), open_port(HOST, 0).detach())
     with (
         closing(FrameWriter(folder, SHOW)),
         closing(ControlProcess(settings, clock)) as process,

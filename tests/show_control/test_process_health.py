@@ -15,7 +15,7 @@ from appliance.keeper.mirror import Mirror, Mirrored
 from appliance.keeper.records import mirrored_checkpoint, mirrored_sensor_memory
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
-from appliance.release.choice import CHOSEN, Aside, Choice, Pair
+from appliance.release.choice import CHOSEN, Aside, Choice, ShowAndBox
 from appliance.release.trial import MirroredProof
 from appliance.show_control.stage_observer import StageObserver
 from tests.bundles import FIGURE
@@ -142,7 +142,7 @@ def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
     processes = ProcessHealth(folder)
     assert reported(processes, 1.0) == {}
     aside = (Aside("a+", "Did not dance."),)
-    Choice((Pair(),), ("Broken one.", "Broken two."), aside).write(folder / CHOSEN)
+    Choice((ShowAndBox(),), ("Broken one.", "Broken two."), aside).write(folder / CHOSEN)
     assert reported(processes, 1.0) == {
         "show-refused": ("preflight", 2, True),
         "show-put-aside": ("preflight", 1, True),

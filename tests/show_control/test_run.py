@@ -16,7 +16,7 @@ from appliance.outputs.shared_frame import FrameWriter
 from appliance.show_control.order_dispatch import ANSWER_S, PATIENCE_S
 from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
-from appliance.show_control.settings import Settings
+from appliance.show_control.settings import ControlSettings
 from tests.show_control.doubles import HOST, Asker, Clock, facts
 
 
@@ -28,7 +28,7 @@ def stage(folder: Path) -> Iterator[FrameWriter]:
 
 @pytest.fixture
 def process(folder: Path, clock: Clock, stage: FrameWriter) -> Iterator[ControlProcess]:
-    settings = Settings(str(folder), open_port(HOST, 0).detach())
+    settings = ControlSettings(str(folder), open_port(HOST, 0).detach())
     with closing(ControlProcess(settings, clock)) as process:
         yield process
 

@@ -11,7 +11,7 @@ import pytest
 from appliance.box.live_pose import LivePose
 from appliance.dancer.turns import STRETCH_TICKS, answerer_leads
 from appliance.pose import quaternion
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError

@@ -13,7 +13,7 @@ from appliance.box.orders import Order
 from appliance.dancer.held_positions import HeldPosition, RemotePosition, in_room
 from appliance.dancer.puppet import weights_of_one_pass
 from appliance.pose import quaternion
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.show.show import load_show
 from appliance.stage.carry_out import obey
 from appliance.stage.comparison import Comparison

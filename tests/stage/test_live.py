@@ -14,7 +14,7 @@ import pytest
 from appliance.box.live_pose import LivePose, LivePoseReader, LivePoseWriter
 from appliance.levers.sources import LIVE
 from appliance.pose import quaternion
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from tests.bundles import write_show
 from tests.recorder.night import Night
 from tests.stage.test_replay import danced

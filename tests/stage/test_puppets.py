@@ -16,7 +16,7 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison

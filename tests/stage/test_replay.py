@@ -13,7 +13,7 @@ from appliance.box.snapshot import packed, unpacked
 from appliance.cli.replay import replay as replay_journal
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import Run, read_journal
+from appliance.recorder.journal_reader import Run, read_journal
 from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison

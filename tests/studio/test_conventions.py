@@ -20,7 +20,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import read_upright
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.strip import COLUMNS, ROWS
-from appliance.recorder.reading import JournalRecording, read_journal
+from appliance.recorder.journal_reader import JournalRecording, read_journal
 from appliance.recorder.record import holds_of
 from appliance.show.show import load_show
 from appliance.studio.exchange.retargeting import lowest_m

@@ -24,7 +24,7 @@ from appliance.outputs.dmx.sacn import component_identifier
 from appliance.pose.bvh import BvhError, read_bvh, write_bvh
 from appliance.projector.alignment import AlignmentFile
 from appliance.release.choice import Choice
-from appliance.release.trial import pair_to_dance
+from appliance.release.trial import chosen_to_dance
 from appliance.sensor.keys import KeyFileError, load_keys
 from appliance.show.config_error import ConfigError
 from appliance.show.projector import ProjectorConfig
@@ -65,7 +65,7 @@ def fixture(path: Path) -> None:
 
 def choice(path: Path) -> None:
     assert Choice.read(path) is None
-    assert pair_to_dance(path, 0.0).good
+    assert chosen_to_dance(path, 0.0).good
 
 
 def recording(path: Path) -> None:

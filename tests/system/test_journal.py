@@ -13,7 +13,7 @@ import pytest
 from appliance.box.checkpoint import CheckpointReader
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.recorder.segments import segment_paths
 from tests.bundles import swaying_phrase, write_show
 from tests.show_control.doubles import Asker

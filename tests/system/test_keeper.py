@@ -20,7 +20,7 @@ from appliance.box.ring_file import RingFileWriter
 from appliance.keeper.fallback import JOURNAL_STOPPED, SENSORS_NOT_SAVED
 from appliance.keeper.keeper import keep_rest
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.sensor.memory import FILE_NAME, memory_record
 from appliance.show.box import load_box
 from appliance.stage.recorder import FILE as JOURNAL_FILE

@@ -13,7 +13,7 @@ import pytest
 from appliance.box.block import BlockReader, BlockWriter
 from appliance.box.orders import Order, OrderInbox, OrderSender
 from appliance.box.runtime_folder import AlreadyHereError, Claim, renew_lost, restored_file
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from tests.bundles import write_show
 from tests.console.page import box_with_page
 from tests.system.processes import children_running, wait_until

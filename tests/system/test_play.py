@@ -16,7 +16,7 @@ import pytest
 from pythonosc.udp_client import SimpleUDPClient
 
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.recorder.record import LATE, NOT_FINITE
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show

@@ -23,8 +23,8 @@ from appliance.dancer.phrase_cache import FOLDER, SUFFIX
 from appliance.keeper.mirror import Mirror
 from appliance.keeper.mirror_process import MirrorProcess
 from appliance.outputs.shared_frame import FrameWriter
-from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, Pair
-from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
+from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, ShowAndBox
+from appliance.release.trial import ANEW, TRIES, MirroredProof, chosen_to_dance, ended_well
 from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
 from tests.bundles import FIGURE, write_show
@@ -166,7 +166,7 @@ def put_aside(tmp_path: Path) -> Machine:
 def fail_to_start(machine: Machine) -> None:
     """Start the stage until it gives up: each process dies before its first frame."""
     for _ in range(STARTS):
-        run_with_timeout(60.0, lambda: pair_to_dance(machine.run / CHOSEN, time.monotonic()).id.encode())
+        run_with_timeout(60.0, lambda: chosen_to_dance(machine.run / CHOSEN, time.monotonic()).id.encode())
 
 
 def only_aside(machine: Machine) -> str:
@@ -283,9 +283,9 @@ class Evening:
             (folder / name).mkdir()
             (folder / name / "show.yaml").touch()
         pairs = (
-            Pair(folder / "new", id=NEW, source="show from the stick"),
-            Pair(folder / "before", id=BEFORE, source="show from the boot partition", good=True),
-            Pair(good=True),
+            ShowAndBox(folder / "new", id=NEW, source="show from the stick"),
+            ShowAndBox(folder / "before", id=BEFORE, source="show from the boot partition", good=True),
+            ShowAndBox(good=True),
         )
         Choice(pairs, data=self.data).write(self.run / CHOSEN)
         Choice(pairs[:2], data=self.data).write(self.data / CHOSEN)
@@ -294,7 +294,7 @@ class Evening:
         """Which pair a stage takes that dies after `danced_s` (None: before its first frame)."""
 
         def begin() -> bytes:
-            pair = pair_to_dance(self.run / CHOSEN, time.monotonic())
+            pair = chosen_to_dance(self.run / CHOSEN, time.monotonic())
             if danced_s is not None:
                 self._leave_frames(danced_s)
             return pair.id.encode()
@@ -389,7 +389,7 @@ def test_a_torn_count_starts_over(evening: Evening, torn: bytes) -> None:
 
 
 def test_without_a_choice_what_comes_with_the_box_dances(tmp_path: Path) -> None:
-    assert pair_to_dance(tmp_path / CHOSEN, 0.0) == Pair(good=True)
+    assert chosen_to_dance(tmp_path / CHOSEN, 0.0) == ShowAndBox(good=True)
     assert "The audience sees the show that comes with the box" in said[0]
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from appliance.recorder import chunks
-from appliance.recorder.reading import segments_of
+from appliance.recorder.journal_reader import segments_of
 from appliance.sensor.keys import SensorKey, load_keys
 from appliance.sensor.link import open_link
 from appliance.sensor.provisioning.wearable_console import WearableConsole

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from appliance.box.checkpoint import FILE, read_checkpoint
 from appliance.outputs.frame_reader import FrameReader
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from appliance.sensor.memory import FILE_NAME, memory_record, memory_text, read_memory
 from tests.bundles import write_show
 from tests.system.box import Box, playing

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from appliance.dancer.puppeteers import HOLD_S, TAKE_S
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from hw_sim.emulator import Sent
 from hw_sim.peers import remove_folder
 from tests.bundles import FIGURE, MOVING, write_show

@@ -23,7 +23,7 @@ import yaml
 from appliance.levers.show_state import ShowState
 from appliance.levers.table import MASTER
 from appliance.outputs.frame_reader import FrameReader
-from appliance.recorder.reading import read_journal
+from appliance.recorder.journal_reader import read_journal
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
 from tests.show_control.doubles import Asker

@@ -44,7 +44,7 @@ class _Hold(NamedTuple):
     heard_at: float
 
 
-class Hands:
+class BrowserHands:
     """Joints that browsers hold. A joint is given back when its browser lets go, is silent for SILENT_S or is
     gone, and when its device was revoked; after a crash of this process, by the next one.
 
@@ -54,7 +54,7 @@ class Hands:
     def __init__(self, guard: Guard, desk: Desk, folder: Path) -> None:
         self._guard, self._desk = guard, desk
         self._held: dict[str, _Hold] = {}
-        self._note = WholeFile(folder / "console.hands", _LARGEST)
+        self._note = WholeFile(folder / "console.browser_hands", _LARGEST)
         self._browsers: set[web.WebSocketResponse] = set()
         self._releasing: set[asyncio.Task[None]] = set()
 
