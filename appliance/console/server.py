@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import hashlib
 import math
 import secrets
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 from aiohttp import web
 
@@ -205,10 +207,16 @@ def _are_plain(arguments: object) -> bool:
     return all(isinstance(one, str) or (isinstance(one, int | float) and abs(one) < 1e9) for one in arguments)
 
 
-class _File(NamedTuple):
+@dataclass(frozen=True)
+class _File:
     content: bytes
     kind: str
     tag: str
+
+    @cached_property
+    def packed(self) -> bytes:
+        """By gzip: a third of the bytes, on a venue's Wi-Fi a third of the time."""
+        return gzip.compress(self.content, mtime=0)
 
 
 def read_files(folder: Path = FOLDER) -> dict[str, _File]:
@@ -217,7 +225,7 @@ def read_files(folder: Path = FOLDER) -> dict[str, _File]:
     for path in sorted(folder.rglob("*")):
         if path.suffix in _KINDS:
             content = path.read_bytes()
-            tag = f'"{hashlib.sha256(content).hexdigest()[:16]}"'
+            tag = f'W/"{hashlib.sha256(content).hexdigest()[:16]}"'
             found[f"/{path.relative_to(folder).as_posix()}"] = _File(content, _KINDS[path.suffix], tag)
     return found | {"/": found["/index.html"], "/phone": found["/phone.html"]}
 
@@ -238,7 +246,10 @@ class PageFiles:
         file = self._files.get(request.path)
         if file is None:
             raise web.HTTPNotFound(text="There is nothing at this address.")
-        headers = {"Cache-Control": "no-cache", "ETag": file.tag}
+        headers = {"Cache-Control": "no-cache", "ETag": file.tag, "Vary": "Accept-Encoding"}
         if request.headers.get("If-None-Match") == file.tag:
             return web.Response(status=304, headers=headers)
-        return web.Response(body=file.content, content_type=file.kind, charset="utf-8", headers=headers)
+        content = file.content
+        if "gzip" in request.headers.get("Accept-Encoding", ""):
+            content, headers["Content-Encoding"] = file.packed, "gzip"
+        return web.Response(body=content, content_type=file.kind, charset="utf-8", headers=headers)
