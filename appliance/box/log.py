@@ -21,13 +21,14 @@ OURS = "appliance"  # the logger above all of the product's own
 LINES, PERIOD_S = 10, 60.0
 _ANSWERED = "aiohttp.http_exceptions"  # what is no HTTP got its 400
 _LAST_OUTPUT_S = 0.5
-# sd-daemon(3): systemd's journal takes a line's priority from its beginning.
+# syslog(3); systemd's journal takes a line's priority from its beginning (sd-daemon(3)).
+INFO_PRIORITY = 6
 _PRIORITIES = {
-    logging.CRITICAL: "<2>",
-    logging.ERROR: "<3>",
-    logging.WARNING: "<4>",
-    logging.INFO: "<6>",
-    logging.DEBUG: "<7>",
+    logging.CRITICAL: 2,
+    logging.ERROR: 3,
+    logging.WARNING: 4,
+    logging.INFO: INFO_PRIORITY,
+    logging.DEBUG: 7,
 }
 
 
@@ -57,7 +58,7 @@ class LogWriter(logging.Handler):
         return passes
 
     def keep_in(self, path: Path) -> None:
-        """Keep the last lines in a file too, each with its time (Unix seconds): the page shows them."""
+        """Keep the last records in a file too, for the page; each is a line: Unix seconds, priority, text."""
         with contextlib.suppress(OSError):
             path.write_bytes(b"")
         self._file = path
@@ -86,10 +87,10 @@ class LogWriter(logging.Handler):
                 self._reported = dropped
 
     def _write(self, text: str, level: int) -> None:
-        self._keep(f"{time.time():.3f} {text}\n")
+        priority = _PRIORITIES.get(level, INFO_PRIORITY)
+        self._keep(f"{time.time():.3f} {priority} {' '.join(text.splitlines())}\n")
         if self._names_priorities:
-            priority = _PRIORITIES.get(level, "")
-            text = "\n".join(f"{priority}{line}" for line in text.split("\n"))
+            text = "\n".join(f"<{priority}>{line}" for line in text.split("\n"))
         with contextlib.suppress(OSError):  # its reader is gone: the page still gets the line
             os.write(self._descriptor, f"{text}\n".encode(errors="backslashreplace"))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from aiohttp import web
 
-from appliance.box.log import MOST_SAID, SAID
+from appliance.box.log import INFO_PRIORITY, MOST_SAID, SAID
 from appliance.console.child import output_of
 
 _PATIENCE_S = 10.0
@@ -18,12 +18,12 @@ _MOST = 200  # lines for a browser
 _FIGURES = re.compile(r" *[0-9.]+ Hz +tick ")  # the stage's line of each second; its newest is enough
 _JOURNALCTL = (
     *("journalctl", "--boot", "--no-pager", f"--lines={MOST_SAID}", "--output=json", "--unit=bunraku*"),
-    "--output-fields=_SYSTEMD_UNIT,UNIT,MESSAGE",
+    "--output-fields=_SYSTEMD_UNIT,UNIT,PRIORITY,MESSAGE",
 )
 
 
 class Logs:
-    """Requests for lines: `time` (Unix seconds), `unit`, `message`; the newest last."""
+    """Requests for records: time (Unix seconds), unit, priority (syslog(3)), message; the newest last."""
 
     def __init__(self, runtime: Path, is_installed: bool) -> None:
         self._said, self._is_installed = runtime / SAID, is_installed
@@ -47,8 +47,8 @@ class Logs:
             raise web.HTTPNotFound(
                 text="Nothing is kept of what `bunraku play` said: is it running?"
             ) from None
-        parts = [line.partition(" ") for line in said]
-        return [_line(float(at), "play", text) for at, _, text in parts if _is_number(at)]
+        parts = [line.split(" ", 2) for line in said]
+        return [_line(float(one[0]), "play", one[1], one[2]) for one in parts if _is_record(one)]
 
 
 async def _of_units() -> list[dict[str, Any]]:
@@ -74,12 +74,14 @@ def _of_journal(line: bytes) -> dict[str, Any] | None:
         at, text = int(entry["__REALTIME_TIMESTAMP"]) / 1e6, entry["MESSAGE"]
     except (ValueError, KeyError, TypeError):
         return None
-    return _line(at, unit.removesuffix(".service"), text) if isinstance(text, str) else None
+    priority = str(entry.get("PRIORITY", INFO_PRIORITY))
+    return _line(at, unit.removesuffix(".service"), priority, text) if isinstance(text, str) else None
 
 
-def _line(at: float, unit: str, text: str) -> dict[str, Any]:
-    return {"time": at, "unit": unit, "message": text[:_LONGEST]}
+def _line(at: float, unit: str, priority: str, text: str) -> dict[str, Any]:
+    urgent = int(priority) if priority.isdecimal() else INFO_PRIORITY
+    return {"time": at, "unit": unit, "priority": urgent, "message": text[:_LONGEST]}
 
 
-def _is_number(text: str) -> bool:
-    return text.replace(".", "", 1).isdecimal()
+def _is_record(parts: list[str]) -> bool:
+    return len(parts) == 3 and parts[0].replace(".", "", 1).isdecimal() and parts[1].isdecimal()

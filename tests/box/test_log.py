@@ -115,7 +115,7 @@ def test_the_page_still_gets_the_lines_when_the_terminal_is_gone(
     writer.close()
     _ended()
     kept = (tmp_path / "said").read_text().splitlines()
-    assert [line.partition(" ")[2] for line in kept] == ["The show begins.", "The show goes on."]
+    assert [line.partition(" ")[2] for line in kept] == ["6 The show begins.", "6 The show goes on."]
 
 
 def test_the_file_for_the_page_stays_small_and_is_there_again_when_it_was_removed(

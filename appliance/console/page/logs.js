@@ -16,6 +16,7 @@ async function readLogs() {
     const item = document.createElement("li"), small = document.createElement("small");
     const name = words(`unit_${line.unit}`);
     item.textContent = line.message;
+    item.classList.toggle("amiss", line.priority <= 4); // a warning, or worse
     small.textContent = `${clock(line.time)} · ${name.startsWith("unit_") ? line.unit : name}`;
     item.append(small);
     return item;
