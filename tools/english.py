@@ -1,6 +1,6 @@
 """Finds translated English in what people read: pages, messages, docstrings and comments.
 
-`python -m tools.english` lists the findings, `--update` writes the table that tests/test_english.py holds.
+`python -m tools.english` lists the findings; tests/test_english.py asserts that there are none.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ import json
 import re
 import subprocess
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 ROOT = Path(__file__).resolve().parents[1]
-TABLE = ROOT / "tests" / "english_findings.txt"
 FOLDERS = ("appliance", "hw_sim", "firmware", "tools", "deploy")
 PAGES = ("*.md", "docs/*.md", "firmware/*.md")
 C_LIKE = {".h", ".hpp", ".c", ".cpp", ".ino", ".js", ".glsl", ".css"}
@@ -255,41 +254,18 @@ def findings(root: Path = ROOT) -> list[Finding]:
     return [one for path in files(root) for one in findings_in(path, root)]
 
 
-def counts(found: Sequence[Finding]) -> Counter[str]:
-    return Counter(one.path for one in found)
-
-
-def read_table(path: Path = TABLE) -> dict[str, int]:
-    """Findings that each file may still have."""
-    rows = (line.rsplit(maxsplit=1) for line in path.read_text("utf-8").splitlines())
-    return {name: int(count) for name, count in rows}
-
-
-def write_table(now: Mapping[str, int], path: Path = TABLE) -> None:
-    """Write the table; ValueError where the sum would grow. A file that moved keeps its findings."""
-    before = sum(read_table(path).values()) if path.exists() else None
-    if before is not None and sum(now.values()) > before:
-        raise ValueError(
-            f"The table has {before} findings, the tree {sum(now.values())}. Rewrite the new ones."
-        )
-    path.write_text("".join(f"{name} {count}\n" for name, count in sorted(now.items())), "utf-8")
-
-
 def main() -> None:
     options = argparse.ArgumentParser(prog="python -m tools.english", description=__doc__)
     options.add_argument("paths", nargs="*", help="files or folders, all without any")
-    options.add_argument("--update", action="store_true", help="write the table; its sum may only shrink")
     options.add_argument("--by-room", action="store_true", help="counts of each folder in place of the list")
     asked = options.parse_args()
     found = findings()
-    if asked.update:
-        write_table(counts(found))
     if asked.by_room:
         rooms = Counter(
             "/".join(one.path.split("/")[:2][: 2 if one.path.count("/") > 0 else 1]) for one in found
         )
         print("\n".join(f"{count:6} {room}" for room, count in rooms.most_common()))
-    elif not asked.update:
+    else:
         wanted = tuple(asked.paths)
         print("\n".join(str(one) for one in found if one.path.startswith(wanted or "")))
 
