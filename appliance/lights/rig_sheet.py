@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from appliance.lights.head import Array
 from appliance.lights.patch import Patch
 from appliance.lights.phrase_run import passes
 from appliance.lights.plan import draw_plan
-from appliance.lights.run import rig_problems, say
+from appliance.lights.run import rig_problems
 from appliance.lights.unknown_name import UnknownNameError
 from appliance.lights.usual_mapping import with_usual_mapping
 from appliance.pictures.filmstrip import MissingPicturesError
@@ -59,15 +60,21 @@ def print_rig(
     config = with_usual_mapping(config, patch, show.skeleton)
     Console().print(_table(config, show, box))
     for sentence in unwired(show.config, box):
-        say(sentence)
+        _say(sentence)
     phrase = read_bvh(show.phrase)
     for sentence in dazzling(config, patch, phrase):
-        say(sentence)
+        _say(sentence)
     try:
         drawn = _draw(config, patch, show, phrase, out, mapping or "", at_s)
-        say(f"The rig, from above and from the audience: {drawn}")
+        _say(f"The rig, from above and from the audience: {drawn}")
     except MissingPicturesError as error:
-        say(str(error))
+        _say(str(error))
+
+
+def _say(message: str) -> None:
+    """Print a line; a closed terminal is ignored."""
+    with contextlib.suppress(OSError, ValueError):
+        print(message, flush=True)
 
 
 def _table(config: LightsConfig, show: Show, box: BoxConfig) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
 import time
@@ -244,18 +243,17 @@ def _light(lights: Lights, stopped: Callable[[], bool], pulse: Callable[[float],
         lights.close()
 
 
-def say(message: str) -> None:
-    """Print a line; a closed terminal is ignored: light matters more."""
-    with contextlib.suppress(OSError, ValueError):
-        print(message, flush=True)
-
-
 def _wait_for(deadline: float, period_s: float) -> float:
-    """Sleep until the next deadline on the grid; missed passes are skipped."""
+    """Sleep until the next deadline on the grid."""
     now = time.monotonic()
-    deadline += period_s * max(1, math.ceil((now - deadline) / period_s))
+    deadline = _next_on_grid(deadline, period_s, now)
     time.sleep(max(deadline - now, 0.0))
     return deadline
+
+
+def _next_on_grid(deadline: float, period_s: float, now: float) -> float:
+    """The deadline after this one; missed passes are skipped."""
+    return deadline + period_s * max(1, math.ceil((now - deadline) / period_s))
 
 
 class ActiveShow:
@@ -319,8 +317,7 @@ class Speaking:
         """While silent: until the next pass on the grid, or until this box leads. None: it speaks."""
         if self._speaks:
             return None
-        now = time.monotonic()
-        deadline += period_s * max(1, math.ceil((now - deadline) / period_s))
+        deadline = _next_on_grid(deadline, period_s, time.monotonic())
         while (left_s := deadline - time.monotonic()) > 0.0:
             time.sleep(min(_LOOK_S, left_s))
             if self.may_speak(time.monotonic()):
