@@ -27,6 +27,11 @@ def listening(host: str, port: int) -> socket.socket:
     return socket.create_server((host, port), family=family, dualstack_ipv6=host == "::")
 
 
+def from_here(host: str) -> str:
+    """The address by which this machine reaches a socket that listens on this host."""
+    return "127.0.0.1" if host in ("0.0.0.0", "::") else host
+
+
 def port_cure(error: OSError, section: str) -> str:
     """The cure for a port that cannot be opened. section: of the box file."""
     cures = {

@@ -17,7 +17,7 @@ import typer
 from appliance.box.durable import write_whole
 from appliance.box.notify import WATCHDOG_S
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
-from appliance.box.served import is_loopback, name_in_network
+from appliance.box.served import from_here, is_loopback, name_in_network
 from appliance.cli.companions import Companion
 from appliance.cli.options import (
     BoxFile,
@@ -151,8 +151,7 @@ def phone(
         )
     try:
         _, host, port, https = (folder / WHERE).read_text().splitlines()
-        here = "127.0.0.1" if host in ("0.0.0.0", "::") else host
-        socket.create_connection((here, int(port)), _PATIENCE_S).close()
+        socket.create_connection((from_here(host), int(port)), _PATIENCE_S).close()
         for line in invitation(codes, address(host, int(port), bool(https)), chosen, sys.stdout.isatty()):
             print(line)
     except (OSError, ValueError) as error:
@@ -214,8 +213,8 @@ def console_command(
     console, own = box.console or ConsoleConfig(), box.control
     if control is None and own is not None and own.port:
         control = own.host, own.port
-    if control is not None and control[0] == "0.0.0.0":
-        control = "127.0.0.1", control[1]
+    if control is not None:
+        control = from_here(control[0]), control[1]
     folder = runtime_folder(box)
     with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as opened:
         host, port = opened.getsockname()[:2]

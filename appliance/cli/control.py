@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from appliance.box.runtime_folder import runtime_folder
-from appliance.box.served import port_cure
+from appliance.box.served import from_here, port_cure
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
 from appliance.sensor.foreign.sources import SourceSettings
@@ -91,7 +91,7 @@ def begin_in(cue: str, show: Show, control: socket.socket | None) -> None:
         raise StageError("--cue needs show control beside the stage: leave --alone and `control: null` out.")
     host, port = control.getsockname()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-        asking.sendto(datagram(("/cue", cue)), ("127.0.0.1" if host == "0.0.0.0" else host, port))
+        asking.sendto(datagram(("/cue", cue)), (from_here(host), port))
 
 
 def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:

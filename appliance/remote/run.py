@@ -14,6 +14,7 @@ from typing import Any
 from appliance.box.fallback import Fallbacks
 from appliance.box.own_process import OwnProcess
 from appliance.box.process_health import ProcessHealth
+from appliance.box.served import from_here
 from appliance.box.show_state import ShowStateReader
 from appliance.levers.addresses import ADDRESSES
 from appliance.levers.show_state import ShowState
@@ -240,7 +241,7 @@ class Remote:
         control = box.control
         assert control is not None  # the box file was checked
         self._box, self._fallbacks = box, fallbacks
-        self._to = ("127.0.0.1" if control.host == "0.0.0.0" else control.host, control.port)
+        self._to = from_here(control.host), control.port
         self._desk = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._desk.setblocking(False)
         self._stage, self._state = FrameReader(folder), ShowStateReader(folder)

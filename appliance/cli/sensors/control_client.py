@@ -9,6 +9,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
+from appliance.box.served import from_here
 from appliance.show.box import BoxConfig
 from appliance.show_control.command import reply_to
 from appliance.show_control.order_dispatch import PATIENCE_S as ERRAND_S
@@ -44,7 +45,7 @@ class ControlClient:
         control = box.control
         if control is None or control.port == 0:
             return cls(None)
-        return cls(("127.0.0.1" if control.host == "0.0.0.0" else control.host, control.port))
+        return cls((from_here(control.host), control.port))
 
     @property
     def has_port(self) -> bool:
