@@ -19,7 +19,6 @@ _PATHS = ("--show", "--box", "--journal", "--chosen")
 _SECONDS, _ALONE = "--seconds", "--alone"
 _FEWEST_SECONDS = 0.1
 INTERRUPTED = 130  # as shells say it
-_PARAMETERS = {"show": "directory", "box": "box_file"}
 
 Options = dict[str, Path | float | bool]
 
@@ -77,10 +76,10 @@ def options_of_play(given: Sequence[str]) -> Options | None:
 
 
 def _play(options: Options) -> int:
-    from appliance.cli.play import play_show
+    from appliance.cli.play import PlayOptions, play_show
 
-    named = {_PARAMETERS.get(name, name): value for name, value in options.items()}
-    return play_show(**named)  # type: ignore[arg-type]  # options_of_play gives each name its type
+    # options_of_play gives each name its type
+    return play_show(PlayOptions(**options))  # type: ignore[arg-type]
 
 
 def _number(text: str) -> float:

@@ -163,13 +163,26 @@ def play(
     ] = False,
 ) -> int:
     """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
-    from appliance.cli.play import play_show
+    from appliance.cli.play import PlayOptions, play_show
 
     if alone:
         refuse_idle(context, ("window",), "with --alone, which starts no projector")
         refuse_idle(context, ("phone",), "with --alone, which serves no page")
     return play_show(
-        show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse, chosen, cue, phone
+        PlayOptions(
+            show=show,
+            box=box,
+            seconds=seconds,
+            emulate=emulate,
+            journal=journal,
+            filmstrip=filmstrip,
+            alone=alone,
+            window=window,
+            rehearse=rehearse,
+            chosen=chosen,
+            cue=cue,
+            phone=phone,
+        )
     )
 
 
@@ -242,7 +255,9 @@ def refuse(error: Exception) -> NoReturn:
         message = sentence(error)
     if message is None:
         raise error
-    print(f"bunraku: {message}", file=sys.stderr)
+    from appliance.box.log import is_journal
+
+    print(f"{'<3>' * is_journal(2)}bunraku: {message}", file=sys.stderr)  # sd-daemon(3): an error
     status = getattr(error, "exit_status", REFUSED)
     if status != REFUSED:
         Notifier().ready(str(error))  # systemd must not count this as a failed start

@@ -6,11 +6,11 @@ import json
 import logging
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from appliance.box.live_pose import forget_live_pose
 from appliance.box.log import SAID, process_log
@@ -22,7 +22,7 @@ from appliance.sensor.memory import forget_memory
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path, named_show
 from appliance.show.control import ControlConfig
-from appliance.show.show import ShowConfig, load_show
+from appliance.show.show import Show, ShowConfig, load_show
 from appliance.show.venue_rig import unwired
 from appliance.stage.open_sensors import reach
 from appliance.stage.run import Stage
@@ -52,123 +52,200 @@ _REHEARSAL = (
 )
 
 
-def play_show(
-    directory: Path | None = None,
-    box_file: Path | None = None,
-    seconds: float | None = None,
-    emulate: bool = False,
-    journal: Path | None = None,
-    filmstrip: Path | None = None,
-    alone: bool = False,
-    window: bool = False,
-    rehearse: Path | None = None,
-    chosen: Path | None = None,
-    cue: str | None = None,
-    phone: bool = False,
-) -> int:
-    """Dance until the seconds are over or a signal comes; returns the exit status.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlayOptions:
+    """The options of `bunraku play`, by the names that they have there.
 
-    alone: start no companions. window: show the projection in a window. rehearse: the same if there is a
-    display, and a picture of the projection at the end. chosen: dance what the preflight chose and proved.
-    cue: begin in this one. phone: a phone is the show's first sensor.
+    show: its folder or name; None: the default show. box: the box file; None: all at its default. Neither
+    may be given with `chosen`, the file of what the preflight chose and proved. seconds: None: until a signal
+    comes. emulate: emulate the sensors; the box keeps nothing of them. journal: its folder; None: the box
+    file's. filmstrip: draw the dance into this PNG at the end. alone: start no companions. window: show the
+    projection in a window. rehearse: the same where there is a display, and render the dance into this PNG
+    at the end. cue: begin in this one. phone: a phone is the show's first sensor.
+    """
+
+    show: Path | None = None
+    box: Path | None = None
+    seconds: float | None = None
+    emulate: bool = False
+    journal: Path | None = None
+    filmstrip: Path | None = None
+    alone: bool = False
+    window: bool = False
+    rehearse: Path | None = None
+    chosen: Path | None = None
+    cue: str | None = None
+    phone: bool = False
+
+
+class _Keeping(NamedTuple):
+    """keeps: whether a keeper runs, which writes the journal and the box's place to the disk. journal: its
+    folder; None: no journal. minutes: how much of it stays.
+    """
+
+    keeps: bool
+    journal: Path | None
+    minutes: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    """A stage that is ready to dance, and what was opened for it.
+
+    scratch: a folder that is removed with this process; None: nothing needs one. control, page: their ports,
+    if their processes are started here.
+    """
+
+    stage: Stage
+    stopped: Callable[[], bool]
+    scratch: Path | None
+    keeping: _Keeping
+    window: bool
+    control: socket.socket | None
+    page: socket.socket | None
+
+
+def play_show(options: PlayOptions) -> int:
+    """Dance until the seconds are over or a signal comes; returns the exit status.
 
     Raises ConfigError, StageError.
     """
-    if chosen is not None:
-        directory, box_file = _chosen_to_dance(chosen, directory, box_file)
-    show, box = load_show(named_show(directory) or default_show_path()), load_box(box_file)
-    if phone:
-        from appliance.cli.phones import with_phone
-
-        box = with_phone(show.config, box)
-    message = ""
-    if directory is not None and chosen is None:  # a network that never ends would block every signal
-        from appliance.cli.network_proof import prove_network
-
-        message = prove_network(show)
+    if options.chosen is not None:
+        options = _chosen_to_dance(options.chosen, options)
+    show, box = _load(options)
+    proof = _proof(options, show)
     with ExitStack() as opened:
-        log = opened.enter_context(process_log())
-        stopped = opened.enter_context(stop_signals())
-        scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
-        if emulate and scratch:
-            from appliance.cli.emulation import emulated, wait_until_calling
-
-            box = opened.enter_context(emulated(show.config, box, scratch))
-        keeps, minutes = journal is not None, box.journal.minutes
-        journal = _new_folder(journal) if journal is not None else box.journal.folder
-        if (filmstrip or rehearse) is not None and scratch and not keeps and (alone or journal is None):
-            keeps, journal, minutes = True, scratch / "dance.journal", PICTURED_MINUTES
-        elif not alone:
-            keeps = journal is not None or (box.state_folder is not None and not emulate)
-        if chosen is not None:
-            opened.enter_context(restored_file(chosen))
-        shown = False
-        if rehearse is not None:
-            from appliance.cli.rehearsal import has_display
-
-            shown = has_display()
-        control = None if alone or box.control is None else _opened(box.control, opened)
-        if cue is not None:
-            from appliance.cli.control import begin_in
-
-            begin_in(cue, show, control)
-        page = None
-        if box.console is not None and not alone:
-            from appliance.cli.console import page_companion
-            from appliance.cli.page_address import open_console_port
-
-            page = opened.enter_context(open_console_port(box.console, or_any=True))
-        stage = Stage(show, box, box.path, rehearsal=emulate)
-        log.keep_in(stage.sharing.folder / SAID)
-        with closing(stage):
-            keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
-            keeper = _keeper(keepers_box, journal, minutes) if keeps else None
-            unlit = () if alone or show.config.lights.fixtures else unwired(show.config, box)
-            for line in (*message.splitlines(), *_introduction(stage, emulate, control), *unlit):
-                _log.info(line)
-            companions = () if alone else tuple(_companions(show.config, box, control, window or shown))
-            if page is not None:
-                companions += (page_companion(box, page, control, emulate, journal),)
-            if emulate and scratch:
-                wait_until_calling(scratch)
-            with _running(companions + (() if keeper is None else (keeper,)), stage):
-                stage.dance(seconds, stopped)
-            if keeper is not None:
-                from appliance.keeper.keeper import keep_rest
-
-                keep_rest(stage.box, stage.sharing.noted, journal, minutes)
-        if not alone:
-            _forget_run(stage)
-        for line in _conclusion(stage):
-            _log.info(line)
-        if filmstrip is not None and journal is not None:
-            from appliance.cli.pictures import draw_dance, load_dance
-            from appliance.cli.rehearsal import PICTURED_S
-
-            picture = draw_dance(load_dance(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
-            _log.info(f"The dance just now, held joints highlighted: {picture}")
-        if rehearse is not None and journal is not None:
-            from appliance.cli.rehearsal import rehearsal_picture
-
-            for line in rehearsal_picture(journal, rehearse, show):
-                _log.info(line)
-    if chosen is not None:
+        prepared = _prepare(options, show, box, opened)
+        with closing(prepared.stage):
+            _dance(options, prepared, proof)
+        _conclude(options, prepared)
+    if options.chosen is not None:
         from appliance.release.trial import ended_well
 
-        ended_well(chosen)
+        ended_well(options.chosen)
     return 0
 
 
-def _chosen_to_dance(chosen: Path, directory: Path | None, box_file: Path | None) -> tuple[Path, Path]:
-    """Show and box file that the preflight chose; their start is counted."""
+def _chosen_to_dance(chosen: Path, options: PlayOptions) -> PlayOptions:
+    """With the show and the box file that the preflight chose; their start is counted."""
     from appliance.release.choice import require_no
     from appliance.release.trial import chosen_to_dance
 
-    require_no("--show", directory, chosen)
-    require_no("--box", box_file, chosen)
+    require_no("--show", options.show, chosen)
+    require_no("--box", options.box, chosen)
     with process_log():
         pair = chosen_to_dance(chosen, time.monotonic())
-    return pair.show, pair.box
+    return replace(options, show=pair.show, box=pair.box)
+
+
+def _load(options: PlayOptions) -> tuple[Show, BoxConfig]:
+    show, box = load_show(named_show(options.show) or default_show_path()), load_box(options.box)
+    if not options.phone:
+        return show, box
+    from appliance.cli.phones import with_phone
+
+    return show, with_phone(show.config, box)
+
+
+def _proof(options: PlayOptions, show: Show) -> str:
+    """Run the network of a named show once; sentences for the user. Not inside stop_signals: a network that
+    never ends would block every signal.
+    """
+    if options.show is None or options.chosen is not None:
+        return ""
+    from appliance.cli.network_proof import prove_network
+
+    return prove_network(show)
+
+
+def _prepare(options: PlayOptions, show: Show, box: BoxConfig, opened: ExitStack) -> _Prepared:
+    """Open the log, the ports and the stage; the caller closes the stage, and `opened` all else."""
+    log = opened.enter_context(process_log())
+    stopped = opened.enter_context(stop_signals())
+    scratch = _scratch(opened) if options.emulate or options.filmstrip or options.rehearse else None
+    if options.emulate and scratch:
+        from appliance.cli.emulation import emulated
+
+        box = opened.enter_context(emulated(show.config, box, scratch))
+    keeping = _keeping(options, box, scratch)
+    if options.chosen is not None:
+        opened.enter_context(restored_file(options.chosen))
+    window = options.window
+    if options.rehearse is not None:
+        from appliance.cli.rehearsal import has_display
+
+        window = has_display() or window
+    control = None if options.alone or box.control is None else _opened(box.control, opened)
+    if options.cue is not None:
+        from appliance.cli.control import begin_in
+
+        begin_in(options.cue, show, control)
+    page = None
+    if box.console is not None and not options.alone:
+        from appliance.cli.page_address import open_console_port
+
+        page = opened.enter_context(open_console_port(box.console, or_any=True))
+    stage = Stage(show, box, box.path, rehearsal=options.emulate)
+    log.keep_in(stage.sharing.folder / SAID)
+    return _Prepared(stage, stopped, scratch, keeping, window, control, page)
+
+
+def _keeping(options: PlayOptions, box: BoxConfig, scratch: Path | None) -> _Keeping:
+    """Raises StageError for a journal that is a file."""
+    if options.journal is not None:
+        return _Keeping(True, _new_folder(options.journal), box.journal.minutes)
+    journal = box.journal.folder
+    pictured = options.filmstrip is not None or options.rehearse is not None
+    if pictured and scratch and (options.alone or journal is None):
+        return _Keeping(True, scratch / "dance.journal", PICTURED_MINUTES)
+    has_place = box.state_folder is not None and not options.emulate
+    return _Keeping(not options.alone and (journal is not None or has_place), journal, box.journal.minutes)
+
+
+def _dance(options: PlayOptions, prepared: _Prepared, proof: str) -> None:
+    """Introduce the show, start what runs beside the stage, dance, and keep what was danced."""
+    stage, scratch, control = prepared.stage, prepared.scratch, prepared.control
+    show, box, (keeps, journal, minutes) = stage.show.config, stage.box, prepared.keeping
+    keepers_box = _rehearsal_box(stage, scratch) if options.emulate and scratch else box.path
+    keeper = _keeper(keepers_box, journal, minutes) if keeps else None
+    unlit = () if options.alone or show.lights.fixtures else unwired(show, box)
+    for line in (*proof.splitlines(), *_introduction(stage, options.emulate, control), *unlit):
+        _log.info(line)
+    companions = () if options.alone else tuple(_companions(show, box, control, prepared.window))
+    if prepared.page is not None:
+        from appliance.cli.console import page_companion
+
+        companions += (page_companion(box, prepared.page, control, options.emulate, journal),)
+    if options.emulate and scratch:
+        from appliance.cli.emulation import wait_until_calling
+
+        wait_until_calling(scratch)
+    with _running(companions + (() if keeper is None else (keeper,)), stage):
+        stage.dance(options.seconds, prepared.stopped)
+    if keeper is not None:
+        from appliance.keeper.keeper import keep_rest
+
+        keep_rest(box, stage.sharing.noted, journal, minutes)
+
+
+def _conclude(options: PlayOptions, prepared: _Prepared) -> None:
+    """After the stage is closed: the next show begins anew; say and draw what was danced."""
+    if not options.alone:
+        _forget_run(prepared.stage)
+    for line in _conclusion(prepared.stage):
+        _log.info(line)
+    journal = prepared.keeping.journal
+    if options.filmstrip is not None and journal is not None:
+        from appliance.cli.pictures import draw_dance, load_dance
+        from appliance.cli.rehearsal import PICTURED_S
+
+        picture = draw_dance(load_dance(journal).part(-PICTURED_S, PICTURED_S), options.filmstrip)
+        _log.info(f"The dance just now, held joints highlighted: {picture}")
+    if options.rehearse is not None and journal is not None:
+        from appliance.cli.rehearsal import rehearsal_picture
+
+        for line in rehearsal_picture(journal, options.rehearse, prepared.stage.show):
+            _log.info(line)
 
 
 def _scratch(opened: ExitStack) -> Path:
