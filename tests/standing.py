@@ -1,13 +1,19 @@
-"""A checkpoint whose puppet is somewhere else."""
+"""Checkpoints: the newest on the disk, and one whose puppet is somewhere else."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from appliance.box.checkpoint import Checkpoint, Standing
+from appliance.box.checkpoint import Checkpoint, Standing, read_checkpoints
 
 OF_PUPPET = frozenset(Standing._fields)
+
+
+def read_checkpoint(path: Path) -> Checkpoint | None:
+    """The newest whole place on the disk; None where there is none."""
+    return next(iter(read_checkpoints(path)[0]), None)
 
 
 def moved(place: Checkpoint, **changes: Any) -> Checkpoint:

@@ -203,11 +203,6 @@ class CheckpointReader:
         self._block.close()
 
 
-def read_checkpoint(path: Path) -> Checkpoint | None:
-    """The newest whole place on the disk; None where there is none. Never raises."""
-    return next(iter(read_checkpoints(path)[0]), None)
-
-
 def read_checkpoints(path: Path) -> tuple[list[Checkpoint], bool]:
     """The whole places on the disk, the newest first, and whether one was dropped. Never raises."""
     places = [unpacked(payload) for payload in SlotFile(path).read()]

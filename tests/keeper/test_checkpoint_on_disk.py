@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, Standing, packed, read_checkpoint
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, Standing, packed
 from appliance.box.record import SLOT_BYTES, SLOT_CAPACITY, SLOTS, SlotFile
 from appliance.keeper.mirror import RETRY_S, TURN_S, Mirror
 from appliance.keeper.records import mirrored_checkpoint
 from tests.box import disks
 from tests.deploy.cut import cut_off
 from tests.logged import said
-from tests.standing import moved
+from tests.standing import moved, read_checkpoint
 
 HEAD_BYTES = 24  # of a slot
 PLACE = Checkpoint("A show", (Standing("main", 1.5, (0.0, 30.0), let_go=("lShldr",)),), boot="here")

@@ -15,11 +15,12 @@ from typing import Any
 
 import yaml
 
-from appliance.box.checkpoint import Checkpoint, packed, read_checkpoint
+from appliance.box.checkpoint import Checkpoint, packed
 from appliance.box.record import SlotFile
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports, remove_folder
+from tests.standing import read_checkpoint
 from tests.system.processes import (
     BUNRAKU,
     Process,

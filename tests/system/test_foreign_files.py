@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from appliance.box.block import BlockReader, BlockWriter
-from appliance.box.checkpoint import Checkpoint, Standing, packed, read_checkpoint, unpacked
+from appliance.box.checkpoint import Checkpoint, Standing, packed, unpacked
 from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.dancer.phrase_cache import FOLDER, LARGEST, SUFFIX, PhraseCache, prepare
 from appliance.fixture_library.convert import convert_file
@@ -30,6 +30,7 @@ from appliance.show.config_error import ConfigError
 from appliance.show.projector import ProjectorConfig
 from appliance.stage.sensor_memory import SensorMemory
 from tests.bundles import FIGURE, swaying_phrase, write_show
+from tests.standing import read_checkpoint
 
 PATIENCE_S = 120.0
 PEAK = 400 << 20  # bytes: the libraries have half of it

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from appliance.box.checkpoint import FILE as PLACE
-from appliance.box.checkpoint import read_checkpoint
 from appliance.outputs.frame_reader import FrameReader
 from tests.show_control.doubles import Asker
 from tests.sources import write_show_with_sources
+from tests.standing import read_checkpoint
 from tests.system.box import JOURNAL, Box, cut_power, playing
 from tests.system.processes import children_running, run_bunraku, wait_until
 

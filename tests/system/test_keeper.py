@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, Standing, read_checkpoint
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, Standing
 from appliance.box.process_health import ProcessHealth
 from appliance.box.ring_file import RingFileWriter
 from appliance.keeper.fallback import JOURNAL_STOPPED, SENSORS_NOT_SAVED
@@ -29,6 +29,7 @@ from tests.box import disks
 from tests.bundles import write_show
 from tests.logged import said
 from tests.recorder.night import Night
+from tests.standing import read_checkpoint
 from tests.system.processes import BUNRAKU, Process, children, is_running, wait_until
 
 MEMORY = b'{"neutral": [], "profiles": {}}'

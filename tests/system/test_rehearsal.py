@@ -7,11 +7,12 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from appliance.box.checkpoint import FILE, read_checkpoint
+from appliance.box.checkpoint import FILE
 from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.journal_reader import read_journal
 from appliance.sensor.memory import FILE_NAME, memory_record, memory_text, read_memory
 from tests.bundles import write_show
+from tests.standing import read_checkpoint
 from tests.system.box import Box, playing
 
 VENUE = {"realtime": {"enabled": False}, "state": "state", "journal": {"folder": "journal", "minutes": 5}}

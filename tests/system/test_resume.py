@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, read_checkpoint
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader
+from tests.standing import read_checkpoint
 from tests.system.box import Box, cut_power, playing
 from tests.system.processes import wait_until
 
