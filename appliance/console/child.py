@@ -68,7 +68,9 @@ async def own_child(
     Raises OSError.
     """
     child = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", module),
+        sys.executable,
+        "-m",
+        module,
         *(word for name, path in box.items() for word in (f"--{name}", path)),
         stdin=asyncio.subprocess.DEVNULL,
         stdout=stdout,

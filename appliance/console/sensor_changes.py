@@ -59,7 +59,8 @@ class SensorChanges:
     async def _run(self, command: Sequence[str], secret: str, telling: asyncio.Queue[dict[str, Any]]) -> None:
         async with self._changing:
             child = await asyncio.create_subprocess_exec(
-                *(*BUNRAKU, *command),
+                *BUNRAKU,
+                *command,
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,

@@ -115,8 +115,11 @@ def open_made_motions(folder: Path, show: Show, parts: StageParts) -> tuple[Made
         return ()
     made = tuple(
         MadeMotions(
-            *(folder, show.skeleton.names, one.motion, start.number),
-            "" if start.source in (*phrases, LIVE) else start.source,
+            folder,
+            show.skeleton.names,
+            one.motion,
+            puppet=start.number,
+            source="" if start.source in (*phrases, LIVE) else start.source,
         )
         for start, one in zip(config.cast, parts.puppets, strict=True)
     )

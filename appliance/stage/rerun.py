@@ -133,6 +133,18 @@ class _RecordedLink(SensorLink):
         numbers = self.recorded["reading_numbers"][place].tolist()
         sequence, time_us, battery, calibration, boot_nonce, taps, recoveries, flags, wearable = numbers
         return SensorReading(
-            *(name, (w, x, y, z), sequence, time_us, measured_at, arrival, battery, calibration),
-            *(boot_nonce, taps, recoveries, flags, None if trip_s != trip_s else trip_s, wearable),
+            sensor=name,
+            orientation=(w, x, y, z),
+            sequence=sequence,
+            sensor_time_us=time_us,
+            measured_at=measured_at,
+            arrival=arrival,
+            battery=battery,
+            calibration=calibration,
+            boot_nonce=boot_nonce,
+            taps=taps,
+            recoveries=recoveries,
+            flags=flags,
+            round_trip_s=None if trip_s != trip_s else trip_s,
+            wearable=wearable,
         )
