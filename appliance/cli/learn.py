@@ -7,7 +7,6 @@ that dances is never touched: what was learned is only offered.
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import logging
 import os
 import shutil
@@ -15,7 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -37,10 +37,11 @@ from appliance.console.learning import (
     USUAL_MIN,
     Learning,
     Wanted,
+    has_studio,
 )
-from appliance.console.proving import Proving
+from appliance.console.show_goes import show_goes
 from appliance.pose.foreign_file import stored_json
-from appliance.release.choice import box_of
+from appliance.release.choice import box_of, files_named
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError
 from appliance.stage.stage_error import StageError
@@ -81,9 +82,9 @@ def learn(
     if learning.wanted() is None:
         learning.begin(wanted)
     with contextlib.suppress(RuntimeFolderError):
-        proving = Proving(runtime_folder(load_box(box)))
+        goes = partial(show_goes, runtime_folder(load_box(box)))
         with process_log():
-            return Learner(learning, proving.show_goes, box, train or ()).run()
+            return Learner(learning, goes, box, train or ()).run()
     with process_log():
         return Learner(learning, lambda: False, box, train or ()).run()
 
@@ -94,8 +95,7 @@ def main(given: Sequence[str]) -> int:
 
     end_with_parent()
     give_way(NICE)
-    named = {name: Path(path) for name, path in zip(given[::2], given[1::2], strict=True)}
-    found = _readable_box(named)
+    found = _readable_box(*files_named(given))
     if found is None:
         return 0
     path, config = found
@@ -105,7 +105,7 @@ def main(given: Sequence[str]) -> int:
         return 0
     try:
         with process_log():
-            return Learner(learning, Proving(runtime_folder(config)).show_goes, path).run()
+            return Learner(learning, partial(show_goes, runtime_folder(config)), path).run()
     except Exception as error:
         from appliance.cli.app import refuse
 
@@ -114,7 +114,7 @@ def main(given: Sequence[str]) -> int:
         refuse(error)
 
 
-def _readable_box(named: Mapping[str, Path]) -> tuple[Path | None, BoxConfig] | None:
+def _readable_box(box: Path | None, chosen: Path | None) -> tuple[Path | None, BoxConfig] | None:
     """The box file, once it can be read: a learner that ended here would be started again at once, for ever.
 
     None: stopped before.
@@ -123,7 +123,7 @@ def _readable_box(named: Mapping[str, Path]) -> tuple[Path | None, BoxConfig] | 
     with stop_signals() as is_stopped:
         while not is_stopped():
             try:
-                path = box_of(named.get("--box"), named.get("--chosen"))
+                path = box_of(box, chosen)
                 return path, load_box(path)
             except ConfigError as error:
                 if str(error) != said:
@@ -301,7 +301,7 @@ class _StoppedError(Exception):
 
 def require_studio() -> None:
     """Raises NotLearnedError where the studio or PyTorch is not installed."""
-    if any(importlib.util.find_spec(name) is None for name in ("appliance.studio", "torch", "onnx")):
+    if not has_studio():
         raise NotLearnedError(STUDIO_MISSING)
 
 

@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,9 @@ from appliance.box.stop_signals import stop_signals
 from appliance.cli.doctor.finding import for_phone
 from appliance.console.proofs import FOLDER, Proofs
 from appliance.console.proving import SHOW_GOES, Proving, Wanted
+from appliance.console.show_goes import show_goes
 from appliance.outputs.frame_reader import FrameReader
-from appliance.release.choice import Choice, box_of
+from appliance.release.choice import Choice, box_of, files_named
 from appliance.show.box import load_box
 from appliance.show.bundle import bundle_files, default_show_path
 
@@ -42,10 +44,9 @@ def main(given: Sequence[str]) -> int:
     from appliance.cli.console import devices_file_made
 
     end_with_parent()
-    named = {name: Path(path) for name, path in zip(given[::2], given[1::2], strict=True)}
-    chosen = named.get("--chosen")
+    box, chosen = files_named(given)
     try:
-        path = box_of(named.get("--box"), chosen)
+        path = box_of(box, chosen)
         config = load_box(path)
         return prove(runtime_folder(config), Proofs(devices_file_made(config).parent / FOLDER), path, chosen)
     except Exception as error:
@@ -62,7 +63,10 @@ def prove(runtime: Path, proofs: Proofs, box: Path | None, chosen: Path | None) 
         return 0
     try:
         show, name = _show(runtime, chosen)
-        document = _latency(proving, wanted, show, box) if wanted.kind == "latency" else _doctor(proving, box)
+        if wanted.kind == "latency":
+            document = _latency(proving, wanted, show, box, partial(show_goes, runtime))
+        else:
+            document = _doctor(proving, box)
         about = {"kind": wanted.kind, "made": time.time(), "host": socket.gethostname()}
         about |= {"machine": machine(), "software": software()}
         about |= {"show": {"name": name, "checksum": checksum(show)}, "box_file": about_file(box)}
@@ -79,14 +83,16 @@ class _NotProvenError(Exception):
     """Nothing to keep; the message says why."""
 
 
-def _latency(proving: Proving, wanted: Wanted, show: Path, box: Path | None) -> dict[str, Any]:
+def _latency(
+    proving: Proving, wanted: Wanted, show: Path, box: Path | None, goes: Callable[[], bool]
+) -> dict[str, Any]:
     """The measurement's figures and limits, and its readings in phase with the sensor."""
     named = ("--box", str(box)) if box is not None else ()
     with tempfile.TemporaryDirectory(prefix="bunraku-prove-") as scratch:
         reported = Path(scratch) / "progress"
         reported.touch()
         command = ("measure", "--seconds", str(wanted.seconds), "--progress", str(reported))
-        said = _run(proving, (*command, "--show", str(show), *named), _copying(reported, proving), True)
+        said = _run(proving, (*command, "--show", str(show), *named), _copying(reported, proving), goes)
         lines = [json.loads(line) for line in reported.read_text().splitlines()]
     if not lines or "figures" not in lines[-1]:
         raise _NotProvenError(f"It could not be measured. {said.strip()[-600:]}")
@@ -117,18 +123,16 @@ def _run(
     proving: Proving,
     arguments: tuple[str, ...],
     on_output: Callable[[], None] = lambda: None,
-    at_rest: bool = False,
+    show_goes_on: Callable[[], bool] = lambda: False,
 ) -> str:
-    """The output of one of our commands; ended when it is no longer wanted. at_rest: or when the show goes
-    on.
-    """
+    """The output of one of our commands; ended when it is no longer wanted, or when the show goes on."""
     with tempfile.TemporaryFile() as out, stop_signals() as is_ended:
         child = start_child((*BUNRAKU, *arguments), stdout=out, stderr=subprocess.STDOUT)
         try:
             while child.poll() is None:
                 if proving.wanted() is None or is_ended():
                     raise _NotProvenError(_ENDED)
-                if at_rest and proving.show_goes():
+                if show_goes_on():
                     raise _NotProvenError(f"{SHOW_GOES} {_ENDED}")
                 on_output()
                 proving.report()

@@ -8,7 +8,6 @@ import json
 import re
 import shutil
 import time
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,15 @@ from appliance.box.child import environment
 from appliance.box.durable import private_folder
 from appliance.console.body import received, said
 from appliance.console.child import answer_of, own_child
-from appliance.console.learning import FOLDER, RECORDINGS, STUDIO_MISSING, USUAL_MIN, Learning, Wanted
+from appliance.console.learning import (
+    FOLDER,
+    RECORDINGS,
+    STUDIO_MISSING,
+    USUAL_MIN,
+    Learning,
+    Wanted,
+    has_studio,
+)
 from appliance.console.stage_view import StageView
 from appliance.pose.recorded_minutes import recorded_minutes
 
@@ -188,8 +195,3 @@ class Learn:
     async def _start(self) -> None:
         quiet = asyncio.subprocess.DEVNULL
         self._child = await own_child("appliance.cli.learn", self._box, environment(), quiet)
-
-
-def has_studio() -> bool:
-    """Whether dancers can be trained here; nothing is imported for it."""
-    return all(find_spec(name) is not None for name in ("appliance.studio", "torch", "onnx"))

@@ -5,6 +5,7 @@ It is on the disk: what was begun goes on after a power cut.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import shutil
 from contextlib import suppress
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from appliance.box.durable import private_folder, write_whole
+from appliance.console.request_folder import RequestFolder
 from appliance.pose.foreign_file import stored_json
 
 FOLDER, RECORDINGS = "learning", "recordings"
@@ -21,6 +23,11 @@ STUDIO_MISSING = (
     "Learning needs the studio, which is not installed on this box: pip install bunraku-studio. The dance "
     "needs no studio: train on another machine, and bring the show on a stick."
 )
+
+
+def has_studio() -> bool:
+    """Whether dancers can be trained here; nothing is imported for it."""
+    return all(importlib.util.find_spec(name) is not None for name in ("appliance.studio", "torch", "onnx"))
 
 
 class Wanted(NamedTuple):
@@ -33,15 +40,15 @@ class Wanted(NamedTuple):
     begins_with: str = ""
 
 
-class Learning:
-    """`wanted.json` is there while something is learned: its removal ends that. `show`: what is learned;
+class Learning(RequestFolder[Wanted]):
+    """`wanted.json` is there while something is learned. `show`: what is learned;
     `before`: what was learned before, while another learning begins with it.
     """
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        super().__init__(folder, "wanted.json")
         self.show, self.before = folder / "show", folder / "before"
-        self._wanted, self._progress = folder / "wanted.json", folder / "progress.json"
+        self._progress = folder / "progress.json"
 
     def begin(self, wanted: Wanted) -> None:
         """Write the request, and delete the last learned show, or move it aside if this begins with it.
@@ -71,27 +78,12 @@ class Learning:
         """The show that was learned last, once it has passed its check."""
         return self.show if self.reported().get("state") in ("learned", "worse") else None
 
-    def want(self, wanted: Wanted) -> None:
-        """Write the request. Raises OSError."""
-        private_folder(self.folder)
-        write_whole(self._wanted, json.dumps(wanted._asdict()).encode())
-
-    def wanted(self) -> Wanted | None:
-        """The current request; None: nothing, or nothing that can be read."""
-        try:
-            said = stored_json(self._wanted)
-            recordings, minutes, before = said["recordings"], said["minutes"], said.get("begins_with", "")
-        except (OSError, ValueError, TypeError, KeyError, AttributeError):
-            return None
+    def _sound(self, said: Any) -> Wanted | None:
+        recordings, minutes, before = said["recordings"], said["minutes"], said.get("begins_with", "")
         is_sound = (
             isinstance(recordings, str) and isinstance(minutes, int | float) and isinstance(before, str)
         )
         return Wanted(recordings, float(minutes), before) if is_sound else None
-
-    def end(self) -> None:
-        """Nothing is wanted any more; what was learned so far stays."""
-        with suppress(OSError):
-            self._wanted.unlink(missing_ok=True)
 
     def report(self, **values: object) -> None:
         """The progress from now on. Raises OSError."""

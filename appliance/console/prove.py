@@ -13,6 +13,7 @@ from appliance.console.body import said
 from appliance.console.child import own_child
 from appliance.console.proofs import FOLDER, Proofs
 from appliance.console.proving import KINDS, LONGEST_S, SHORTEST_S, SHOW_GOES, Proving, Wanted
+from appliance.console.show_goes import show_goes
 
 _USUAL_S = 30
 _LARGEST_PART = 1 << 18  # bytes of progress in one answer
@@ -27,7 +28,7 @@ class Prove:
     """
 
     def __init__(self, runtime: Path, state: Path, box: dict[str, str], is_installed: bool) -> None:
-        self._box, self._is_installed = box, is_installed
+        self._runtime, self._box, self._is_installed = runtime, box, is_installed
         self._proving, self._proofs = Proving(runtime), Proofs(state / FOLDER)
         self._child: asyncio.subprocess.Process | None = None
         self._proving.end()  # what a page before this one began ended with it, or ends now
@@ -54,7 +55,7 @@ class Prove:
         return web.json_response(
             {
                 "runs": None if (wanted := self._running()) is None else wanted._asdict(),
-                "show_goes": self._proving.show_goes(),
+                "show_goes": show_goes(self._runtime),
                 "proofs": self._proofs.listed(),
             }
         )
@@ -68,7 +69,7 @@ class Prove:
             raise web.HTTPBadRequest(text=f"Measure for {SHORTEST_S} to {LONGEST_S} seconds.")
         if self._running() is not None:
             raise web.HTTPConflict(text="Something is being proven already. Wait for its end, or end it.")
-        if kind == "latency" and self._proving.show_goes():
+        if kind == "latency" and show_goes(self._runtime):
             raise web.HTTPConflict(text=SHOW_GOES)
         try:
             self._proving.want(Wanted(kind, seconds))

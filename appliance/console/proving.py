@@ -1,4 +1,4 @@
-"""The folder in which page and prover meet: what is wanted, what was measured so far; and who may begin."""
+"""The folder in which page and prover meet: what is wanted, and what was measured so far."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ import json
 import os
 import time
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from appliance.box.durable import private_folder
-from appliance.box.show_state import ShowStateReader
-from appliance.console.stage_view import StageView
-from appliance.pose.foreign_file import stored_json
+from appliance.console.request_folder import RequestFolder
 
 FOLDER = "prove"
 KINDS = ("latency", "doctor")
@@ -27,16 +25,14 @@ class Wanted(NamedTuple):
     seconds: int
 
 
-class Proving:
-    """`wanted` is there while something is proven: its removal ends that. `progress`: JSON, one a line.
+class Proving(RequestFolder[Wanted]):
+    """`wanted` is there while something is proven. `progress`: JSON, one a line.
     `sign`: its time is the last sign of life, in monotonic seconds: a clock that is set moves all others.
     """
 
     def __init__(self, runtime: Path) -> None:
-        self._runtime = runtime
-        self.folder = runtime / FOLDER
-        self._wanted, self.progress = self.folder / "wanted", self.folder / "progress"
-        self._sign = self.folder / "sign"
+        super().__init__(runtime / FOLDER, "wanted")
+        self.progress, self._sign = self.folder / "progress", self.folder / "sign"
 
     def want(self, wanted: Wanted) -> None:
         """Begin: an empty progress, then the request. Raises OSError."""
@@ -44,24 +40,13 @@ class Proving:
         self.progress.write_bytes(b"")
         self._sign.touch(mode=0o600)
         self.report()
-        part = self.folder / ".wanted"
-        part.write_text(json.dumps(wanted._asdict()))
-        part.replace(self._wanted)
+        super().want(wanted)
 
-    def wanted(self) -> Wanted | None:
-        """The current request; None: nothing, or nothing that can be read."""
-        try:
-            said = stored_json(self._wanted)
-            kind, seconds = said["kind"], said["seconds"]
-        except (OSError, ValueError, TypeError, KeyError):
-            return None
+    def _sound(self, said: Any) -> Wanted | None:
+        kind, seconds = said["kind"], said["seconds"]
         if kind not in KINDS or not isinstance(seconds, int) or not SHORTEST_S <= seconds <= LONGEST_S:
             return None
         return Wanted(kind, seconds)
-
-    def end(self) -> None:
-        """Nothing is wanted any more."""
-        self._wanted.unlink(missing_ok=True)
 
     def report(self, **values: object) -> None:
         """One more object of the progress; without any, a sign of life."""
@@ -77,13 +62,3 @@ class Proving:
             return time.monotonic() - self._sign.stat().st_mtime > _SILENT_S
         except OSError:
             return True
-
-    def show_goes(self) -> bool:
-        """Whether a dance is on: a stage that lives, and a show that was not stopped."""
-        stage, state = StageView(self._runtime), ShowStateReader(self._runtime)
-        try:
-            now = time.monotonic()
-            return stage.state(now) == "fresh" and not state.read().stands(now)
-        finally:
-            stage.close()
-            state.close()

@@ -42,7 +42,6 @@ from appliance.console.night import Night
 from appliance.console.phones import Phones
 from appliance.console.pose_map import PoseMap
 from appliance.console.prove import Prove
-from appliance.console.proving import Proving
 from appliance.console.rehearsed import FOLDER, ZIP, Rehearsed
 from appliance.console.report import settings_in, watch
 from appliance.console.rig import Rig
@@ -50,6 +49,7 @@ from appliance.console.seen_stage import SeenStage
 from appliance.console.sensor_changes import SensorChanges
 from appliance.console.server import Server
 from appliance.console.settings import WHERE, ConsoleSettings
+from appliance.console.show_goes import show_goes
 from appliance.console.stage_view import StageView
 from appliance.console.update import Update
 from appliance.console.venue import Venue
@@ -89,15 +89,15 @@ async def _serve(settings: ConsoleSettings) -> int:
     prove = Prove(folder, Path(settings.devices).parent, settings.box, settings.is_installed)
     logs = Logs(folder, settings.is_installed)
     rehearsed = Path(settings.devices).parent / FOLDER
-    state, show_goes = Path(settings.devices).parent, Proving(folder).show_goes
-    venue = Venue(folder, settings.box, settings.is_installed, state, show_goes)
+    state, goes = Path(settings.devices).parent, partial(show_goes, folder)
+    venue = Venue(folder, settings.box, settings.is_installed, state, goes)
     learn = Learn(state, settings.journal, settings.box, settings.is_installed, stage)
     night = Night(stage, box, Path(settings.devices).parent, folder)
     helping = Help(box, logs, folder, settings.journal, settings.box)
     hands, rig = BrowserHands(guard, desk, folder), Rig(folder)
     phones = Phones(guard, door, settings.phones, folder, fallbacks)
     others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes(), *phones.routes()]
-    update = Update(folder, settings.is_installed, show_goes)
+    update = Update(folder, settings.is_installed, goes)
     others += [*Midi(stage, box).routes(), *Fleet(state, stage).routes()]
     others += [*night.routes(), *helping.routes(), *update.routes()]
     others += certificate.routes(Path(settings.devices).parent)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -160,6 +161,14 @@ def box_of(box: Path | None, chosen: Path | None) -> Path | None:
     require_no("--box", box, chosen)
     choice = Choice.read(chosen)
     return choice.first.box if choice is not None else APPLIANCE_BOX
+
+
+def files_named(given: Sequence[str]) -> tuple[Path | None, Path | None]:
+    """The box file and the choice in the arguments that the page gives its child: `--box FILE` or
+    `--chosen FILE`.
+    """
+    named = {name: Path(path) for name, path in zip(given[::2], given[1::2], strict=True)}
+    return named.get("--box"), named.get("--chosen")
 
 
 def require_no(option: str, given: Path | None, chosen: Path) -> None:

@@ -303,7 +303,7 @@ def test_a_power_cut_as_learning_begins_loses_no_show(
         if cut == "rename":
             patched.setattr(Path, "rename", lost)
         else:
-            patched.setattr("appliance.console.learning.write_whole", written_once)
+            patched.setattr("appliance.console.request_folder.write_whole", written_once)
         with pytest.raises(KeyboardInterrupt):
             box.learning.begin(Wanted("takes", 60.0, str(box.learning.show)))
     box.let_end()
@@ -326,7 +326,7 @@ def test_a_power_cut_before_learning_begins_leaves_the_last_show_offered(
         write_whole(path, content)
 
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr("appliance.console.learning.write_whole", cut)
+        patched.setattr("appliance.console.request_folder.write_whole", cut)
         learning.begin(Wanted("takes", 60.0, str(learning.show)))
     assert learning.wanted() is None and learning.playable() == learning.show
     learning.want(Wanted("takes", 60.0, str(learning.show)))

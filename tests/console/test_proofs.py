@@ -10,6 +10,7 @@ import pytest
 
 from appliance.console.proofs import MOST, Proofs
 from appliance.console.proving import Proving, Wanted
+from appliance.console.show_goes import show_goes
 from tests.console.page import Page
 
 
@@ -36,7 +37,7 @@ def test_what_is_wanted_is_one_of_two_things(tmp_path: Path, said: str) -> None:
     (tmp_path / "prove" / "wanted").write_text(said)
     assert proving.wanted() is None
     proving.end()
-    assert proving.wanted() is None and not proving.show_goes()
+    assert proving.wanted() is None and not show_goes(tmp_path)
 
 
 def test_a_prover_is_silent_by_a_clock_that_nobody_sets(
