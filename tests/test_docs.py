@@ -396,6 +396,13 @@ def test_each_step_from_the_shop_to_the_wall_says_what_one_sees_and_whether_it_w
         assert "(not tried" in step or (tested and (ROOT / tested[1]).is_file()), step
 
 
+def test_the_map_of_the_house_has_every_room() -> None:
+    """`house.md` says what each folder of the product is for."""
+    rows = re.findall(r"^\| (.+?) \|", (ROOT / "docs" / "house.md").read_text(), re.MULTILINE)
+    named = set(re.findall(r"`(?:appliance/)?(\w+)`", " ".join(row for row in rows if "`appliance/" in row)))
+    assert {one.parent.name for one in (ROOT / "appliance").glob("*/__init__.py")} <= named
+
+
 def test_pages_for_users_are_short_enough_to_be_read() -> None:
     lines = {page.name: len(page.read_text("utf-8").splitlines()) for page in FOR_USERS}
     assert sum(lines.values()) < LINES_AT_MOST, lines

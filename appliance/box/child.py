@@ -71,7 +71,7 @@ def end_child(process: subprocess.Popen[bytes], within_s: float, by: signal.Sign
 
 
 def await_end(process: subprocess.Popen[bytes], within_s: float) -> None:
-    """Wait for the end of a child that was asked to end; the same."""
+    """Wait for a child that was asked to end, and kill it after within_s seconds, as end_child does."""
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(within_s)
     process.kill()

@@ -21,7 +21,7 @@ class Fallback(NamedTuple):
 
 
 class Fallen(NamedTuple):
-    """How it is with one fallback. times: how often since the process began; active: it is in force now.
+    """The state of one fallback. times: how often since the process began; active: it is in force now.
 
     about: the names of what it concerns (sensors, receivers, wires, a disk), "" where that is not known.
     """

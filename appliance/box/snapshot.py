@@ -29,12 +29,12 @@ def packed(one: Any) -> bytes:
 
 
 def restore(one: Any, data: bytes) -> None:
-    """Let an object go on as the one did whose state this is. Raises what DAMAGED lists for invalid bytes."""
+    """Restore, in place, the state that `packed` saved. Raises what DAMAGED lists for invalid bytes."""
     _restored(one, unpacked(data))
 
 
 def shift_times(one: Any, seconds: float) -> None:
-    """Let an object go on by another clock, which is so much ahead."""
+    """Shift all monotonic times of an object by the seconds by which its new clock is ahead."""
     kind: Any = type(one)
     for base in kind.__mro__:
         for name in vars(base).get("TIMES", ()):

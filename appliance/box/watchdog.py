@@ -26,7 +26,7 @@ class Patience:
         self._looked_at = 0.0
 
     def note_sign(self, now: float) -> None:
-        """The work goes on."""
+        """Note that the work goes on."""
         self._since = now
 
     def is_over(self, now: float, is_preparing: bool) -> bool:

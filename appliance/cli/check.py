@@ -40,7 +40,7 @@ from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.admission import Admission
 from appliance.stage.open_sensors import reach
 from appliance.stage.stage_error import StageError
-from appliance.stage.stage_parts import StageParts, admission, assemble
+from appliance.stage.stage_parts import StageParts, assemble, measure_admission
 
 _PATIENCE_S = 60.0  # a user can wait longer than a box at power-on
 
@@ -106,7 +106,7 @@ def verified_parts(directory: Path, box_file: Path | None) -> tuple[StageParts, 
     _refuse_misfits(show, box)
     _refuse_missing_secret(box)
     parts = assemble(show, without_ports(box))
-    verdict = admission(parts, box)
+    verdict = measure_admission(parts, box)
     parts.close()
     return parts, verdict
 

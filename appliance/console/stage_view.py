@@ -38,9 +38,9 @@ class StageView:
     """The shared frame of a runtime folder, read without numpy; never waits, never raises.
 
     facts: show, skeleton and hands, as the page gets them; empty before the first stage. seen_facts: as the
-    stage wrote them. show_directory: for
-    this box's own processes; None before the first stage. generation: another number for each new stage.
-    with_ghost: the frame that `newest` gave last, with what the puppet starts from.
+    stage wrote them. show_directory: for this box's own processes; None before the first stage. generation:
+    another number for each new stage. with_ghost: the frame that `newest` gave last, with what the puppet
+    starts from.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -370,7 +370,7 @@ class Crossfade:
         return ease(self._tick / self._length)
 
     def end_if_over(self) -> None:
-        """The leaving head goes with the last tick."""
+        """Drop the leaving head after the last tick of the crossfade."""
         if self._tick > self._length - 1.5:
             self.leaving = None
 
@@ -388,7 +388,7 @@ class Crossfade:
 
     @staticmethod
     def restored(leaving: Playhead | None, times: list[float]) -> Crossfade:
-        """Go on as another one stood."""
+        """The crossfade of a snapshot: its leaving head, and `times`."""
         crossfade = Crossfade()
         crossfade.leaving, (crossfade._tick, crossfade._length) = leaving, times
         return crossfade

@@ -120,7 +120,7 @@ class Puppet:
         """The moving joints of one of all joints (T, J, 4): the window (T, M, 4) of the next dance."""
         return np.take(window, self.network.moving, axis=1, out=self.window, mode="clip")
 
-    def restore(self, pose: FloatArray, whole: FloatArray) -> None:
+    def scatter(self, pose: FloatArray, whole: FloatArray) -> None:
         """Write a pose of the moving joints (M, 4) into one of all joints (J, 4); numbers (M,) as well."""
         whole[self.network.moving] = pose
 

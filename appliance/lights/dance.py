@@ -217,7 +217,7 @@ class Felt:
         self._features = self._features and self._make()
 
     def rest(self) -> None:
-        """Nothing moves."""
+        """Ease all features towards stillness: the dance pauses."""
         self._ease(dict.fromkeys(FEATURES, 0.0), PAUSE_S)
 
     def _ease(self, numbers: Mapping[Any, float], elapsed_s: float) -> None:

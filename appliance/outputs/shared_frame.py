@@ -63,7 +63,7 @@ class Facts:
 
     @property
     def layout(self) -> FrameLayout:
-        """How its frames lie."""
+        """The byte layout of its frames."""
         return layout_of(len(self.skeleton), self.puppets, self.phrases)
 
     @property

@@ -47,7 +47,7 @@ def _password(text: str) -> str:
     if 8 <= len(text) <= 63 and text.isascii() and text.isprintable():
         return text
     raise refusal(
-        f"A password has 8 to 63 letters, digits or signs; this one has {len(text)}.",
+        f"A password has 8 to 63 letters, digits or punctuation; this one has {len(text)}.",
         "Copy it from the router.",
     )
 

@@ -115,7 +115,7 @@ def name_fault(name: str) -> str | None:
     """The fault in a new sensor's name, as a clause; None when box and sensor accept it."""
     if not 0 < len(name) <= LONGEST_NAME or not all("!" <= letter <= "~" for letter in name):
         return (
-            f"a sensor's name has 1 to {LONGEST_NAME} letters, digits or signs, "
+            f"a sensor's name has 1 to {LONGEST_NAME} letters, digits or punctuation, "
             "without spaces or accents, for instance left-wrist"
         )
     return None

@@ -11,7 +11,7 @@ from appliance.box.record import Record
 from appliance.pose.foreign_file import plain_json
 from appliance.show.box import BoxConfig
 from appliance.stage.admission import Admission
-from appliance.stage.stage_parts import StageParts, admission, warm_up
+from appliance.stage.stage_parts import StageParts, measure_admission, warm_up
 
 _LARGEST = 4096
 
@@ -27,7 +27,7 @@ def admitted(folder: Path, parts: StageParts, box: BoxConfig, comes_back: bool) 
     if before is not None:
         warm_up(parts, before)
         return before
-    measured = admission(parts, box)
+    measured = measure_admission(parts, box)
     with contextlib.suppress(OSError), contextlib.closing(record.writer(folder)) as block:
         block.write(json.dumps(asdict(measured)).encode())
     return measured

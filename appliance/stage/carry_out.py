@@ -64,7 +64,7 @@ def obey_for_sensors(order: Order, parts: StageParts, wearing: SensorFit, now: f
     sensor = order.text
     try:
         if order.name == "reload":
-            return True, _admit(order, parts)
+            return True, _reload_keys(order, parts)
         if order.name == "strobe":
             _require_heard([sensor], parts.link, now)
             parts.link.strobe(sensor, now, STROBE_S)
@@ -86,7 +86,7 @@ def obey_for_sensors(order: Order, parts: StageParts, wearing: SensorFit, now: f
     )
 
 
-def _admit(order: Order, parts: StageParts) -> str:
+def _reload_keys(order: Order, parts: StageParts) -> str:
     parts.link.set_keys({name: SensorKey(name, *key) for name, key in order.keys.items()})
     known = f"The box knows {len(order.keys)} sensor{'' if len(order.keys) == 1 else 's'} now"
     missing = [name for name in parts.worn if name not in order.keys and not parts.link.is_foreign(name)]

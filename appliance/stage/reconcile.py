@@ -47,11 +47,11 @@ class Reconciler:
         self.rate = self._usual_rate = parts.rate
         self._show, self._reader = show, reader
         self._is_first = parts.led.springs is not None or parts.continuing is not None
-        self._gate = True
+        self._strings_pull = True
         self._made, self.source, self.wanted = made, source, ""
         self.motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
         self._seen: ShowState | None = None
-        self._goes = self._going = True
+        self._strings_may_pull = self._is_going = True
         self._declared: Fade[str] | None = None
 
     def pending(self, now: float) -> Sequence[Order]:
@@ -79,10 +79,11 @@ class Reconciler:
                 elif self._is_first and name in _FROM_STATE:  # it was in force
                     orders.append(order_of(one, at_once(fade)))
             self._is_first = False
-        if self._goes != self._gate:
-            self._gate = self._goes
+        if self._strings_may_pull != self._strings_pull:
+            self._strings_pull = self._strings_may_pull
             if self.parts.springs:
-                orders.append(Order("gate", (float(self._gate), GATE_S if self._gate else 0.0)))
+                fade_s = GATE_S if self._strings_pull else 0.0
+                orders.append(Order("gate", (float(self._strings_pull), fade_s)))
         live, declared = self.parts.led.live, self._declared
         wanted = declared.value if declared else self.source
         melt_s = declared.seconds if declared else MELT_S
@@ -96,7 +97,7 @@ class Reconciler:
                 source, fade_s = wanted if self._is_made(wanted) else "", melt_s
             if (order := made.order(source, fade_s, now)) is not None:
                 orders.append(order)
-        rate = self.rate if self._going or not show_state.stands(now) else 0.0
+        rate = self.rate if self._is_going or not show_state.stands(now) else 0.0
         if rate != self.parts.rate:
             orders.append(Order("rate", (rate,)))
         return orders
@@ -114,8 +115,8 @@ class Reconciler:
 
     def _see(self, show_state: ShowState) -> None:
         """Another show state: what each tick asks of it."""
-        self._seen, self._going = show_state, show_state.going
-        self._goes = self._going and not (show_state.panic or show_state.blackout)
+        self._seen, self._is_going = show_state, show_state.going
+        self._strings_may_pull = self._is_going and not (show_state.panic or show_state.blackout)
         is_declared = show_state.show == self._show and PHRASE in show_state
         self._declared = show_state[PHRASE] if is_declared else None
 

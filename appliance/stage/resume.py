@@ -144,7 +144,7 @@ class Resumption:
             return
         try:
             self._writer.write(place)
-        except ValueError as error:  # names of several thousand signs
+        except ValueError as error:  # names of several thousand characters
             self._writer, self.complaint = None, f"The place of the dance is not kept: {error}"
 
 

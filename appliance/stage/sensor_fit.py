@@ -73,7 +73,7 @@ class SensorFit:
         before, wearer.reading = wearer.reading, reading
         if before is None:
             self._meet(wearer, reading)
-        elif reading.wearable != before.wearable:  # it hangs otherwise
+        elif reading.wearable != before.wearable:  # another wearable: it is mounted differently
             wearer.stillness.restart()
             wearer.drift.restart()
             self._ask_for_stillness(wearer)
@@ -196,7 +196,7 @@ class SensorFit:
     def _take(self, wearer: SensorBinding) -> None:
         reading = wearer.reading
         assert reading is not None
-        self._settle(wearer)
+        self._stop_waiting(wearer)
         pose = NeutralPose(reading.orientation, 0.0, reading.boot_nonce)
         self._wear(wearer, [pose] * len(wearer.hands))
         wearer.drift.take_neutral()
@@ -213,7 +213,7 @@ class SensorFit:
             "Its joint goes on as before. Ask again, and stand still at once."
         )
         if wearer.reading is not None and wearer.has_pose_of(wearer.reading.boot_nonce):
-            self._settle(wearer)
+            self._stop_waiting(wearer)
         else:
             self._wait_for(wearer, STILL_S)
 
@@ -221,7 +221,7 @@ class SensorFit:
         wearer.needs_still_s, wearer.waits_until = still_s, until
         self._link.wants_neutral.add(wearer.name)
 
-    def _settle(self, wearer: SensorBinding) -> None:
+    def _stop_waiting(self, wearer: SensorBinding) -> None:
         wearer.needs_still_s, wearer.waits_until = 0.0, math.inf
         self._link.wants_neutral.discard(wearer.name)
 

@@ -226,7 +226,7 @@ def assemble(
     )
 
 
-def admission(parts: StageParts, box: BoxConfig) -> Admission:
+def measure_admission(parts: StageParts, box: BoxConfig) -> Admission:
     """Measure the show's iterations on this machine with the first window and all hands of all puppets.
 
     Raises StageError where the network fails.

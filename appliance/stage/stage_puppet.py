@@ -156,12 +156,12 @@ class StagePuppet:
                 self.blending.add(self.puppet.poses)
         if not self.network_failed:
             self._danced[:] = self._whole[0]
-            self.puppet.restore(self.blending.take(), self._danced)
+            self.puppet.scatter(self.blending.take(), self._danced)
 
     def stand(self) -> None:
         """Put the danced pose on the floor and into the world."""
         frame, grounding = self.frame, self.grounding
-        self.puppet.restore(self.hands.holds, frame.holds)
+        self.puppet.scatter(self.hands.holds, frame.holds)
         grounding.lead(*self.lead.step())
         try:
             figure = grounding.ground_pose(

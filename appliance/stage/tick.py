@@ -24,7 +24,8 @@ DRAIN, MOTION, HANDS, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
 
 
 class Tick:
-    """Runs the stage's parts once a slot. Nothing here waits, logs, or allocates for the collector.
+    """Runs the stage's parts once a slot. Nothing here logs, or allocates for the collector; it waits only
+    for a late reading of the primary sensor, late_look_s at the longest.
 
     A tick that starts so late that its frame could not leave in time does not dance: it sends the last pose
     again, marked late. The phrase stands still meanwhile, so nothing is jumped over and nothing is replayed.

@@ -71,7 +71,7 @@ class Dancer:
             assert not puppet.is_broken
             pose = motion.window()[0].copy()
             moved = blending.take().copy()
-            puppet.restore(moved, pose)
+            puppet.scatter(moved, pose)
             rows.append((moved, window[0].copy(), pose, motion.roots()[0].copy(), motion.lift))
             motion.advance()
         danced, phrase, *whole = (np.array(column) for column in zip(*rows, strict=True))

@@ -71,7 +71,7 @@ def test_windows_of_all_joints_go_to_the_moving_ones_and_back(puppet: Puppet, ph
         assert np.array_equal(moving[:, place], window[:, phrase.skeleton.index(name)])
     whole = window[0].copy()
     changed = random_quaternions(np.random.default_rng(0), len(puppet.joints))
-    puppet.restore(changed, whole)
+    puppet.scatter(changed, whole)
     for joint, name in enumerate(phrase.skeleton.names):
         expected = changed[puppet.joints.index(name)] if name in puppet.joints else window[0, joint]
         assert np.array_equal(whole[joint], expected)

@@ -171,13 +171,13 @@ def cast(bundle: Path) -> Iterator[StageParts]:
 def measured(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """One entry for each measurement."""
     times: list[int] = []
-    real = module.admission
+    real = module.measure_admission
 
     def counted(*given: object) -> Admission:
         times.append(1)
         return real(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(module, "admission", counted)
+    monkeypatch.setattr(module, "measure_admission", counted)
     return times
 
 

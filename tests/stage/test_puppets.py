@@ -23,7 +23,7 @@ from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from appliance.stage.sharing import facts_of
 from appliance.stage.stage_error import StageError
-from appliance.stage.stage_parts import admission, assemble
+from appliance.stage.stage_parts import assemble, measure_admission
 from tests.bundles import swaying_phrase, write_show
 from tests.recorder.night import BOX, Night, reading
 
@@ -157,7 +157,7 @@ def test_all_of_them_count_towards_the_budget(tmp_path: Path) -> None:
     ran: list[tuple[int, int, int]] = []
     for number, puppet in enumerate(parts.puppets):
         _count(puppet.puppet, number, ran)
-    measured = admission(parts, BOX)
+    measured = measure_admission(parts, BOX)
     assert {(0, 3, 2), (1, 3, 2), (2, 2, 1), (3, 3, 2)} <= set(ran)
     assert measured.puppets == 4 and "3 coding iterations of 4 puppets cost" in measured.sentence()
     parts.run_with(replace(measured, coding=2, interaction=1, most_coding=2))

@@ -40,7 +40,7 @@ def osc_string(text: str) -> bytes:
 
 
 def address_part(name: str) -> str:
-    """A joint's name as one part of an address: signs that OSC reserves become underscores."""
+    """A joint's name as one part of an address: characters that OSC reserves become underscores."""
     return name.translate(_FORBIDDEN_IN_ADDRESS).encode("ascii", "replace").decode().replace("?", "_")
 
 

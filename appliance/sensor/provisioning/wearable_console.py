@@ -104,7 +104,7 @@ class WearableConsole:
         line = f"{command} {secret}" if secret else command
         if len(line.encode()) > LONGEST_LINE or any(ord(sign) < 32 for sign in line):
             raise RefusedError(
-                f"The wearable's console takes no such line: '{command}' is too long or has odd signs."
+                f"The wearable's console takes no such line: '{command}' is too long or has odd characters."
             )
         self._write(line.encode() + b"\n")
         until = time.monotonic() + self._patience_s
