@@ -32,6 +32,12 @@ _PRIORITIES = {
 }
 
 
+class Trouble(str):
+    """A sentence about what the show goes on without: the log has it as a warning."""
+
+    __slots__ = ()
+
+
 class LogWriter(logging.Handler):
     """Writes records to a file descriptor (standard output by default), and their priorities to journald.
 
@@ -41,20 +47,24 @@ class LogWriter(logging.Handler):
     def __init__(self, descriptor: int = 1) -> None:
         super().__init__()
         self._descriptor = descriptor
-        self._names_priorities = _is_journal(descriptor)
+        self._names_priorities = is_journal(descriptor)
         # Its put() takes no lock: the real-time thread would wait for one that another thread holds.
         self._records: SimpleQueue[tuple[str, int] | None] = SimpleQueue()
         self.dropped = self._reported = 0
         self._file: Path | None = None
         self._in_file = 0  # records
+        self._is_closed = False
         self._thread = threading.Thread(target=self._write_all, name="log writer", daemon=True)
         self._thread.start()
 
     def handle(self, record: logging.LogRecord) -> bool:
         """As logging.Handler's, but it takes no lock."""
-        passes = bool(self.filter(record))
-        if passes:
-            self.emit(record)
+        try:
+            if passes := bool(self.filter(record)):
+                self.emit(record)
+        except Exception:  # the text of a library's record does not fit its values
+            self.handleError(record)
+            return False
         return passes
 
     def keep_in(self, path: Path) -> None:
@@ -71,9 +81,11 @@ class LogWriter(logging.Handler):
             self.dropped += 1
 
     def close(self) -> None:
-        """Let the last records out, for as long as half a second."""
-        self._records.put(None)
-        self._thread.join(_LAST_OUTPUT_S)
+        """Let the last records out, for as long as half a second; `logging` closes it again at the end."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._records.put(None)
+            self._thread.join(_LAST_OUTPUT_S)
         super().close()
 
     def _write_all(self) -> None:
@@ -153,7 +165,12 @@ def process_log(descriptor: int = 1) -> Iterator[LogWriter]:
         writer.close()
 
 
-def _is_journal(descriptor: int) -> bool:
+def log_sentence(logger: logging.Logger, sentence: str) -> None:
+    """Log a sentence as its kind says."""
+    logger.log(logging.WARNING if isinstance(sentence, Trouble) else logging.INFO, sentence)
+
+
+def is_journal(descriptor: int) -> bool:
     """Whether systemd's journal reads it (JOURNAL_STREAM, systemd.exec(5))."""
     device, _, inode = os.environ.get("JOURNAL_STREAM", "").partition(":")
     with contextlib.suppress(OSError):

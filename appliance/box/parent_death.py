@@ -46,9 +46,11 @@ def forked(do: Callable[[], object]) -> int:
     try:
         gc.freeze()  # unused objects of the parent would close descriptors that are others by then
         end_with(parent, signal.SIGKILL)
+        if log := sys.modules.get("logging"):
+            log.getLogger().handlers = []  # their writing threads are not here
         do()
         status = 0
-    except Exception:
+    except BaseException:
         import traceback
 
         traceback.print_exc()

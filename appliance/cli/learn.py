@@ -46,7 +46,7 @@ from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError
 from appliance.stage.stage_error import StageError
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("appliance.cli.learn")  # `python -m` calls it otherwise
 
 NICE = 19
 # Reading, export, measuring the answer and the check: they took 5 minutes on two cores that others used.

@@ -7,7 +7,7 @@ import sys
 
 from appliance.box.parent_death import end_with_parent
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("appliance.show_control")  # `python -m` calls it otherwise
 
 
 def main() -> int:

@@ -156,10 +156,10 @@ class ControlProcess:
             self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)
         for descriptor in self._foreign.opened(now):
             self._poll.register(descriptor, select.POLLIN)
-        news = self._news.look(self.handler.show_state, now)
-        for message in (self.port.news(now), news, *self._foreign.news(now)):
-            if message:
-                _log.info(message)
+        for trouble in filter(None, (self.port.news(now), *self._foreign.news(now))):
+            _log.warning(trouble)
+        if news := self._news.look(self.handler.show_state, now):
+            _log.info(news)
 
     def _follow_leader(self, now: float) -> None:
         """On a box of a pair that follows: declare what the other one has declared."""

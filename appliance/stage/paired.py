@@ -15,6 +15,7 @@ import numpy as np
 
 from appliance.box.clock import TICK_S, TickClock
 from appliance.box.fallback import Fallbacks
+from appliance.box.log import Trouble
 from appliance.box.orders import Order
 from appliance.box.snapshot import packed, restore, shift_times
 from appliance.dancer.loop import Loop
@@ -189,8 +190,10 @@ class PairedStage:
         name, peers = self._settings.name, self._settings.peers
         if self._carrier.is_apart(peers):
             self._log_and_note(
-                f"{name.capitalize()} ({' and '.join(peers)}) is in no network of the outputs: if the link "
-                "fails, both send. Give its address in the outputs' network as the first `peer:`."
+                Trouble(
+                    f"{name.capitalize()} ({' and '.join(peers)}) is in no network of the outputs: if the "
+                    "link fails, both send. Give its address in the outputs' network as the first `peer:`."
+                )
             )
 
     def may_dance(self, now: float) -> bool:
@@ -413,7 +416,7 @@ class PairedStage:
         self.resyncs += 1
         self.pair.forget_state()
         if self.resyncs < 10 or self.resyncs % 100 == 0:
-            self._log_and_note(f"{why} The leader's state is fetched again.")
+            self._log_and_note(Trouble(f"{why} The leader's state is fetched again."))
 
     def _take_state(self, item: bytes) -> None:
         (self._applied,) = struct.unpack_from("<q", item)

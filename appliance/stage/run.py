@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from appliance.box.clock import Slot, TickClock
 from appliance.box.live_pose import LivePoseReader
+from appliance.box.log import log_sentence
 from appliance.box.notify import Notifier
 from appliance.box.orders import Order, OrderInbox
 from appliance.box.realtime import enter_realtime, leave_realtime
@@ -39,7 +40,7 @@ from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
 from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
-from appliance.stage.watch import Trouble, Watch
+from appliance.stage.watch import Watch
 
 if TYPE_CHECKING:
     from appliance.dancer.puppet import PuppetNetwork
@@ -352,7 +353,7 @@ class Stage:
 
     def _log_and_note(self, message: str) -> None:
         """For the log, and for the journal."""
-        _log.log(logging.WARNING if isinstance(message, Trouble) else logging.INFO, message)
+        log_sentence(_log, message)
         if self.recorder is not None:
             self.recorder.event(SAID, self._now, message=message)
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from appliance.box.fallback import Fallbacks
+from appliance.box.log import Trouble
 from appliance.dancer.live import SILENT_S as LIVE_SILENT_S
 from appliance.dancer.puppeteers import HOLD_S
 from appliance.levers.sources import LIVE
@@ -23,12 +24,6 @@ SILENT_S = 0.5
 CHARGED = 25  # percent: above it a low battery may be said again
 
 
-class Trouble(str):
-    """A sentence about what the show goes on without: the log has it as a warning."""
-
-    __slots__ = ()
-
-
 class Watch:
     """Checks for silent sensors at each tick, for all else once a second, after the frame has left."""
 
@@ -42,7 +37,7 @@ class Watch:
         self._is_source_late = False
         self._dropped: dict[str, int] = {}
         self._ways: dict[str, str] = {}
-        self._said: set[tuple[str, str]] = set()  # what is so, and was said
+        self._said: set[tuple[str, str]] = set()  # conditions that hold, and were reported
         self.fallbacks.set(fallback.ITERATIONS_LOWERED.name, "" if admission.fits else admission.sentence())
         self.fallbacks.concern(fallback.NOT_LET_IN.name, parts.not_let_in)
         self._missing = parts.not_let_in
