@@ -113,14 +113,14 @@ def limits_of(soak: Soak) -> list[Limit]:
     grown = [one for unit in soak.box.units if (one := growth(unit, soak.seconds)) is not None]
     for one in grown:
         message = (
-            f"{one.first.anonymous_mb:.1f} -> {one.last.anonymous_mb:.1f} MB, {one.last.handles} handles"
+            f"{one.first.anonymous_mb:.1f} -> {one.last.anonymous_mb:.1f} MB, of which {one.own_mb:+.1f} MB "
+            f"as it went on, {one.last.handles} handles"
         )
         found.append(
             Limit(
                 f"own memory and handles of {one.name}",
                 f"{message} in {_time(one.lived_s)}",
-                f"the last quarter has at most {MOST_GROWTH_MB:g} MB more than the first half, and no more "
-                "handles or threads",
+                f"at most {MOST_GROWTH_MB:g} MB more as it goes on, and no more handles or threads",
                 one.own_mb <= MOST_GROWTH_MB and one.handles <= 0 and one.threads <= 0,
             )
         )

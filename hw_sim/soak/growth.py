@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from statistics import median
-from typing import TypeVar
 
 from hw_sim.soak.unit import Unit
 from hw_sim.soak.vitals import Vitals
@@ -12,18 +11,19 @@ from hw_sim.soak.vitals import Vitals
 FIRST_MINUTE_S = 60.0
 WINDOW_S = 10.0  # figures of memory are medians over this window
 _SHORTEST_LIFE_S = 3.0
-N = TypeVar("N", int, float)
 
 
 @dataclass(frozen=True)
 class Growth:
     """Resources of one process after its first minute, and at the end; it has lived for `lived_s`.
 
-    Memory is a median over some seconds. Handles and threads come and go, with receivers or for an instant,
-    and a generator has twice the memory while it makes a phrase: what the last quarter has more than the
+    Handles and threads come and go, with receivers or for an instant: what the last quarter has more than the
     first half, at its least and at its most, was not given back.
 
-    own_mb: memory that no file backs; of mapped motions that stay, the handles tell.
+    own_mb: memory that no file backs, which a whole life like the time from its second quarter to its last
+    would have added: the least of the last quarter less the least of the second, twice. A generator has twice
+    the memory while it makes a phrase, and only a process that has run for a while has what it needs. Each is
+    a median over some seconds. Handles tell of mapped motions that stay.
     """
 
     name: str
@@ -54,13 +54,13 @@ def growth(unit: Unit, run_s: float) -> Growth | None:
     half, quarter = after[: len(after) // 2 + 1], after[-(len(after) // 4 + 1) :]
     return Growth(
         *(unit.name, history[-1][0] - history[0][0], _summary(early, half), _summary(late, quarter)),
-        _more(_medians(half), _medians(quarter)),
+        2.0 * (min(_medians(quarter)) - min(_medians(half[len(half) // 2 :]))),
         _more([held.handles for held in half], [held.handles for held in quarter]),
         _more([held.threads for held in half], [held.threads for held in quarter]),
     )
 
 
-def _more(before: list[N], after: list[N]) -> N:
+def _more(before: list[int], after: list[int]) -> int:
     return min(min(after) - min(before), max(after) - max(before))
 
 
