@@ -197,7 +197,7 @@ function commanded(sentence) {
   if (!key) return translated(sentence);
   const level = name === "master" ? rest.replace(/^([\d.]+)(?: ([\d.]+))?/, (_, share, fade) => {
     return [`${number(100 * share)} %`, fade && `${number(Number(fade), fade % 1 ? 1 : 0)} s`].filter(Boolean).join(" · ");
-  }) : rest;
+  }) : translated(rest);
   return words("happened_count", { kind: words(key), count: level });
 }
 

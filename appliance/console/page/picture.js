@@ -14,7 +14,8 @@ const INNER = [...Array(MESH * MESH).keys()].filter((place) => ![0, MESH - 1, ME
 const LOOK_AGAIN_MS = 1800; // at the next word of the box: every two seconds
 const PARTS = ["looks", "wall", "rig"];
 let part = "looks"; // as it was chosen here; one that the box does not have gives way to the first that it has
-let lookedAt = -LOOK_AGAIN_MS;
+const PATIENCE_MS = 10_000; // on a slow link a picture takes longer than that to come
+let lookedAt = -PATIENCE_MS, isAsked = false;
 let wall = null, ownUntil = 0, shown = CORNERS.map((one) => [...one]), pulls = [];
 
 // A handle: its place, how it is drawn under a finger, and the order for a step.
@@ -50,7 +51,10 @@ export function initPicture() {
   held(byId("corners-reset"), () => change("/projector/corners/reset", [], CORNERS), (sentence) => say(sentence));
   byId("corners-undo").addEventListener("click", undo);
   for (const [event, sight] of [["load", "visible"], ["error", "hidden"]]) {
-    byId("wall-now").addEventListener(event, () => { byId("wall-now").style.visibility = sight; });
+    byId("wall-now").addEventListener(event, () => {
+      isAsked = false;
+      byId("wall-now").style.visibility = sight;
+    });
   }
   const brightness = byId("brightness");
   brightness.addEventListener("input", tellBrightness);
@@ -107,7 +111,9 @@ export function showPicture(value) {
 // The newest picture that the projector left of the wall, while somebody looks.
 function lookAtWall(projects) {
   byId("wall-part").hidden = !projects;
-  if (!projects || byId("wall-now").offsetParent === null || performance.now() - lookedAt < LOOK_AGAIN_MS) return;
+  const waits = performance.now() - lookedAt < (isAsked ? PATIENCE_MS : LOOK_AGAIN_MS);
+  if (!projects || waits || document.visibilityState !== "visible" || byId("wall-now").offsetParent === null) return;
+  isAsked = true;
   lookedAt = performance.now();
   byId("wall-now").src = `/api/wall.jpg?${Math.round(lookedAt)}`;
 }
