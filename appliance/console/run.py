@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import ipaddress
 import signal
 import socket
@@ -117,6 +118,7 @@ async def _serve(settings: ConsoleSettings) -> int:
     context, serve = _https(settings) if settings.https else None, runner.server
     assert serve is not None
     notifier.ready("The page is served.")
+    gc.freeze()  # the collector counts only what browsers leave, and so takes it before it is a megabyte
     await learn.go_on()
     tasks = [
         asyncio.create_task(door.accept(listening, serve, context)),
