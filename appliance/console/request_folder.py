@@ -13,7 +13,7 @@ from appliance.pose.foreign_file import stored_json
 
 
 class Wish(Protocol):
-    """What is asked for: a NamedTuple."""
+    """A request: a NamedTuple."""
 
     def _asdict(self) -> dict[str, Any]: ...
 
@@ -46,4 +46,4 @@ class RequestFolder(ABC, Generic[Asked]):
 
     @abstractmethod
     def _sound(self, said: Any) -> Asked | None:
-        """The request in what was read; None, or an error of `wanted`, where it is none."""
+        """The request as it was read; None, or an error that `wanted` catches, for anything else."""
