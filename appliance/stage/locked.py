@@ -12,7 +12,7 @@ from appliance.pair.roles import Role
 from appliance.show.locked import LockedConfig
 from appliance.show.pair import PairConfig
 from appliance.stage.fallback import OUT_OF_STEP
-from appliance.stage.paired import PairedStage, settings_of
+from appliance.stage.paired import PairedStage, PairParts, settings_of
 from appliance.stage.rejoining import Rejoining
 
 _SILENT_MS = 200.0  # then a box that follows dances by itself
@@ -22,10 +22,9 @@ _REJOINS_S = 1.5  # in which its figures are led back to the leader's: as slowly
 class LockedStage(PairedStage):
     """As a pair's, but every box speaks to its own receivers, and the same one always leads."""
 
-    def __init__(self, config: LockedConfig, *rest: Any) -> None:
-        """rest: as a pair's."""
+    def __init__(self, config: LockedConfig, stage: PairParts) -> None:
         self._links = _links(config)
-        super().__init__(self._links[0], *rest)
+        super().__init__(self._links[0], stage)
         self._rejoining = Rejoining(self._parts.skeleton, self._tick.frame.puppets, _REJOINS_S)
         if not self._settings.is_first:
             self._parts.outputs.altered_by = self._rejoining.lead

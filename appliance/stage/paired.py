@@ -7,7 +7,7 @@ import json
 import struct
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,9 +59,15 @@ TOLERANCE_DEGREES = 0.5  # between processors of two kinds; beyond it the leader
 def settings_of(config: PairConfig) -> PairSettings:
     """From the box file. Raises ConfigError for a missing or malformed secret."""
     key = secret_in(config.secret)
-    name = "the second box" if config.role == "first" else "the first box"
-    where = config.host, config.port, tuple(config.peer)
-    return PairSettings(name, config.role == "first", *where, key, config.silent_ms / 1000.0)
+    return PairSettings(
+        name="the second box" if config.role == "first" else "the first box",
+        is_first=config.role == "first",
+        host=config.host,
+        port=config.port,
+        peers=tuple(config.peer),
+        key=key,
+        silent_s=config.silent_ms / 1000.0,
+    )
 
 
 def secret_in(path: Path) -> bytes:
@@ -86,6 +92,26 @@ def fingerprint_of(show: Show, facts: dict[str, Any]) -> bytes:
     return digest.digest()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairParts:
+    """What a stage shares with its pair.
+
+    folder: where this box's part in the pair is published. note: logs a sentence, and notes it in the
+    journal. made: gives the loops that this box's generator has made, and raises ValueError for others; None:
+    there is no generator.
+    """
+
+    outputs: OutputsConfig
+    show: Show
+    parts: StageParts
+    wearing: SensorFit
+    tick: Tick
+    reconciler: Reconciler
+    folder: Path
+    note: Callable[[str], None]
+    made: Callable[[str], Loop] | None = None
+
+
 class PairedStage:
     """Joins the pair with the stage's parts. Nothing here waits but `follow`.
 
@@ -93,36 +119,23 @@ class PairedStage:
     differs: the worst difference of a frame from the leader's, degrees, since it was followed.
     """
 
-    def __init__(
-        self,
-        config: PairConfig,
-        outputs: OutputsConfig,
-        show: Show,
-        parts: StageParts,
-        wearing: SensorFit,
-        tick: Tick,
-        reconciler: Reconciler,
-        folder: Path,
-        note: Callable[[str], None],
-        made: Callable[[str], Loop] | None = None,
-    ) -> None:
-        """note: logs a sentence, and notes it in the journal. made: gives the loops that this box's generator
-        has made; it raises ValueError.
-        """
+    def __init__(self, config: PairConfig, stage: PairParts) -> None:
+        show, parts, tick = stage.show, stage.parts, stage.tick
         facts = facts_of_run(show, list(parts.worn))
         self._layout = layout_of(facts)
         self._settings = settings_of(config)
         self.pair = self._open(fingerprint_of(show, facts), time.monotonic())
-        self._parts, self._tick, self._wearing, self._reconciler = parts, tick, wearing, reconciler
-        self._log_and_note = note
-        self._rerun = Rerun(tick, wearing, facts["sensors"])
+        self._parts, self._tick = parts, tick
+        self._wearing, self._reconciler = stage.wearing, stage.reconciler
+        self._log_and_note = stage.note
+        self._rerun = Rerun(tick, stage.wearing, facts["sensors"])
         self._own_link, self._own_live = parts.link, parts.live_inbox
         self._own_latest_start_s = tick.latest_start_s
         self._own_most = [one.iterations.most for one in parts.puppets]
-        if made is not None:
-            parts.make_by(_made_here_or_again(show, parts, made))
-        self._part = PartWriter(folder)
-        self._carrier = Carrier(receivers_of(outputs), peers=self._settings.peers)
+        if stage.made is not None:
+            parts.make_by(_made_here_or_again(show, parts, stage.made))
+        self._part = PartWriter(stage.folder)
+        self._carrier = Carrier(receivers_of(stage.outputs), peers=self._settings.peers)
         self._give_at = float("-inf")
         self._items: list[bytes] = []
         self._sent_state: ShowState | None = None
@@ -359,8 +372,16 @@ class PairedStage:
         roles = self.pair.roles
         if speaks := roles.leads and self._carrier.may_speak(now, roles.heard):
             self._spoke_at = now
-        flags = roles.leads, speaks, self.pair.is_ready, roles.peer_lives(now)
-        self._part.write(BoxPart(*flags, roles.epoch, now))
+        self._part.write(
+            BoxPart(
+                leads=roles.leads,
+                speaks=speaks,
+                is_ready=self.pair.is_ready,
+                peer_lives=roles.peer_lives(now),
+                epoch=roles.epoch,
+                written=now,
+            )
+        )
 
     def _hear_leader(self) -> None:
         parts = self._parts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from appliance.box.runtime_folder import renew_lost
 from appliance.box.show_state import ShowStateReader
 from appliance.box.snapshot import packed
 from appliance.dancer.phrase_cache import MEMORY
+from appliance.dancer.puppet import PuppetNetwork
 from appliance.pair.part import forget_part
 from appliance.recorder.record import ORDER, SAID, facts_of_run
 from appliance.sensor.battery_life import BatteryLives
@@ -43,8 +44,6 @@ from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
 
 if TYPE_CHECKING:
-    from appliance.dancer.puppet import PuppetNetwork
-    from appliance.pose.skeleton import Skeleton
     from appliance.stage.paired import PairedStage
 
 _log = logging.getLogger(__name__)
@@ -86,8 +85,12 @@ class Stage:
             self.memory = SensorMemory(box.state_folder, self.sharing.noted)
             opened.callback(self.memory.close)
             self.parts: StageParts = assemble(
-                *(show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY),
-                *_network_of_a_pair(box),
+                show,
+                box,
+                profiles=self.memory.profiles,
+                box_file=box_file,
+                memory=self.sharing.folder / MEMORY,
+                network_of=_network_of(box),
             )
             opened.callback(self.parts.close)
             if self.parts.has_live:
@@ -110,7 +113,7 @@ class Stage:
         self.iterations = self.parts.led.iterations
         self.second_look = SecondLook(self.admission)
         self.reconciler = Reconciler(
-            *(show.config.name, self.parts, show_state, self.made, show.config.motion.source)
+            show.config.name, self.parts, show_state, made=self.made, source=show.config.motion.source
         )
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
@@ -219,16 +222,25 @@ class Stage:
             return None
         if self.recorder is None:
             return None  # what another box would follow is what the recorder notes; it was said why not
-        rest = self.box.outputs, self.show, self.parts, self.wearing, self.tick, self.reconciler
-        more = self.sharing.folder, self._log_and_note, self.made[0].loop if self.made else None
-        if pair is not None:
-            from appliance.stage.paired import PairedStage
+        from appliance.stage.paired import PairedStage, PairParts
 
-            paired = PairedStage(pair, *rest, *more)
+        stage = PairParts(
+            outputs=self.box.outputs,
+            show=self.show,
+            parts=self.parts,
+            wearing=self.wearing,
+            tick=self.tick,
+            reconciler=self.reconciler,
+            folder=self.sharing.folder,
+            note=self._log_and_note,
+            made=self.made[0].loop if self.made else None,
+        )
+        if pair is not None:
+            paired = PairedStage(pair, stage)
         elif locked is not None:
             from appliance.stage.locked import LockedStage
 
-            paired = LockedStage(locked, *rest, *more)
+            paired = LockedStage(locked, stage)
         self.recorder.tap = paired.note
         return paired
 
@@ -345,10 +357,15 @@ class Stage:
         age_s = self._sensor_age_s(leaders_now)
         if self.paired is not None:
             self.paired.set_fallbacks(self.watch.fallbacks, now)
-        fallbacks = self.watch.fallbacks.happened(now)
-        paired = {} if self.paired is None else self.paired.reported(now)
         self.sharing.publish_health(
-            *(now, self.health, self.reconciler, age_s, locked, roster, fallbacks, paired)
+            now,
+            self.health,
+            self.reconciler,
+            sensor_age_s=age_s,
+            locked=locked,
+            sensors=roster,
+            fallbacks=self.watch.fallbacks.happened(now),
+            paired={} if self.paired is None else self.paired.reported(now),
         )
 
     def _log_and_note(self, message: str) -> None:
@@ -398,12 +415,13 @@ class Stage:
             return None
 
 
-def _network_of_a_pair(box: BoxConfig) -> Iterator[Callable[[Path, Skeleton, int], PuppetNetwork]]:
-    """One that can be told where the other box's failed."""
-    if box.pair is not None or box.locked is not None:
-        from appliance.stage.rerun import RecordedNetwork
+def _network_of(box: BoxConfig) -> type[PuppetNetwork]:
+    """Of one of several boxes: a network that can be told where the other box's failed."""
+    if box.pair is None and box.locked is None:
+        return PuppetNetwork
+    from appliance.stage.rerun import RecordedNetwork
 
-        yield RecordedNetwork
+    return RecordedNetwork
 
 
 def _open_inbox(folder: Path) -> OrderInbox:
