@@ -209,7 +209,7 @@ class PairedStage:
                 )
             )
 
-    def may_dance(self, now: float) -> bool:
+    def still_leads(self, now: float) -> bool:
         """The leader, before a tick: whether it still leads."""
         self._look(now)
         if self.pair.leads:

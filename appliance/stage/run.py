@@ -170,11 +170,11 @@ class Stage:
         if self.paired is not None:
             self.paired.begin(clock.now())
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
-            if self.paired is not None and not self._may_dance(clock):
+            if self.paired is not None and not self._lead_or_follow(clock):
                 continue
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self._now = slot.started
-            if self.paired is not None and not self.paired.may_dance(slot.started):
+            if self.paired is not None and not self.paired.still_leads(slot.started):
                 continue
             # only the first tick after a stop: a machine that is always slow is still reported
             self._comes_from_stop = slot.skipped >= _HUNG_SLOTS and not self._comes_from_stop
@@ -244,7 +244,7 @@ class Stage:
         self.recorder.tap = paired.note
         return paired
 
-    def _may_dance(self, clock: TickClock) -> bool:
+    def _lead_or_follow(self, clock: TickClock) -> bool:
         """Whether this box leads; else it follows for a moment, with its outputs silent."""
         paired = self.paired
         assert paired is not None

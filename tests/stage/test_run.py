@@ -270,7 +270,7 @@ def test_a_box_that_follows_says_once_that_it_is_ready(
     monkeypatch.setattr(evening.stage.notifier, "ready", lambda: said.append("ready"))
     monkeypatch.setattr(evening.stage, "paired", follower(ahead_s=0.0))
     for _ in range(100):
-        assert not evening.stage._may_dance(TickClock(monotonic=lambda: 0.0))
+        assert not evening.stage._lead_or_follow(TickClock(monotonic=lambda: 0.0))
     assert said == ["ready"]
 
 
