@@ -94,7 +94,7 @@ def fingerprint_of(show: Show, facts: dict[str, Any]) -> bytes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairParts:
-    """What a stage shares with its pair.
+    """The parts of a stage that its pair works with.
 
     folder: where this box's part in the pair is published. note: logs a sentence, and notes it in the
     journal. made: gives the loops that this box's generator has made, and raises ValueError for others; None:

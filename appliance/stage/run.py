@@ -416,7 +416,7 @@ class Stage:
 
 
 def _network_of(box: BoxConfig) -> type[PuppetNetwork]:
-    """Of one of several boxes: a network that can be told where the other box's failed."""
+    """The class of the network; with other boxes, one that can be told where theirs failed."""
     if box.pair is None and box.locked is None:
         return PuppetNetwork
     from appliance.stage.rerun import RecordedNetwork
