@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from appliance.box.live_pose import forget_live_pose
-from appliance.box.log import SAID, process_log
+from appliance.box.log import SAID, Trouble, log_sentence, process_log
 from appliance.box.made_motion import forget_made_motion
 from appliance.box.runtime_folder import restored_file
 from appliance.box.show_state import forget_show_state
@@ -160,8 +160,8 @@ def _proof(options: PlayOptions, show: Show) -> str:
 
 def _prepare(options: PlayOptions, show: Show, box: BoxConfig, opened: ExitStack) -> _Prepared:
     """Open the log, the ports and the stage; the caller closes the stage, and `opened` all else."""
-    log = opened.enter_context(process_log())
     stopped = opened.enter_context(stop_signals())
+    log = opened.enter_context(process_log())  # closed first: a second Ctrl-C cuts no line off
     scratch = _scratch(opened) if options.emulate or options.filmstrip or options.rehearse else None
     if options.emulate and scratch:
         from appliance.cli.emulation import emulated
@@ -208,9 +208,9 @@ def _dance(options: PlayOptions, prepared: _Prepared, proof: str) -> None:
     show, box, (keeps, journal, minutes) = stage.show.config, stage.box, prepared.keeping
     keepers_box = _rehearsal_box(stage, scratch) if options.emulate and scratch else box.path
     keeper = _keeper(keepers_box, journal, minutes) if keeps else None
-    unlit = () if options.alone or show.lights.fixtures else unwired(show, box)
+    unlit = () if options.alone or show.lights.fixtures else map(Trouble, unwired(show, box))
     for line in (*proof.splitlines(), *_introduction(stage, options.emulate, control), *unlit):
-        _log.info(line)
+        log_sentence(_log, line)
     companions = () if options.alone else tuple(_companions(show, box, control, prepared.window))
     if prepared.page is not None:
         from appliance.cli.console import page_companion
@@ -366,8 +366,8 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
         _inputs(stage, control),
         stage.admission.sentence(),
     ]
-    lines += stage.parts.complaints
-    lines += map(str, (*show.doubtful_hands(), *show.doubtful_strings()))
+    lines += map(Trouble, stage.parts.complaints)
+    lines += map(Trouble, map(str, (*show.doubtful_hands(), *show.doubtful_strings())))
     if (hours := stage.box.hours) is not None:
         lines += hours.unknown_cues([cue.name for cue in show.config.cues])
     if emulate:
