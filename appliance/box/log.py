@@ -62,7 +62,7 @@ class LogWriter(logging.Handler):
         try:
             if passes := bool(self.filter(record)):
                 self.emit(record)
-        except Exception:  # the text of a library's record does not fit its values
+        except Exception:  # as logging does: reported on standard error
             self.handleError(record)
             return False
         return passes
@@ -120,11 +120,10 @@ class LogWriter(logging.Handler):
 
 
 class LibraryLimit(logging.Filter):
-    """Lets all records of the product through, and of libraries LINES in PERIOD_S: strangers may provoke
-    them.
+    """Passes every record of the product, and LINES of libraries in PERIOD_S, which strangers may provoke.
 
-    The first one after that says how many were left out. Requests that are no HTTP are none of them: their
-    traceback says nothing that anybody could mend.
+    The next record of a library then says how many were left out. The traceback of a request that is no HTTP
+    is dropped: it names nothing that anybody could mend.
     """
 
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:

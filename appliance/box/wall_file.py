@@ -7,7 +7,7 @@ from pathlib import Path
 
 WALL = "wall.jpg"  # in the runtime folder, in memory
 EVERY_S = 10.0
-ASKED = "wall.asked"  # touched by a page that somebody looks at
+ASKED = "wall.asked"  # a page on a screen touches it at each look at the wall
 SOON_S = 2.0  # then
 LARGEST = 200_000  # bytes
 
@@ -30,7 +30,7 @@ def ask_for_wall(folder: Path) -> None:
 
 
 def is_wall_asked_for(folder: Path, now: float) -> bool:
-    """Whether somebody looks. now: Unix seconds."""
+    """Whether a browser shows the wall. now: Unix seconds."""
     try:
         return abs(now - (folder / ASKED).stat().st_mtime) <= EVERY_S
     except OSError:

@@ -340,7 +340,7 @@ class SpringsParameters:
         self.settle()
 
     def turn(self, knob: str, values: Sequence[float], seconds: float) -> None:
-        """Turn one knob to these values within so many seconds."""
+        """Fade one knob to these values over `seconds`."""
         self._glide.aim(_PARTS[knob], values, seconds)
         self.settle()
 

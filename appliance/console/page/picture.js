@@ -108,7 +108,7 @@ export function showPicture(value) {
   put(wall.corners);
 }
 
-// The newest picture that the projector left of the wall, while somebody looks.
+// Shows the projector's newest picture of the wall while this page is on a screen.
 function lookAtWall(projects) {
   byId("wall-part").hidden = !projects;
   const waits = performance.now() - lookedAt < (isAsked ? PATIENCE_MS : LOOK_AGAIN_MS);
